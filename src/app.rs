@@ -1,0 +1,1 @@
+//! The application model: state, commands, jobs. No window.

@@ -1,0 +1,22 @@
+//! Pure science: images, sensors, frames, simulation, registration, diffusion, metrics.
+//!
+//! **Architecture invariant:** nothing here names a window, a GPU, a model runtime, a file,
+//! a thread or a clock. Values come in as arguments and go out as results, in metres and radians.
+
+pub mod align;
+pub mod cloud;
+pub mod colormap;
+pub mod contact;
+pub mod dataset;
+pub mod diffusion;
+pub mod frames;
+pub mod grid;
+pub mod label;
+pub mod mesh;
+pub mod metrics;
+pub mod postprocess;
+pub mod resample;
+pub mod sample;
+pub mod sensor;
+pub mod sim;
+pub mod units;

@@ -1,0 +1,1 @@
+//! Registration: contact points to the in-hand pose.

@@ -1,0 +1,1 @@
+//! Point clouds lifted from imprints, in the grasp frame.

@@ -1,0 +1,1 @@
+//! Contact masks from depth: threshold, top percent, CAD signed distance.

@@ -1,0 +1,1 @@
+//! Latent diffusion: schedule, seeded noise, DDIM.

@@ -1,0 +1,1 @@
+//! Editing contact masks: brush stamps, patches, clean-ups.

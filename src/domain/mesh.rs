@@ -1,0 +1,48 @@
+//! Triangle meshes: the CAD models of the tools, in metres and the object frame.
+
+use glam::DVec3;
+
+/// An indexed triangle mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriMesh {
+    /// Corner positions, metres, object frame.
+    pub vertices: Vec<DVec3>,
+    /// Corner indices of each triangle, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriMesh {
+    /// The corners of triangle `index`.
+    pub fn corners(&self, index: usize) -> [DVec3; 3] {
+        self.triangles[index].map(|v| self.vertices[v as usize])
+    }
+
+    /// Smallest and largest corner of the bounding box; `None` without vertices.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let first = *self.vertices.first()?;
+        Some(self.vertices.iter().fold([first, first], |[lo, hi], v| [lo.min(*v), hi.max(*v)]))
+    }
+
+    /// Surface area, square metres.
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len()).map(|i| triangle_area(self.corners(i))).sum()
+    }
+
+    /// Whether every edge belongs to exactly two triangles, once in each direction.
+    pub fn is_watertight(&self) -> bool {
+        let mut edges: Vec<(u32, u32)> = Vec::with_capacity(self.triangles.len() * 3);
+        for t in &self.triangles {
+            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                edges.push((a, b));
+            }
+        }
+        edges.sort_unstable();
+        let unique = edges.windows(2).all(|w| w[0] != w[1]);
+        unique && edges.iter().all(|&(a, b)| edges.binary_search(&(b, a)).is_ok())
+    }
+}
+
+/// Area of a triangle, square metres.
+pub fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {
+    0.5 * (b - a).cross(c - a).length()
+}

@@ -1,0 +1,1 @@
+//! From the decoder's output to an imprint in metres.

@@ -1,0 +1,1 @@
+//! Simulator of both sensors and their ground truth.

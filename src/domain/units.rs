@@ -1,0 +1,40 @@
+//! Metres and radians inside, millimetres and degrees on screen: the only place that converts and formats.
+
+/// Metres to millimetres.
+pub fn mm(metres: f64) -> f64 {
+    metres * 1e3
+}
+
+/// `8.42 mm`: lengths are shown with two decimals.
+pub fn text_mm(metres: f64) -> String {
+    format!("{:.2} mm", mm(metres))
+}
+
+/// `12.3°`: angles are shown with one decimal.
+pub fn text_deg(radians: f64) -> String {
+    format!("{:.1}°", radians.to_degrees())
+}
+
+/// The angle brought into (-π, π].
+pub fn wrap_angle(radians: f64) -> f64 {
+    let wrapped = radians.rem_euclid(std::f64::consts::TAU);
+    if wrapped > std::f64::consts::PI { wrapped - std::f64::consts::TAU } else { wrapped }
+}
+
+/// The size of the difference of two angles, in [0, π]: 359° and 1° are 2° apart.
+pub fn angle_error(a: f64, b: f64) -> f64 {
+    wrap_angle(a - b).abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angle_error_wraps() {
+        assert!((angle_error(359f64.to_radians(), 1f64.to_radians()) - 2f64.to_radians()).abs() < 1e-12);
+        assert!((angle_error(0.3, 0.3 + std::f64::consts::TAU)).abs() < 1e-12);
+        assert_eq!(text_deg(-0.1), "-5.7°");
+        assert_eq!(text_mm(0.00842), "8.42 mm");
+    }
+}

@@ -1,0 +1,1 @@
+//! The 3D renderer. Knows domain types, not the application state.

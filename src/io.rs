@@ -1,0 +1,1 @@
+//! Adapters to files: datasets, meshes, arrays, masks, export.

@@ -1,0 +1,1 @@
+//! The studio's window: panes, widgets, theme.

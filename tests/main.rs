@@ -1,0 +1,17 @@
+//! The one integration binary (see ARCHITECTURE.md): each level of test is a module.
+
+#[allow(dead_code, reason = "not every feature set uses every helper")]
+mod support;
+
+mod apply;
+mod cli;
+mod io;
+mod layers;
+mod models;
+mod pose;
+mod sim;
+
+#[cfg(feature = "gui")]
+mod gpu;
+#[cfg(feature = "ui-test")]
+mod ui;
