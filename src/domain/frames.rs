@@ -45,10 +45,7 @@ impl PlanarPose {
 
     /// The same motion in space.
     pub fn to_affine(self) -> DAffine3 {
-        DAffine3::from_rotation_translation(
-            DQuat::from_rotation_x(self.theta_rad),
-            DVec3::new(0.0, self.y_m, self.z_m),
-        )
+        DAffine3::from_rotation_translation(DQuat::from_rotation_x(self.theta_rad), DVec3::new(0.0, self.y_m, self.z_m))
     }
 
     /// Whether every number is finite.

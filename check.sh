@@ -1,0 +1,41 @@
+#!/usr/bin/env bash
+# Passes the tests: everything that CI runs, fastest first, with all set-up of its own.
+# On Debian and Ubuntu it installs a software Vulkan driver and the window libraries (asks for sudo if need be);
+# a missing GPU, ONNX Runtime or window is then a failure, not a skip.
+set -euo pipefail
+cd "$(dirname "$0")"
+step() { printf '\n== %s (%ss)\n' "$*" "$SECONDS"; }
+
+step "packages"
+. ./setup.sh
+need_packages test
+
+step "format"
+cargo fmt --check
+
+step "lints: the science alone, then everything"
+cargo clippy --locked --no-default-features --all-targets -- -D warnings
+cargo clippy --locked --features ui-test --all-targets -- -D warnings
+
+step "documentation"
+RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --document-private-items --features ui-test
+
+step "tests: the science alone"
+cargo test --locked --no-default-features
+
+step "the ONNX Runtime library, fetched by the product itself"
+runtime_dir="$PWD/target/onnxruntime"
+cargo run --locked --quiet --features ui-test -- runtime --fetch --dir "$runtime_dir"
+ORT_DYLIB_PATH="$(find "$runtime_dir" -name 'libonnxruntime*' -type f | head -n 1)"
+export ORT_DYLIB_PATH
+
+step "tests: files, models on both engines, GPU on a software driver, the studio by clicks and keys"
+export REQUIRE_GPU=1 REQUIRE_ORT=1
+if [ -z "${VK_DRIVER_FILES:-}" ]; then
+  # One named driver for every machine: pictures and timings of the tests then mean the same everywhere.
+  driver=$(find /usr/share/vulkan/icd.d -name 'lvp_icd*.json' 2>/dev/null | head -n 1)
+  [ -z "$driver" ] || export VK_DRIVER_FILES="$driver"
+fi
+cargo test --locked --features ui-test
+
+step "all passed"
