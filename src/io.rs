@@ -1,1 +1,6 @@
 //! Adapters to files: datasets, meshes, arrays, masks, export.
+//!
+//! Every error names the file, what is wrong with it, and (`hint`) what to do about it.
+
+pub mod atomic;
+pub mod pt;

@@ -1,1 +1,3 @@
-//! (filled by its layer)
+//! Files: what PyTorch wrote, the lab's folders, image folders, masks, export, and everything that can be wrong.
+
+mod pt;

@@ -1,0 +1,169 @@
+//! PyTorch's container, in both directions.
+
+use std::path::PathBuf;
+
+use touch2touch::io::pt::{PtError, PtItem, Tensor, Values, read_dict, read_text_lists, write_dict};
+
+fn data(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+/// The bits of a tensor as `make_pt_fixture.py` writes them.
+fn bits(tensor: &Tensor) -> Vec<String> {
+    match &tensor.values {
+        Values::F32(v) => v.iter().map(|x| format!("{:08x}", x.to_bits())).collect(),
+        Values::F64(v) => v.iter().map(|x| format!("{:016x}", x.to_bits())).collect(),
+        Values::U8(v) => v.iter().map(u8::to_string).collect(),
+        Values::I64(v) => v.iter().map(i64::to_string).collect(),
+    }
+}
+
+#[test]
+fn a_file_written_by_pytorch_reads_back_to_the_last_bit() {
+    let dict = read_dict(&data("torch_views.pt")).unwrap();
+    let truth: serde_json::Value = serde_json::from_slice(&std::fs::read(data("torch_views.json")).unwrap()).unwrap();
+    let truth = truth.as_object().unwrap();
+    assert!(truth.len() >= 16);
+    for (key, want) in truth {
+        let tensor = dict.tensor(key).unwrap();
+        assert_eq!(serde_json::json!(tensor.shape), want["shape"], "{key}");
+        assert_eq!(serde_json::json!(bits(&tensor)), want["bits"], "{key}");
+        let is_f64 = want["dtype"] == "float64";
+        assert_eq!(matches!(tensor.values, Values::F64(_)), is_f64, "{key}");
+    }
+    assert_eq!(dict.scalar("a_float").unwrap(), 0.25);
+    assert_eq!(dict.scalar("an_int").unwrap(), 7.0);
+    assert_eq!(dict.scalar("theta").unwrap(), -0.107_569_456_100_463_87);
+    assert_eq!(dict.f32s("transposed", &[&[5, 3]]).unwrap().len(), 15);
+}
+
+#[test]
+fn what_is_not_there_or_of_another_shape_is_named() {
+    let dict = read_dict(&data("torch_views.pt")).unwrap();
+    let err = dict.tensor("bubble_imprint").unwrap_err();
+    let text = err.to_string();
+    assert!(
+        text.contains("bubble_imprint") && text.contains("transposed") && text.contains("torch_views.pt"),
+        "{text}"
+    );
+    let err = dict.f32s("f32", &[&[2, 1, 140, 175], &[140, 175]]).unwrap_err();
+    let text = err.to_string();
+    assert!(text.contains("[2, 3, 4]") && text.contains("[2, 1, 140, 175] or [140, 175]"), "{text}");
+    assert!(matches!(dict.scalar("f32"), Err(PtError::WrongShape { .. })));
+    assert!(matches!(dict.scalar("empty"), Err(PtError::WrongShape { .. })));
+    assert!(matches!(dict.tensor("a_text"), Err(PtError::NotATensor { .. })));
+    assert!(!err.hint().is_empty());
+}
+
+#[test]
+fn numpy_values_and_top_level_tensors_are_refused_by_name() {
+    let dict = read_dict(&data("torch_numpy.pt")).unwrap();
+    assert_eq!(dict.tensor("ok").unwrap(), Tensor::f32(&[2], vec![1.0; 2]));
+    for key in ["theta", "arr"] {
+        let text = dict.tensor(key).unwrap_err().to_string();
+        assert!(text.contains("numpy") && text.contains(key), "{text}");
+    }
+    assert!(matches!(read_dict(&data("torch_toplevel.pt")), Err(PtError::NotADict { .. })));
+}
+
+#[test]
+fn damaged_files_are_errors_at_every_length() {
+    let whole = std::fs::read(data("torch_views.pt")).unwrap();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("cut.pt");
+    for length in (0..whole.len()).step_by(97) {
+        std::fs::write(&path, &whole[..length]).unwrap();
+        let text = read_dict(&path).unwrap_err().to_string();
+        assert!(text.contains("cut.pt"), "{text}");
+    }
+    // A flipped byte is either found or lands in padding; it never panics.
+    for at in (0..whole.len()).step_by(61) {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 0x55;
+        std::fs::write(&path, &bytes).unwrap();
+        if let Ok(dict) = read_dict(&path) {
+            for key in dict.keys() {
+                dict.tensor(&key).ok();
+            }
+        }
+    }
+    for (content, name) in [(&b"hello world"[..], "text.pt"), (b"", "empty.pt"), (b"PK\x03\x04", "pk.pt")] {
+        let path = dir.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        assert!(read_dict(&path).unwrap_err().to_string().contains(name));
+    }
+    assert!(matches!(read_dict(&dir.path().join("none.pt")), Err(PtError::Io { .. })));
+    assert!(matches!(read_dict(dir.path()), Err(PtError::NotADict { .. })));
+}
+
+fn sample_items() -> Vec<(&'static str, PtItem)> {
+    let numbers: Vec<f32> = (0..24).map(|i| (i as f32).sin() * 1e-3).collect();
+    vec![
+        ("bubble_imprint", Tensor::f32(&[2, 1, 3, 4], numbers).into()),
+        ("theta", Tensor::f64(&[], vec![-0.107_569_456_100_463_87]).into()),
+        ("contact_mask", Tensor::u8(&[2, 2], vec![0, 1, 255, 7]).into()),
+        ("index", Tensor { shape: vec![2], values: Values::I64(vec![-5, i64::MAX]) }.into()),
+        ("none", Tensor::f32(&[0, 3], vec![]).into()),
+        ("train_tools", PtItem::Texts(vec!["pattern_31_rod".into(), "ünïcode".into()])),
+        ("name", PtItem::Text("demo".into())),
+        ("scale", PtItem::Float(0.1)),
+    ]
+}
+
+#[test]
+fn what_is_written_reads_back_and_is_the_same_every_time() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.pt");
+    write_dict(&path, &sample_items()).unwrap();
+    let first = std::fs::read(&path).unwrap();
+    write_dict(&path, &sample_items()).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), first);
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file is left");
+    let dict = read_dict(&path).unwrap();
+    for (key, item) in sample_items() {
+        if let PtItem::Tensor(tensor) = item {
+            assert_eq!(dict.tensor(key).unwrap(), tensor, "{key}");
+        }
+    }
+    assert_eq!(dict.scalar("scale").unwrap(), 0.1);
+    let lists = read_text_lists(&path).unwrap();
+    assert_eq!(lists, [("train_tools".to_string(), vec!["pattern_31_rod".to_string(), "ünïcode".into()])]);
+    let lists = read_text_lists(&data("torch_tools.pt")).unwrap();
+    assert_eq!(lists[0], ("test_tools".to_string(), vec!["pattern_35".to_string(), "pattern_36".into()]));
+    let bad = [("x", PtItem::from(Tensor::f32(&[2, 2], vec![0.0])))];
+    assert!(matches!(write_dict(&path, &bad), Err(PtError::BadTensor { .. })));
+    assert_eq!(std::fs::read(&path).unwrap(), first, "a refused write leaves the old file");
+}
+
+/// Needs a Python with PyTorch, named by `TOUCH2TOUCH_TORCH_PYTHON`.
+#[test]
+fn pytorch_reads_what_is_written() {
+    let Some(python) = std::env::var_os("TOUCH2TOUCH_TORCH_PYTHON") else {
+        eprintln!("TOUCH2TOUCH_TORCH_PYTHON is not set: PyTorch itself is not asked");
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.pt");
+    write_dict(&path, &sample_items()).unwrap();
+    let script = "
+import sys, math, torch
+d = torch.load(sys.argv[1], weights_only=True)
+want = torch.tensor([math.sin(i) for i in range(24)])
+assert list(d) == ['bubble_imprint', 'theta', 'contact_mask', 'index', 'none', 'train_tools', 'name', 'scale'], list(d)
+assert d['bubble_imprint'].shape == (2, 1, 3, 4) and d['bubble_imprint'].dtype == torch.float32
+assert (d['bubble_imprint'].flatten() - want * 1e-3).abs().max() < 1e-9
+assert d['theta'].item() == -0.10756945610046387 and d['theta'].shape == () and d['theta'].dtype == torch.float64
+assert d['contact_mask'].tolist() == [[0, 1], [255, 7]] and d['contact_mask'].dtype == torch.uint8
+assert d['index'].tolist() == [-5, 2**63 - 1]
+assert d['none'].shape == (0, 3)
+assert d['train_tools'] == ['pattern_31_rod', 'ünïcode'] and d['name'] == 'demo' and d['scale'] == 0.1
+torch.load(sys.argv[1], weights_only=True, mmap=True)
+";
+    let out = std::process::Command::new(python)
+        .args(["-c", script])
+        .arg(&path)
+        .env("OMP_NUM_THREADS", "1")
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+}
