@@ -1,1 +1,182 @@
 //! Colour maps for depth (sequential) and error (diverging); CPU twin of `shaders/common/color.wgsl`.
+//!
+//! Colours are sRGB-encoded (what a PNG or a screen takes). A GPU test holds the two implementations together.
+
+use serde::{Deserialize, Serialize};
+
+/// sRGB colour of a value that is not a number: a mid grey that neither map contains.
+pub const NAN_COLOR: [f32; 3] = [0.42, 0.42, 0.42];
+
+/// How a scalar becomes a colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::EnumIter)]
+pub enum ColorMap {
+    /// Dark blue to yellow, perceptually uniform, readable by the colour-blind: depth and other amounts.
+    #[default]
+    Viridis,
+    /// Blue, white, red, symmetric in lightness: signed errors around zero. Use it with [`Range::symmetric`].
+    Diverging,
+    /// Black to white.
+    Gray,
+}
+
+/// Coefficients of viridis as a polynomial of degree 6, constant term first.
+///
+/// Source: fit by Matt Zucker (CC0) to matplotlib's viridis (CC0).
+const VIRIDIS: [[f32; 3]; 7] = [
+    [0.277_727_33, 0.005_407_344_5, 0.334_099_8],
+    [0.105_093_04, 1.404_613_5, 1.384_590_1],
+    [-0.330_861_83, 0.214_847_56, 0.095_095_16],
+    [-4.634_230_6, -5.799_101, -19.332_441],
+    [6.228_27, 14.179_934, 56.690_55],
+    [4.776_385, -13.745_145, -65.353_03],
+    [-5.435_456, 4.645_852_6, 26.312_435],
+];
+
+/// Stops of the diverging map from the negative end over zero to the positive end, equally spaced.
+const DIVERGING: [[f32; 3]; 5] =
+    [[0.02, 0.19, 0.38], [0.26, 0.58, 0.76], [0.97, 0.97, 0.97], [0.84, 0.38, 0.30], [0.40, 0.0, 0.12]];
+
+impl ColorMap {
+    /// `Viridis`, `Diverging`, `Gray`: for menus.
+    pub fn name(self) -> &'static str {
+        ["Viridis", "Diverging", "Gray"][self as usize]
+    }
+
+    /// The sRGB colour, each part in 0..1, of a position `unit` in the range. Positions outside 0..1 take the end
+    /// colours; NaN takes [`NAN_COLOR`].
+    pub fn rgb(self, unit: f32) -> [f32; 3] {
+        if unit.is_nan() {
+            return NAN_COLOR;
+        }
+        let t = unit.clamp(0.0, 1.0);
+        match self {
+            Self::Viridis => {
+                std::array::from_fn(|c| VIRIDIS.iter().rev().fold(0.0, |sum, k| sum * t + k[c]).clamp(0.0, 1.0))
+            }
+            Self::Diverging => {
+                let s = t * 4.0;
+                let i = (s as usize).min(3);
+                let f = s - i as f32;
+                std::array::from_fn(|c| DIVERGING[i][c] + (DIVERGING[i + 1][c] - DIVERGING[i][c]) * f)
+            }
+            Self::Gray => [t; 3],
+        }
+    }
+
+    /// [`Self::rgb`] in bytes, rounded to nearest.
+    pub fn rgb8(self, unit: f32) -> [u8; 3] {
+        self.rgb(unit).map(to_u8)
+    }
+
+    /// The map sampled at 256 equally spaced positions, for images.
+    pub fn table(self) -> [[u8; 3]; 256] {
+        std::array::from_fn(|i| self.rgb8(i as f32 / 255.0))
+    }
+}
+
+/// The values that the two ends of a colour map stand for, in the unit of the data.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Range {
+    /// Value at the lower end.
+    pub lo: f32,
+    /// Value at the upper end.
+    pub hi: f32,
+}
+
+impl Range {
+    /// From `-size` to `size`, so that the middle of a diverging map is zero.
+    pub fn symmetric(size: f32) -> Self {
+        Self { lo: -size.abs(), hi: size.abs() }
+    }
+
+    /// Smallest and largest finite value; `None` without a finite value.
+    pub fn of<'a>(values: impl IntoIterator<Item = &'a f32>) -> Option<Self> {
+        values.into_iter().filter(|v| v.is_finite()).fold(None, |range, &v| {
+            Some(match range {
+                None => Self { lo: v, hi: v },
+                Some(Self { lo, hi }) => Self { lo: lo.min(v), hi: hi.max(v) },
+            })
+        })
+    }
+
+    /// Position of `value` in the range: 0 at `lo`, 1 at `hi`, clamped; NaN stays NaN. In an empty range
+    /// (`hi <= lo`, or an end that is not finite) everything is in the middle.
+    pub fn unit(self, value: f32) -> f32 {
+        if value.is_nan() {
+            return f32::NAN;
+        }
+        let span = self.hi - self.lo;
+        if !(span > 0.0 && span.is_finite()) {
+            return 0.5;
+        }
+        ((value - self.lo) / span).clamp(0.0, 1.0)
+    }
+}
+
+/// 0..1 to 0..255, rounded to nearest.
+fn to_u8(v: f32) -> u8 {
+    (v * 255.0 + 0.5) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Relative lightness from sRGB by Rec. 709 weights, without linearising: monotone is all that is asked.
+    fn luma([r, g, b]: [f32; 3]) -> f32 {
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+    }
+
+    #[test]
+    fn viridis_passes_through_its_published_colours() {
+        let published = [
+            (0.0, [0x44, 0x01, 0x54]),
+            (0.25, [0x3b, 0x52, 0x8b]),
+            (0.5, [0x21, 0x91, 0x8c]),
+            (1.0, [0xfd, 0xe7, 0x25]),
+        ];
+        for (t, want) in published {
+            for (a, b) in ColorMap::Viridis.rgb8(t).iter().zip(want) {
+                // The polynomial is a fit: its author gives no bound; 4 steps of 255 cannot be seen.
+                assert!(a.abs_diff(b) <= 4, "{t}: {:?} for {want:?}", ColorMap::Viridis.rgb8(t));
+            }
+        }
+    }
+
+    #[test]
+    fn sequential_maps_get_lighter_and_the_diverging_one_darker_towards_both_ends() {
+        for i in 1..=200 {
+            let (a, b) = ((i - 1) as f32 / 200.0, i as f32 / 200.0);
+            assert!(luma(ColorMap::Viridis.rgb(b)) > luma(ColorMap::Viridis.rgb(a)));
+            assert!(luma(ColorMap::Gray.rgb(b)) > luma(ColorMap::Gray.rgb(a)));
+            assert!(luma(ColorMap::Diverging.rgb(0.5 + b / 2.0)) < luma(ColorMap::Diverging.rgb(0.5 + a / 2.0)));
+            assert!(luma(ColorMap::Diverging.rgb(0.5 - b / 2.0)) < luma(ColorMap::Diverging.rgb(0.5 - a / 2.0)));
+        }
+        let [negative, positive] = [0.2, 0.8].map(|t| ColorMap::Diverging.rgb(t));
+        assert!(negative[2] > negative[0] && positive[0] > positive[2], "blue below zero, red above");
+    }
+
+    #[test]
+    fn outside_and_nan() {
+        for map in [ColorMap::Viridis, ColorMap::Diverging, ColorMap::Gray] {
+            assert_eq!(map.rgb(f32::NAN), NAN_COLOR);
+            assert_eq!(map.rgb(f32::NEG_INFINITY), map.rgb(0.0));
+            assert_eq!(map.rgb(7.0), map.rgb(1.0));
+            assert_eq!(map.table()[255], map.rgb8(1.0));
+            assert!(map.rgb(0.3).iter().all(|c| (0.0..=1.0).contains(c)));
+        }
+    }
+
+    #[test]
+    fn ranges() {
+        let r = Range::of(&[f32::NAN, 2.0, f32::INFINITY, -1.0]).unwrap();
+        assert_eq!((r.lo, r.hi), (-1.0, 2.0));
+        assert_eq!(r.unit(0.5), 0.5);
+        assert_eq!(r.unit(9.0), 1.0);
+        assert!(r.unit(f32::NAN).is_nan());
+        assert_eq!(Range::of(&[f32::NAN]), None);
+        assert_eq!(Range { lo: 3.0, hi: 3.0 }.unit(3.0), 0.5);
+        assert_eq!(Range { lo: f32::NAN, hi: 3.0 }.unit(3.0), 0.5);
+        assert_eq!(Range::symmetric(-2.0).unit(0.0), 0.5);
+    }
+}
