@@ -1,1 +1,21 @@
-//! Latent diffusion: schedule, seeded noise, DDIM.
+//! Latent diffusion without a model: schedules, seeded noise, and the DDIM sampler.
+//!
+//! A model is anything that implements [`Denoiser`]; the graphs of a bundle do (module `infer::generator`), and so do
+//! the closed-form denoisers of the tests. [`sample`] runs the loop; it owns no thread and can be cancelled between
+//! two steps through its progress closure.
+//!
+//! Sources: Song et al., "Denoising Diffusion Implicit Models" (2021), equations 12 and 16; the schedule and the
+//! spacing of the public latent-diffusion release.
+
+mod ddim;
+mod noise;
+mod schedule;
+mod tensor;
+
+pub use ddim::{
+    Denoiser, DiffusionError, GenerateConfig, Latent, ModelError, Prediction, Progress, Sampler,
+    sample, sample_seeds,
+};
+pub use noise::GaussianNoise;
+pub use schedule::{Schedule, ScheduleError, Spacing, Step};
+pub use tensor::Tensor;

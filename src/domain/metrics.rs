@@ -1,1 +1,13 @@
-//! Image and pose metrics.
+//! How good a prediction, a mask or a pose is. Every range is explicit, and every special case has a name.
+//!
+//! Sums run in f64. Pixels that are not finite in either image are left out of the error metrics.
+
+mod angle;
+mod image;
+mod mask;
+mod ssim;
+
+pub use angle::AngleSummary;
+pub use image::{MetricError, Psnr, PsnrMean, mse, psnr, psnr_of_mse, unit_range};
+pub use mask::MaskScore;
+pub use ssim::{Ssim, SsimRange, ssim};

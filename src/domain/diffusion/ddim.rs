@@ -1,0 +1,310 @@
+//! The sampler: [`sample`] runs DDIM over any [`Denoiser`].
+
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
+use super::{GaussianNoise, Schedule, ScheduleError, Spacing, Step, Tensor};
+
+/// A clean latent, `[batch, channels, height, width]`.
+pub type Latent = Tensor;
+
+/// What a denoiser's output means, with `x = √ᾱ·x₀ + √(1-ᾱ)·ε`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Prediction {
+    /// The noise ε.
+    Epsilon,
+    /// The velocity `√ᾱ·ε - √(1-ᾱ)·x₀` (Salimans & Ho 2022).
+    V,
+    /// The clean sample x₀.
+    Sample,
+}
+
+/// How the noise is taken away.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampler {
+    /// Denoising diffusion implicit models; `eta` 0 is deterministic, 1 is ancestral sampling.
+    #[default]
+    Ddim,
+}
+
+/// The choices of one generation. Together with the input and the bundle it determines the result.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GenerateConfig {
+    /// Sampling steps, 1 to the schedule's training steps.
+    pub steps: u32,
+    /// Share of fresh noise per step, 0 to 1.
+    pub eta: f64,
+    /// Seed of the starting noise and of the fresh noise.
+    pub seed: u64,
+    /// The update rule.
+    pub sampler: Sampler,
+    /// The training steps visited.
+    pub spacing: Spacing,
+}
+
+impl Default for GenerateConfig {
+    fn default() -> Self {
+        Self {
+            steps: 50,
+            eta: 0.0,
+            seed: 42,
+            sampler: Sampler::Ddim,
+            spacing: Spacing::Trailing,
+        }
+    }
+}
+
+/// How far a generation is. Sent before each step; answer `Break` to cancel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Steps done.
+    pub step: u32,
+    /// Steps in all.
+    pub of: u32,
+}
+
+/// A model could not do its part.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// The engine gave up.
+    #[error("the graph `{graph}` could not be run: {reason}")]
+    Run {
+        /// The graph's role in its bundle.
+        graph: String,
+        /// The engine's words.
+        reason: String,
+    },
+    /// A tensor of another shape than agreed.
+    #[error("the graph `{graph}` gave a tensor of shape {found:?} instead of {expected:?}")]
+    Shape {
+        /// The graph's role in its bundle.
+        graph: String,
+        /// What the bundle says.
+        expected: Vec<usize>,
+        /// What came.
+        found: Vec<usize>,
+    },
+    /// NaN or infinity in an output.
+    #[error(
+        "the graph `{graph}` gave {count} values that are not numbers; its input may be far from what it was trained on"
+    )]
+    NonFinite {
+        /// The graph's role in its bundle.
+        graph: String,
+        /// How many.
+        count: usize,
+    },
+}
+
+/// Why a generation has no result.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DiffusionError {
+    /// The progress closure asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+    /// The schedule cannot be used this way.
+    #[error(transparent)]
+    Schedule(#[from] ScheduleError),
+    /// The model failed.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Eta outside [0, 1] or NaN.
+    #[error("eta is {0}; choose 0 (deterministic) to 1")]
+    Eta(f64),
+    /// Seeds and conditions do not match in number.
+    #[error("{seeds} seeds for {conditions} conditions")]
+    Batch {
+        /// Seeds given.
+        seeds: usize,
+        /// Conditions given.
+        conditions: usize,
+    },
+}
+
+/// A trained (or closed-form) model that tells signal from noise.
+pub trait Denoiser {
+    /// Predicts, for each entry of the batch, what [`Denoiser::prediction`] names.
+    ///
+    /// `latent` is `[batch, …latent_shape]`, `condition` has the same batch; the result has the shape of `latent`.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the model cannot be run.
+    fn predict(
+        &mut self,
+        latent: &Tensor,
+        timestep: u32,
+        condition: &Tensor,
+    ) -> Result<Tensor, ModelError>;
+
+    /// What the output of [`Denoiser::predict`] means.
+    fn prediction(&self) -> Prediction;
+
+    /// Shape of one latent, without the batch.
+    fn latent_shape(&self) -> Vec<usize>;
+}
+
+/// Generates one latent per entry of `condition`, all from `config.seed`, so that a batch gives exactly what its
+/// entries give alone.
+///
+/// The progress closure is called before each step and once at the end; `Break` ends the loop within one step.
+///
+/// # Errors
+/// See [`DiffusionError`].
+pub fn sample(
+    denoiser: &mut dyn Denoiser,
+    schedule: &Schedule,
+    config: &GenerateConfig,
+    condition: &Tensor,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Latent, DiffusionError> {
+    sample_seeds(
+        denoiser,
+        schedule,
+        config,
+        &vec![config.seed; condition.batch()],
+        condition,
+        progress,
+    )
+}
+
+/// As [`sample`], with a seed of its own for each entry of the batch (`config.seed` is not used).
+///
+/// # Errors
+/// See [`DiffusionError`].
+pub fn sample_seeds(
+    denoiser: &mut dyn Denoiser,
+    schedule: &Schedule,
+    config: &GenerateConfig,
+    seeds: &[u64],
+    condition: &Tensor,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Latent, DiffusionError> {
+    if !(0.0..=1.0).contains(&config.eta) {
+        return Err(DiffusionError::Eta(config.eta));
+    }
+    if seeds.len() != condition.batch() {
+        return Err(DiffusionError::Batch {
+            seeds: seeds.len(),
+            conditions: condition.batch(),
+        });
+    }
+    let prediction = denoiser.prediction();
+    let steps = schedule.steps(config.steps, config.spacing, prediction)?;
+    let of = steps.len() as u32;
+    let mut tell = |step: u32| match progress(Progress { step, of }) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(DiffusionError::Cancelled),
+    };
+
+    let one = denoiser.latent_shape();
+    let len: usize = one.iter().product();
+    let shape: Vec<usize> = std::iter::once(seeds.len()).chain(one).collect();
+    let mut noises: Vec<GaussianNoise> =
+        seeds.iter().map(|&seed| GaussianNoise::new(seed)).collect();
+    // The trajectory is kept in f64; the model sees it rounded to f32.
+    let mut x: Vec<f64> = noises
+        .iter_mut()
+        .flat_map(|n| (0..len).map(|_| n.draw()).collect::<Vec<_>>())
+        .collect();
+    let mut input = Tensor::filled(shape.clone(), 0.0);
+
+    for (done, step) in steps.iter().enumerate() {
+        tell(done as u32)?;
+        input
+            .data_mut()
+            .iter_mut()
+            .zip(&x)
+            .for_each(|(to, &from)| *to = from as f32);
+        let output = denoiser.predict(&input, step.timestep, condition)?;
+        if output.shape() != shape {
+            let (expected, found) = (shape.clone(), output.shape().to_vec());
+            return Err(ModelError::Shape {
+                graph: "denoiser".into(),
+                expected,
+                found,
+            }
+            .into());
+        }
+        let count = output.non_finite();
+        if count > 0 {
+            return Err(ModelError::NonFinite {
+                graph: "denoiser".into(),
+                count,
+            }
+            .into());
+        }
+        let update = Update::new(step, prediction, config.eta);
+        for ((x, output), noise) in x
+            .chunks_mut(len.max(1))
+            .zip(output.data().chunks(len.max(1)))
+            .zip(&mut noises)
+        {
+            for (x, &output) in x.iter_mut().zip(output) {
+                *x = update.apply(*x, f64::from(output), noise);
+            }
+        }
+    }
+    tell(of)?;
+    input
+        .data_mut()
+        .iter_mut()
+        .zip(&x)
+        .for_each(|(to, &from)| *to = from as f32);
+    Ok(input)
+}
+
+/// The coefficients of one DDIM step, equation 12 of the paper.
+struct Update {
+    prediction: Prediction,
+    signal: f64,
+    noise: f64,
+    signal_next: f64,
+    direction_next: f64,
+    sigma: f64,
+}
+
+impl Update {
+    fn new(step: &Step, prediction: Prediction, eta: f64) -> Self {
+        let (now, next) = (step.alpha_bar, step.alpha_bar_next);
+        // Equation 16. The clamps only catch rounding: a schedule never rises.
+        let variance = if now < 1.0 && next > 0.0 {
+            ((1.0 - next) / (1.0 - now)).max(0.0) * (1.0 - now / next).max(0.0)
+        } else {
+            0.0
+        };
+        let sigma = eta * variance.sqrt();
+        Self {
+            prediction,
+            signal: now.sqrt(),
+            noise: (1.0 - now).sqrt(),
+            signal_next: next.sqrt(),
+            direction_next: (1.0 - next - sigma * sigma).max(0.0).sqrt(),
+            sigma,
+        }
+    }
+
+    fn apply(&self, x: f64, output: f64, noise: &mut GaussianNoise) -> f64 {
+        let (clean, epsilon) = match self.prediction {
+            // signal > 0: Schedule::steps refuses pure noise for this prediction.
+            Prediction::Epsilon => ((x - self.noise * output) / self.signal, output),
+            Prediction::V => (
+                self.signal * x - self.noise * output,
+                self.signal * output + self.noise * x,
+            ),
+            Prediction::Sample if self.noise == 0.0 => (output, 0.0),
+            Prediction::Sample => (output, (x - self.signal * output) / self.noise),
+        };
+        let mean = self.signal_next * clean + self.direction_next * epsilon;
+        if self.sigma > 0.0 {
+            mean + self.sigma * noise.draw()
+        } else {
+            mean
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,401 @@
+//! DDIM against denoisers whose answer is known in closed form.
+
+use super::*;
+
+/// Knows the clean latent and so the exact noise: `x = √ᾱ·x₀ + √(1-ᾱ)·ε`.
+struct Perfect {
+    schedule: Schedule,
+    clean: Vec<f32>,
+    prediction: Prediction,
+    calls: usize,
+}
+
+/// The exact posterior mean for data N(mean, std²), independent per pixel: E[x₀|x] = m + s²√ᾱ(x - √ᾱ·m)/(ᾱs² + 1-ᾱ).
+struct Gaussian {
+    schedule: Schedule,
+    mean: Vec<f64>,
+    std: f64,
+    prediction: Prediction,
+}
+
+fn express(prediction: Prediction, x: f64, clean: f64, alpha_bar: f64) -> f64 {
+    let (signal, noise) = (alpha_bar.sqrt(), (1.0 - alpha_bar).sqrt());
+    let epsilon = if noise > 0.0 {
+        (x - signal * clean) / noise
+    } else {
+        0.0
+    };
+    match prediction {
+        Prediction::Epsilon => epsilon,
+        Prediction::V => signal * epsilon - noise * clean,
+        Prediction::Sample => clean,
+    }
+}
+
+impl Denoiser for Perfect {
+    fn predict(
+        &mut self,
+        latent: &Tensor,
+        timestep: u32,
+        _: &Tensor,
+    ) -> Result<Tensor, ModelError> {
+        self.calls += 1;
+        let alpha_bar = self.schedule.alpha_bar()[timestep as usize];
+        let clean = self.clean.iter().cycle();
+        let data = latent.data().iter().zip(clean);
+        let data = data
+            .map(|(&x, &c)| express(self.prediction, x.into(), c.into(), alpha_bar) as f32)
+            .collect();
+        Ok(Tensor::new(latent.shape().to_vec(), data).unwrap())
+    }
+
+    fn prediction(&self) -> Prediction {
+        self.prediction
+    }
+
+    fn latent_shape(&self) -> Vec<usize> {
+        vec![1, 2, self.clean.len() / 2]
+    }
+}
+
+impl Denoiser for Gaussian {
+    fn predict(
+        &mut self,
+        latent: &Tensor,
+        timestep: u32,
+        _: &Tensor,
+    ) -> Result<Tensor, ModelError> {
+        let a = self.schedule.alpha_bar()[timestep as usize];
+        let variance = self.std * self.std;
+        let data = latent
+            .data()
+            .iter()
+            .zip(self.mean.iter().cycle())
+            .map(|(&x, &mean)| {
+                let x = f64::from(x);
+                let clean =
+                    mean + variance * a.sqrt() * (x - a.sqrt() * mean) / (a * variance + 1.0 - a);
+                express(self.prediction, x, clean, a) as f32
+            });
+        Ok(Tensor::new(latent.shape().to_vec(), data.collect()).unwrap())
+    }
+
+    fn prediction(&self) -> Prediction {
+        self.prediction
+    }
+
+    fn latent_shape(&self) -> Vec<usize> {
+        vec![4, 16, 16]
+    }
+}
+
+const KINDS: [Prediction; 3] = [Prediction::Epsilon, Prediction::V, Prediction::Sample];
+
+fn lab() -> Schedule {
+    Schedule::scaled_linear(1000, 0.0015, 0.0155).unwrap()
+}
+
+fn condition(batch: usize) -> Tensor {
+    Tensor::filled(vec![batch, 1, 2, 2], 0.0)
+}
+
+fn run(
+    denoiser: &mut dyn Denoiser,
+    schedule: &Schedule,
+    config: GenerateConfig,
+) -> Result<Tensor, DiffusionError> {
+    sample(denoiser, schedule, &config, &condition(1), &mut |_| {
+        ControlFlow::Continue(())
+    })
+}
+
+#[test]
+fn a_perfect_prediction_returns_the_clean_latent() {
+    let clean = vec![-1.5, -0.2, 0.0, 0.7, 1.0, 3.0];
+    for prediction in KINDS {
+        for steps in [1, 2, 7, 50, 1000] {
+            for spacing in [Spacing::Lab, Spacing::Trailing] {
+                for eta in [0.0, 1.0] {
+                    let mut model = Perfect {
+                        schedule: lab(),
+                        clean: clean.clone(),
+                        prediction,
+                        calls: 0,
+                    };
+                    let config = GenerateConfig {
+                        steps,
+                        eta,
+                        spacing,
+                        ..Default::default()
+                    };
+                    let found = run(&mut model, &lab(), config).unwrap();
+                    for (a, b) in found.data().iter().zip(&clean) {
+                        assert!(
+                            (a - b).abs() < 1e-5,
+                            "{prediction:?} {steps} {spacing:?} {eta}: {a} for {b}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn gaussian_data_comes_back_with_its_mean_and_spread() {
+    // 1024 pixels: standard error of the mean 0.5/32, of the deviation 0.5/45; four of them, plus the sampler's own
+    // error, which falls with the number of steps.
+    let means: Vec<f64> = (0..1024).map(|i| f64::from(i % 7) - 3.0).collect();
+    for prediction in KINDS {
+        for eta in [0.0, 0.5, 1.0] {
+            let mut model = Gaussian {
+                schedule: lab(),
+                mean: means.clone(),
+                std: 0.5,
+                prediction,
+            };
+            let config = GenerateConfig {
+                steps: 250,
+                eta,
+                seed: 3,
+                ..Default::default()
+            };
+            let found = run(&mut model, &lab(), config).unwrap();
+            let rest: Vec<f64> = found
+                .data()
+                .iter()
+                .zip(&means)
+                .map(|(&x, m)| f64::from(x) - m)
+                .collect();
+            let mean = rest.iter().sum::<f64>() / 1024.0;
+            let std = (rest.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 1024.0).sqrt();
+            assert!(
+                mean.abs() < 0.07,
+                "{prediction:?} eta {eta}: mean off by {mean}"
+            );
+            assert!(
+                (std - 0.5).abs() < 0.05,
+                "{prediction:?} eta {eta}: spread {std}"
+            );
+        }
+    }
+}
+
+#[test]
+fn deterministic_sampling_follows_the_exact_flow() {
+    // For Gaussian data the eta = 0 path has a closed form: x₀ = m + s·z with z the start's standardised value
+    // at the noisiest step. Discretised, the error falls with the number of steps.
+    let (mean, std) = (0.8, 0.3);
+    let mut errors = Vec::new();
+    for steps in [50, 1000] {
+        let mut model = Gaussian {
+            schedule: lab(),
+            mean: vec![mean],
+            std,
+            prediction: Prediction::Epsilon,
+        };
+        let found = run(
+            &mut model,
+            &lab(),
+            GenerateConfig {
+                steps,
+                ..Default::default()
+            },
+        )
+        .unwrap();
+        let a = lab().alpha_bar()[999];
+        let mut noise = GaussianNoise::new(42);
+        let worst = found.data().iter().map(|&x| {
+            let start = noise.draw();
+            let z = (start - a.sqrt() * mean) / (a * std * std + 1.0 - a).sqrt();
+            (f64::from(x) - (mean + std * z)).abs()
+        });
+        errors.push(worst.fold(0.0, f64::max));
+    }
+    assert!(errors[0] < 0.2 && errors[1] < 0.02, "{errors:?}");
+    assert!(errors[1] < errors[0] / 4.0, "{errors:?}");
+}
+
+#[test]
+fn every_step_count_and_eta_stays_finite() {
+    let mut model = Gaussian {
+        schedule: lab(),
+        mean: vec![0.0],
+        std: 1.0,
+        prediction: Prediction::Epsilon,
+    };
+    for steps in (1..=12).chain([20, 33, 64, 100, 333, 501, 999, 1000]) {
+        for eta in [0.0, 0.3, 1.0] {
+            for spacing in [Spacing::Lab, Spacing::Trailing] {
+                let config = GenerateConfig {
+                    steps,
+                    eta,
+                    spacing,
+                    ..Default::default()
+                };
+                assert_eq!(run(&mut model, &lab(), config).unwrap().non_finite(), 0);
+            }
+        }
+    }
+}
+
+#[test]
+fn extreme_schedules_are_finite_or_refused() {
+    // No noise at all, all noise at the end, a plateau, almost no signal, and one step.
+    let shares = [
+        vec![1.0, 1.0],
+        vec![1.0, 0.5, 0.0],
+        vec![0.5, 0.5, 0.5],
+        vec![1.0, 1e-300],
+        vec![1e-12],
+    ];
+    for shares in shares {
+        let schedule = Schedule::from_alpha_bar(shares.clone()).unwrap();
+        for prediction in KINDS {
+            for eta in [0.0, 1.0] {
+                for spacing in [Spacing::Lab, Spacing::Trailing] {
+                    let mut model = Perfect {
+                        schedule: schedule.clone(),
+                        clean: vec![0.5; 4],
+                        prediction,
+                        calls: 0,
+                    };
+                    let config = GenerateConfig {
+                        steps: shares.len() as u32,
+                        eta,
+                        spacing,
+                        ..Default::default()
+                    };
+                    match run(&mut model, &schedule, config) {
+                        Ok(latent) => {
+                            assert_eq!(latent.non_finite(), 0, "{shares:?} {prediction:?} {eta}")
+                        }
+                        Err(err) => assert!(
+                            prediction == Prediction::Epsilon
+                                && matches!(
+                                    err,
+                                    DiffusionError::Schedule(ScheduleError::PureNoise { .. })
+                                ),
+                            "{shares:?} {prediction:?}: {err}"
+                        ),
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_batch_gives_what_its_entries_give_alone() {
+    let means: Vec<f64> = vec![0.2];
+    let mut model = Gaussian {
+        schedule: lab(),
+        mean: means,
+        std: 0.7,
+        prediction: Prediction::V,
+    };
+    let config = GenerateConfig {
+        steps: 5,
+        eta: 0.8,
+        ..Default::default()
+    };
+    let mut go = |seeds: &[u64]| {
+        sample_seeds(
+            &mut model,
+            &lab(),
+            &config,
+            seeds,
+            &condition(seeds.len()),
+            &mut |_| ControlFlow::Continue(()),
+        )
+        .unwrap()
+    };
+    let batch = go(&[5, 6, 5]);
+    assert_eq!(batch.item(0), go(&[5]).item(0));
+    assert_eq!(batch.item(1), go(&[6]).item(0));
+    assert_eq!(batch.item(0), batch.item(2));
+    assert_ne!(batch.item(0), batch.item(1));
+}
+
+#[test]
+fn cancelling_stops_within_one_step() {
+    let mut model = Perfect {
+        schedule: lab(),
+        clean: vec![0.0; 4],
+        prediction: Prediction::Epsilon,
+        calls: 0,
+    };
+    let mut seen = Vec::new();
+    let config = GenerateConfig {
+        steps: 20,
+        ..Default::default()
+    };
+    let result = sample(&mut model, &lab(), &config, &condition(1), &mut |p| {
+        seen.push(p);
+        if p.step == 3 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    assert_eq!(result, Err(DiffusionError::Cancelled));
+    assert_eq!(model.calls, 3);
+    assert_eq!(
+        seen,
+        (0..=3)
+            .map(|step| Progress { step, of: 20 })
+            .collect::<Vec<_>>()
+    );
+}
+
+#[test]
+fn wrong_parameters_and_models_are_errors() {
+    struct Broken(Vec<usize>, f32);
+    impl Denoiser for Broken {
+        fn predict(&mut self, _: &Tensor, _: u32, _: &Tensor) -> Result<Tensor, ModelError> {
+            Ok(Tensor::filled(self.0.clone(), self.1))
+        }
+        fn prediction(&self) -> Prediction {
+            Prediction::Epsilon
+        }
+        fn latent_shape(&self) -> Vec<usize> {
+            vec![1, 2, 2]
+        }
+    }
+    let config = GenerateConfig::default();
+    let with = |shape: Vec<usize>, value, config| run(&mut Broken(shape, value), &lab(), config);
+    assert!(matches!(
+        with(vec![1, 1, 2, 2], f32::NAN, config),
+        Err(DiffusionError::Model(ModelError::NonFinite {
+            count: 4,
+            ..
+        }))
+    ));
+    assert!(matches!(
+        with(vec![1, 4], 0.0, config),
+        Err(DiffusionError::Model(ModelError::Shape { .. }))
+    ));
+    for eta in [-0.1, 1.1, f64::NAN] {
+        let config = GenerateConfig { eta, ..config };
+        assert!(matches!(
+            with(vec![1, 1, 2, 2], 0.0, config),
+            Err(DiffusionError::Eta(_))
+        ));
+    }
+    let mut model = Broken(vec![1, 1, 2, 2], 0.0);
+    let result = sample_seeds(
+        &mut model,
+        &lab(),
+        &config,
+        &[1, 2],
+        &condition(1),
+        &mut |_| ControlFlow::Continue(()),
+    );
+    assert_eq!(
+        result,
+        Err(DiffusionError::Batch {
+            seeds: 2,
+            conditions: 1
+        })
+    );
+}

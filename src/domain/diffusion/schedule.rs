@@ -1,0 +1,375 @@
+//! [`Schedule`]: how much signal is left at each training step, and which steps a sampler visits.
+
+use serde::{Deserialize, Serialize};
+
+use super::Prediction;
+
+/// The share of signal ᾱ at each training step, in f64, never rising.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule {
+    alpha_bar: Vec<f64>,
+}
+
+/// Which training steps a sampler visits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Spacing {
+    /// The public latent-diffusion release's: `1, 1 + c, 1 + 2c, …` with `c = T / steps` rounded down. The last, noisiest
+    /// steps of the training are left out, and the number of steps is `ceil(T / c)`, not always the one asked for.
+    Lab,
+    /// `round(T - i·T/steps) - 1` for `i = 0, 1, …`: starts at the noisiest step, where the latent really is pure noise.
+    #[default]
+    Trailing,
+}
+
+/// Below this ᾱ the clean latent cannot be computed from a noise prediction: rounding in the model's f32 output is
+/// amplified by 1/√ᾱ, here 1e5, to the size of the latent's details.
+const MIN_SIGNAL_FOR_NOISE: f64 = 1e-10;
+
+/// One step of a sampler.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// The training step, what the model is told.
+    pub timestep: u32,
+    /// ᾱ before the step.
+    pub alpha_bar: f64,
+    /// ᾱ after the step; 1 after the last one.
+    pub alpha_bar_next: f64,
+}
+
+/// What keeps numbers from being a schedule, or a schedule from being used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ScheduleError {
+    /// No steps, or so many that they cannot be a schedule.
+    #[error("a schedule of {0} training steps; 1 to 1000000 can be used")]
+    Length(usize),
+    /// A beta outside (0, 1).
+    #[error("the betas run from {start} to {end}, but must lie between 0 and 1")]
+    Betas {
+        /// First beta.
+        start: f64,
+        /// Last beta.
+        end: f64,
+    },
+    /// A value outside [0, 1], or NaN.
+    #[error("the signal share at training step {step} is {value}, outside 0 to 1")]
+    Value {
+        /// Where.
+        step: usize,
+        /// What.
+        value: f64,
+    },
+    /// The signal share grows with the noise.
+    #[error("the signal share rises at training step {step}; a schedule must fall")]
+    Rising {
+        /// The first step above its predecessor.
+        step: usize,
+    },
+    /// More sampling steps than training steps, or none.
+    #[error("{steps} sampling steps; choose 1 to {limit}")]
+    Steps {
+        /// Asked for.
+        steps: u32,
+        /// Training steps.
+        limit: usize,
+    },
+    /// ᾱ = 0 (or nearly, below 1e-10) with a noise prediction: the signal cannot be computed from pure noise.
+    #[error(
+        "training step {timestep} is pure noise, so a model that predicts noise says nothing about the image there; use a model that predicts v or the sample, or another spacing"
+    )]
+    PureNoise {
+        /// The step.
+        timestep: u32,
+    },
+}
+
+impl Schedule {
+    /// From the signal shares themselves.
+    ///
+    /// # Errors
+    /// Empty, outside [0, 1], NaN, or rising anywhere (even in the last bit: a rise makes a noise variance negative).
+    pub fn from_alpha_bar(alpha_bar: Vec<f64>) -> Result<Self, ScheduleError> {
+        if alpha_bar.is_empty() || alpha_bar.len() > 1_000_000 {
+            return Err(ScheduleError::Length(alpha_bar.len()));
+        }
+        for (step, &value) in alpha_bar.iter().enumerate() {
+            if !(0.0..=1.0).contains(&value) {
+                return Err(ScheduleError::Value { step, value });
+            }
+        }
+        if let Some(step) = alpha_bar.windows(2).position(|w| w[1] > w[0]) {
+            return Err(ScheduleError::Rising { step: step + 1 });
+        }
+        Ok(Self { alpha_bar })
+    }
+
+    /// From the noise variance added at each training step.
+    fn from_betas(betas: impl Iterator<Item = f64>) -> Result<Self, ScheduleError> {
+        let mut product = 1.0;
+        Self::from_alpha_bar(
+            betas
+                .map(|beta| {
+                    product *= 1.0 - beta;
+                    product
+                })
+                .collect(),
+        )
+    }
+
+    /// Square roots of the betas evenly spaced: what latent diffusion calls "linear". The lab: (1000, 0.0015, 0.0155).
+    ///
+    /// # Errors
+    /// As [`Self::linear`].
+    pub fn scaled_linear(
+        steps: usize,
+        beta_start: f64,
+        beta_end: f64,
+    ) -> Result<Self, ScheduleError> {
+        check_betas(steps, beta_start, beta_end)?;
+        let (start, end) = (beta_start.sqrt(), beta_end.sqrt());
+        Self::from_betas((0..steps).map(|i| (start + fraction(i, steps) * (end - start)).powi(2)))
+    }
+
+    /// Betas evenly spaced, as in the first diffusion papers.
+    ///
+    /// # Errors
+    /// No steps, or betas outside (0, 1).
+    pub fn linear(steps: usize, beta_start: f64, beta_end: f64) -> Result<Self, ScheduleError> {
+        check_betas(steps, beta_start, beta_end)?;
+        Self::from_betas(
+            (0..steps).map(|i| beta_start + fraction(i, steps) * (beta_end - beta_start)),
+        )
+    }
+
+    /// Nichol & Dhariwal (2021), equation 17: s = 0.008, betas at most 0.999.
+    ///
+    /// # Errors
+    /// No steps.
+    pub fn cosine(steps: usize) -> Result<Self, ScheduleError> {
+        if steps == 0 || steps > 1_000_000 {
+            return Err(ScheduleError::Length(steps));
+        }
+        let share = |t: f64| {
+            ((t / steps as f64 + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2)
+                .cos()
+                .powi(2)
+        };
+        Self::from_betas(
+            (0..steps).map(|i| (1.0 - share(i as f64 + 1.0) / share(i as f64)).clamp(0.0, 0.999)),
+        )
+    }
+
+    /// ᾱ of every training step.
+    pub fn alpha_bar(&self) -> &[f64] {
+        &self.alpha_bar
+    }
+
+    /// The number of training steps.
+    pub fn training_steps(&self) -> usize {
+        self.alpha_bar.len()
+    }
+
+    /// The steps a sampler takes, noisiest first; the last one ends at ᾱ = 1, the clean latent.
+    ///
+    /// # Errors
+    /// [`ScheduleError::Steps`], and [`ScheduleError::PureNoise`] where `prediction` is noise and a visited ᾱ is (almost) 0.
+    pub fn steps(
+        &self,
+        steps: u32,
+        spacing: Spacing,
+        prediction: Prediction,
+    ) -> Result<Vec<Step>, ScheduleError> {
+        let total = self.alpha_bar.len();
+        let count = steps as usize;
+        if count == 0 || count > total {
+            return Err(ScheduleError::Steps {
+                steps,
+                limit: total,
+            });
+        }
+        let timesteps: Vec<usize> = match spacing {
+            Spacing::Trailing => {
+                // Rounded half up in whole numbers: (2·(T·S - i·T) + S) / (2·S).
+                (0..count)
+                    .map(|i| (2 * total * (count - i) + count) / (2 * count) - 1)
+                    .collect()
+            }
+            Spacing::Lab => {
+                let stride = total / count;
+                // The "+ 1" runs over the end for a stride of 1 (and for a single training step): those are dropped.
+                let mut up: Vec<usize> = (0..total)
+                    .step_by(stride)
+                    .map(|t| t + 1)
+                    .filter(|&t| t < total)
+                    .collect();
+                if up.is_empty() {
+                    up.push(total - 1);
+                }
+                up.reverse();
+                up
+            }
+        };
+        let next = timesteps
+            .iter()
+            .skip(1)
+            .map(|&t| self.alpha_bar[t])
+            .chain(std::iter::once(1.0));
+        timesteps
+            .iter()
+            .zip(next)
+            .map(|(&t, alpha_bar_next)| {
+                let alpha_bar = self.alpha_bar[t];
+                if alpha_bar < MIN_SIGNAL_FOR_NOISE && prediction == Prediction::Epsilon {
+                    return Err(ScheduleError::PureNoise { timestep: t as u32 });
+                }
+                Ok(Step {
+                    timestep: t as u32,
+                    alpha_bar,
+                    alpha_bar_next,
+                })
+            })
+            .collect()
+    }
+}
+
+fn fraction(i: usize, steps: usize) -> f64 {
+    if steps == 1 {
+        0.0
+    } else {
+        i as f64 / (steps - 1) as f64
+    }
+}
+
+fn check_betas(steps: usize, start: f64, end: f64) -> Result<(), ScheduleError> {
+    if steps == 0 || steps > 1_000_000 {
+        return Err(ScheduleError::Length(steps));
+    }
+    let inside = |beta: f64| beta > 0.0 && beta < 1.0;
+    if inside(start) && inside(end) {
+        Ok(())
+    } else {
+        Err(ScheduleError::Betas { start, end })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lab() -> Schedule {
+        Schedule::scaled_linear(1000, 0.0015, 0.0155).unwrap()
+    }
+
+    #[test]
+    fn the_labs_schedule_has_the_published_values() {
+        let schedule = lab();
+        // Values to the digits given for the lab's model.
+        for (step, expected, tolerance) in [
+            (0, 0.9985, 1e-9),
+            (1, 0.996_995_6, 5e-8),
+            (996, 0.000_700_70, 5e-9),
+            (999, 0.000_668_67, 5e-9),
+        ] {
+            let found = schedule.alpha_bar()[step];
+            assert!((found - expected).abs() < tolerance, "step {step}: {found}");
+        }
+    }
+
+    #[test]
+    fn spacings_visit_the_documented_steps() {
+        let schedule = lab();
+        let visit = |n, spacing| -> Vec<u32> {
+            schedule
+                .steps(n, spacing, Prediction::Epsilon)
+                .unwrap()
+                .iter()
+                .map(|s| s.timestep)
+                .collect()
+        };
+        let lab = visit(200, Spacing::Lab);
+        assert_eq!((lab.len(), lab[0], lab[198], lab[199]), (200, 996, 6, 1));
+        assert_eq!(visit(300, Spacing::Lab).len(), 333);
+        assert_eq!(visit(1, Spacing::Lab), [1]);
+        assert_eq!(visit(4, Spacing::Trailing), [999, 749, 499, 249]);
+        assert_eq!(visit(1, Spacing::Trailing), [999]);
+        for n in 1..=1000 {
+            for spacing in [Spacing::Lab, Spacing::Trailing] {
+                let steps = visit(n, spacing);
+                assert!(steps.windows(2).all(|w| w[1] < w[0]), "{n} {spacing:?}");
+                assert!(steps[0] < 1000);
+            }
+        }
+        assert_eq!(visit(1000, Spacing::Trailing).len(), 1000);
+        assert_eq!(
+            schedule.steps(1001, Spacing::Lab, Prediction::V),
+            Err(ScheduleError::Steps {
+                steps: 1001,
+                limit: 1000
+            })
+        );
+        assert!(schedule.steps(0, Spacing::Trailing, Prediction::V).is_err());
+    }
+
+    #[test]
+    fn the_last_step_ends_at_the_clean_latent() {
+        for spacing in [Spacing::Lab, Spacing::Trailing] {
+            assert_eq!(
+                lab()
+                    .steps(50, spacing, Prediction::Epsilon)
+                    .unwrap()
+                    .last()
+                    .unwrap()
+                    .alpha_bar_next,
+                1.0
+            );
+        }
+    }
+
+    #[test]
+    fn impossible_schedules_are_refused() {
+        assert!(matches!(
+            Schedule::from_alpha_bar(vec![]),
+            Err(ScheduleError::Length(0))
+        ));
+        let risen = 0.5f64.next_up();
+        assert_eq!(
+            Schedule::from_alpha_bar(vec![0.9, 0.5, risen]),
+            Err(ScheduleError::Rising { step: 2 })
+        );
+        assert!(matches!(
+            Schedule::from_alpha_bar(vec![1.0, f64::NAN]),
+            Err(ScheduleError::Value { step: 1, .. })
+        ));
+        assert!(Schedule::from_alpha_bar(vec![1.1]).is_err());
+        for (start, end) in [(0.0, 0.1), (0.1, 1.0), (f64::NAN, 0.1), (-0.1, 0.1)] {
+            assert!(matches!(
+                Schedule::linear(10, start, end),
+                Err(ScheduleError::Betas { .. })
+            ));
+            assert!(matches!(
+                Schedule::scaled_linear(10, start, end),
+                Err(ScheduleError::Betas { .. })
+            ));
+        }
+        assert!(Schedule::cosine(0).is_err() && Schedule::linear(usize::MAX, 0.1, 0.2).is_err());
+        let to_zero = Schedule::from_alpha_bar(vec![0.9, 0.0]).unwrap();
+        assert_eq!(
+            to_zero.steps(2, Spacing::Trailing, Prediction::Epsilon),
+            Err(ScheduleError::PureNoise { timestep: 1 })
+        );
+        assert!(to_zero.steps(2, Spacing::Trailing, Prediction::V).is_ok());
+    }
+
+    #[test]
+    fn every_kind_of_schedule_falls_to_almost_nothing() {
+        for schedule in [
+            lab(),
+            Schedule::linear(1000, 1e-4, 0.02).unwrap(),
+            Schedule::cosine(1000).unwrap(),
+        ] {
+            assert!(schedule.alpha_bar()[0] > 0.99 && schedule.alpha_bar()[999] < 1e-3);
+        }
+        assert_eq!(Schedule::cosine(1).unwrap().training_steps(), 1);
+        assert_eq!(Schedule::linear(1, 0.1, 0.2).unwrap().alpha_bar(), [0.9]);
+    }
+}
