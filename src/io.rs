@@ -3,4 +3,7 @@
 //! Every error names the file, what is wrong with it, and (`hint`) what to do about it.
 
 pub mod atomic;
+pub mod dataset;
+pub mod images;
 pub mod pt;
+pub mod stl;

@@ -1,0 +1,306 @@
+//! [`Dataset`]: one index over three kinds of source. Opening reads names only; samples load one by one.
+//!
+//! * the lab's folders of `.pt` files (the submodule `lab`),
+//! * a folder of pictures `NAME_gelslim.png` + `NAME_bubble.png` (the submodule `pictures`),
+//! * the built-in demo, rendered by the simulator.
+//!
+//! A [`Dataset`] never changes after opening and can be shared with worker threads.
+
+mod lab;
+mod pictures;
+
+use std::path::{Path, PathBuf};
+
+use crate::domain::dataset::{Index, PairEntry, PairId, Problem};
+use crate::domain::grid::{DepthMap, Grid};
+use crate::domain::mesh::TriMesh;
+use crate::domain::sample::Sample;
+
+use super::images::PictureError;
+use super::pt::PtError;
+use super::stl::{self, MeshError};
+
+pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE};
+
+/// Which kind of source a dataset is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SourceKind {
+    /// The lab's folders of `.pt` files.
+    Lab,
+    /// A folder of pictures: no pose, no camera, assumed scale.
+    Pictures,
+    /// The built-in simulator.
+    Demo,
+}
+
+/// Why a folder cannot be opened as a dataset.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The folder does not exist or may not be read.
+    #[error("cannot read the folder ({}): {source}", path.display())]
+    Io {
+        /// The folder.
+        path: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// Nothing in the folder looks like a dataset.
+    #[error("no paired touches found ({})", path.display())]
+    NothingFound {
+        /// The folder.
+        path: PathBuf,
+    },
+}
+
+impl OpenError {
+    /// What to do about it.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::Io { .. } => "check the path and its permissions",
+            Self::NothingFound { .. } => {
+                "open the folder that holds train/, test/ and tools_stls/, or a folder of NAME_gelslim.png with \
+                 NAME_bubble.png"
+            }
+        }
+    }
+
+    /// The same as an entry of a problem list.
+    pub fn to_problem(&self) -> Problem {
+        let (Self::Io { path, .. } | Self::NothingFound { path }) = self;
+        Problem { file: path.clone(), what: self.to_string(), hint: self.hint().into() }
+    }
+}
+
+/// Why one pair cannot be loaded.
+#[derive(Debug, thiserror::Error)]
+pub enum LoadError {
+    /// A `.pt` file of the pair.
+    #[error(transparent)]
+    Pt(#[from] PtError),
+    /// A picture of the pair.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// The pair is not one of this dataset.
+    #[error("the dataset has no pair number {}", id.0)]
+    NoSuchPair {
+        /// The number asked for.
+        id: PairId,
+    },
+}
+
+impl LoadError {
+    /// The file it is about.
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::Pt(err) => Some(err.file()),
+            Self::Picture(err) => Some(err.file()),
+            Self::NoSuchPair { .. } => None,
+        }
+    }
+
+    /// What to do about it.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::Pt(err) => err.hint(),
+            Self::Picture(err) => err.hint(),
+            Self::NoSuchPair { .. } => "open the dataset again",
+        }
+    }
+
+    /// The same as an entry of a problem list.
+    pub fn to_problem(&self) -> Problem {
+        Problem {
+            file: self.file().map(Path::to_owned).unwrap_or_default(),
+            what: self.to_string(),
+            hint: self.hint().into(),
+        }
+    }
+}
+
+/// A sample with what was odd about its files.
+#[derive(Clone, Debug, Default)]
+pub struct Loaded {
+    /// The sample.
+    pub sample: Sample,
+    /// What is odd: values that are not numbers, missing keys that the sample can do without, halves that disagree.
+    pub notes: Vec<Problem>,
+}
+
+/// An opened source of paired touches.
+#[derive(Debug)]
+pub struct Dataset {
+    /// What to call it.
+    pub title: String,
+    /// Its root folder; `None` for the demo. The same for every sub-folder it was opened from.
+    pub root: Option<PathBuf>,
+    /// The kind of source.
+    pub kind: SourceKind,
+    /// Names of all pairs in natural order.
+    pub index: Index,
+    /// What is wrong with it, as far as names and folders tell.
+    pub problems: Vec<Problem>,
+    source: Source,
+}
+
+#[derive(Debug)]
+enum Source {
+    Lab(lab::Lab),
+    Pictures(pictures::Pictures),
+}
+
+/// What a scan finds, before it becomes a [`Dataset`].
+struct Scan {
+    root: PathBuf,
+    pairs: Vec<PairEntry>,
+    problems: Vec<Problem>,
+    source: Source,
+    kind: SourceKind,
+}
+
+impl Dataset {
+    /// Opens the lab's folders or a folder of pictures, whichever `path` holds. Reads names only.
+    ///
+    /// `path` may be the dataset's root, the folder above its `data` folder, any folder inside it, or a file in it.
+    ///
+    /// # Errors
+    /// [`OpenError`] if nothing can be opened at all; everything smaller is listed in [`Dataset::problems`].
+    pub fn open(path: &Path) -> Result<Self, OpenError> {
+        let io = |source| OpenError::Io { path: path.to_owned(), source };
+        // Absolute, so that masks are found again from every working directory.
+        let absolute = path.canonicalize().map_err(io)?;
+        let folder = if absolute.is_dir() { absolute } else { absolute.parent().unwrap_or(&absolute).to_owned() };
+        drop(std::fs::read_dir(&folder).map_err(io)?);
+        let scan = lab::scan(&folder)
+            .or_else(|| pictures::scan(&folder))
+            .ok_or_else(|| OpenError::NothingFound { path: path.to_owned() })?;
+        let title = scan.root.file_name().map_or_else(|| "dataset".into(), |n| n.to_string_lossy().into_owned());
+        Ok(Self {
+            title,
+            root: Some(scan.root),
+            kind: scan.kind,
+            index: Index { pairs: scan.pairs },
+            problems: scan.problems,
+            source: scan.source,
+        })
+    }
+
+    /// Loads a pair. Takes tens of milliseconds: not for the thread that draws.
+    ///
+    /// Pixels without measurement are NaN in the imprint, also where the file has infinities or the camera said 0.
+    ///
+    /// # Errors
+    /// [`LoadError`] naming the file, and for tensors the key.
+    pub fn load(&self, id: PairId) -> Result<Sample, LoadError> {
+        self.load_with_notes(id).map(|loaded| loaded.sample)
+    }
+
+    /// [`Dataset::load`], together with what is odd about the files.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn load_with_notes(&self, id: PairId) -> Result<Loaded, LoadError> {
+        if self.index.get(id).is_none() {
+            return Err(LoadError::NoSuchPair { id });
+        }
+        match &self.source {
+            Source::Lab(lab) => lab.load(id),
+            Source::Pictures(pictures) => pictures.load(id),
+        }
+    }
+
+    /// The tool's CAD model in metres and the object frame; `None` where the dataset has none.
+    ///
+    /// # Errors
+    /// [`MeshError`] if there is a file that cannot be used.
+    pub fn tool_mesh(&self, tool: &str) -> Result<Option<TriMesh>, MeshError> {
+        match self.tool_mesh_file(tool) {
+            Some(path) => stl::read(path).map(|file| Some(file.mesh)),
+            None => Ok(None),
+        }
+    }
+
+    /// The file of the tool's CAD model, if the source has files.
+    pub fn tool_mesh_file(&self, tool: &str) -> Option<&Path> {
+        match &self.source {
+            Source::Lab(lab) => lab.mesh_file(tool),
+            Source::Pictures(_) => None,
+        }
+    }
+
+    /// The files of a pair (GelSlim, then bubble), as far as they exist.
+    pub fn pair_files(&self, id: PairId) -> Vec<PathBuf> {
+        match &self.source {
+            Source::Lab(lab) => lab.files(id),
+            Source::Pictures(pictures) => pictures.files(id),
+        }
+    }
+
+    /// The bubble picture as it is in the file (0..255, rotated by 180 degrees); `None` for other sources.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn bubble_tile(&self, id: PairId) -> Result<Option<Grid<f32>>, LoadError> {
+        match &self.source {
+            Source::Pictures(pictures) => pictures.tile(id, pictures::BUBBLE),
+            Source::Lab(_) => Ok(None),
+        }
+    }
+
+    /// The lab's own VQ-VAE prediction for the pair as it is in the file `NAME_vqvae.png` (0..255, rotated by
+    /// 180 degrees like the bubble's); `None` where there is none.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn vqvae_tile(&self, id: PairId) -> Result<Option<Grid<f32>>, LoadError> {
+        match &self.source {
+            Source::Pictures(pictures) => pictures.tile(id, pictures::VQVAE),
+            Source::Lab(_) => Ok(None),
+        }
+    }
+
+    /// [`Dataset::vqvae_tile`] brought to metres, raw orientation and 175 x 140 px, as the measured imprint is.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn vqvae_imprint(&self, id: PairId) -> Result<Option<DepthMap>, LoadError> {
+        Ok(self.vqvae_tile(id)?.map(|tile| pictures::imprint_from_tile(&tile)))
+    }
+}
+
+/// The last run of digits in `text`; the lab's order of files. Numbers too large to hold come last.
+fn last_integer(text: &str) -> u64 {
+    let Some(end) = text.rfind(|c: char| c.is_ascii_digit()) else { return 0 };
+    let start = text[..=end]
+        .rfind(|c: char| !c.is_ascii_digit())
+        .map_or(0, |i| i + text[i..].chars().next().map_or(1, char::len_utf8));
+    text[start..=end].parse().unwrap_or(u64::MAX)
+}
+
+fn problem(file: impl Into<PathBuf>, what: impl Into<String>, hint: impl Into<String>) -> Problem {
+    Problem { file: file.into(), what: what.into(), hint: hint.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_integer_orders_files() {
+        for (text, want) in [
+            ("data_12", 12),
+            ("pattern_05_3_lines_angle_2_data_5", 5),
+            ("x", 0),
+            ("7é", 7),
+            ("é7", 7),
+            ("99999999999999999999999", u64::MAX),
+        ] {
+            assert_eq!(last_integer(text), want, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_dataset_can_be_shared_with_threads() {
+        fn check<T: Send + Sync>() {}
+        check::<Dataset>();
+    }
+}

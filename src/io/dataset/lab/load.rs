@@ -1,0 +1,239 @@
+//! Reading one grasp of the lab's files: keys, shapes and units as in the released data set.
+
+use std::path::Path;
+
+use glam::DAffine3;
+
+use crate::domain::dataset::Problem;
+use crate::domain::frames::{PlanarPose, affine_from_xyz_quat};
+use crate::domain::grid::{DepthMap, Grid, RgbGrid};
+use crate::domain::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, GelSlimTouch, Sample, Scale};
+use crate::domain::sensor::{Finger, Intrinsics, bubble, gelslim};
+use crate::io::dataset::{LoadError, Loaded, problem};
+use crate::io::pt::{PtDict, PtError, read_dict};
+
+const BUBBLE_SHAPE: [usize; 4] = [2, 1, bubble::HEIGHT, bubble::WIDTH];
+const GELSLIM_SHAPE: [usize; 4] = [2, 3, gelslim::HEIGHT, gelslim::WIDTH];
+/// A depth this close to the lens is the camera's way of saying "nothing measured".
+const NO_DEPTH_M: f32 = 1e-4;
+/// Two halves of one grasp store the same pose; this allows for 32-bit copies of it.
+const SAME_POSE: f64 = 1e-5;
+
+/// Loads one pair; either half may be absent.
+pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> Result<Loaded, LoadError> {
+    let mut notes = Vec::new();
+    let mut fingers = [FingerTouch::default(), FingerTouch::default()];
+    let mut poses: Vec<(&Path, [f64; 3])> = Vec::new();
+    if let Some(path) = bubble_file {
+        let dict = read_dict(path)?;
+        for (finger, touch) in fingers.iter_mut().zip(bubble_touches(&dict, &mut notes)?) {
+            finger.bubble = Some(touch);
+        }
+        poses.extend(pose(&dict, &mut notes)?.map(|p| (path, p)));
+    }
+    if let Some(path) = gelslim_file {
+        let dict = read_dict(path)?;
+        for (finger, touch) in fingers.iter_mut().zip(gelslim_touches(&dict, &mut notes)?) {
+            finger.gelslim = Some(touch);
+        }
+        // Where the bubble file has a pose, that one counts and this one is only compared.
+        let mut ignored = Vec::new();
+        let here = pose(&dict, if poses.is_empty() { &mut notes } else { &mut ignored })?;
+        poses.extend(here.map(|p| (path, p)));
+    }
+    if let [(a, first), (b, second)] = &poses[..]
+        && first.iter().zip(second).any(|(x, y)| (x - y).abs() > SAME_POSE)
+    {
+        notes.push(problem(
+            *b,
+            format!("theta, x, y {second:?} differ from {first:?} in {}", a.display()),
+            "the two halves are from different grasps; check how the files were named",
+        ));
+    }
+    let grasp_from_object =
+        poses.first().map(|(_, [theta, x, y])| PlanarPose::object_from_grasp_of_lab(*theta, *x, *y).inverse());
+    Ok(Loaded { sample: Sample { fingers: fingers.map(Some), grasp_from_object, scale: Scale::Measured }, notes })
+}
+
+/// A value that the sample can do without: absent is a note, wrong is an error.
+fn optional<T>(
+    dict: &PtDict,
+    result: Result<T, PtError>,
+    without: &str,
+    notes: &mut Vec<Problem>,
+) -> Result<Option<T>, PtError> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(err @ PtError::MissingKey { .. }) => {
+            notes.push(problem(dict.file(), format!("{err}: {without}"), err.hint()));
+            Ok(None)
+        }
+        Err(err) => Err(err),
+    }
+}
+
+fn pose(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<Option<[f64; 3]>, PtError> {
+    let without = "the true pose is unknown";
+    let mut values = [0.0; 3];
+    for (value, key) in values.iter_mut().zip(["theta", "x", "y"]) {
+        match optional(dict, dict.scalar(key), without, notes)? {
+            Some(number) if number.is_finite() => *value = number,
+            Some(number) => {
+                let what = format!("key \"{key}\" is {number}: {without}");
+                notes.push(problem(dict.file(), what, "write the file again"));
+                return Ok(None);
+            }
+            None => return Ok(None),
+        }
+    }
+    Ok(Some(values))
+}
+
+/// Splits a tensor of two fingers.
+fn halves<T>(values: &[T]) -> [&[T]; 2] {
+    let (a, b) = values.split_at(values.len() / 2);
+    [a, b]
+}
+
+fn depth_map(values: &[f32]) -> DepthMap {
+    Grid::from_vec(bubble::WIDTH, bubble::HEIGHT, values.to_vec()).expect("the shape was checked")
+}
+
+fn bubble_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[BubbleTouch; 2], PtError> {
+    let imprint = dict.f32s("bubble_imprint", &[&BUBBLE_SHAPE])?;
+    let without = "points cannot be lifted to the grasp frame";
+    let reference = optional(dict, dict.f32s("bubble_depth_ref", &[&BUBBLE_SHAPE]), without, notes)?;
+    let cameras = cameras(dict, without, notes)?;
+    // Only the simulator writes these two.
+    let truth = if dict.has("contact_mask") && dict.has("imprint_clean") {
+        Some((dict.f32s("contact_mask", &[&BUBBLE_SHAPE])?, dict.f32s("imprint_clean", &[&BUBBLE_SHAPE])?))
+    } else {
+        None
+    };
+    let mut touch = |finger: Finger| {
+        let index = finger.index();
+        let mut map = depth_map(halves(&imprint)[index]);
+        let reference = reference.as_ref().map(|r| depth_map(halves(r)[index]));
+        invalid_to_nan(dict, finger, &mut map, reference.as_ref(), notes);
+        let camera = match (reference, cameras[index]) {
+            (Some(depth_reference), Some((intrinsics, grasp_from_camera))) => {
+                Some(BubbleCamera { depth_reference, intrinsics, grasp_from_camera })
+            }
+            _ => None,
+        };
+        let truth = truth.as_ref().map(|(contact, clean)| BubbleTruth {
+            imprint: depth_map(halves(clean)[index]),
+            contact: depth_map(halves(contact)[index]).map(|&v| v > 0.5),
+        });
+        BubbleTouch { imprint: map, camera, truth }
+    };
+    Ok([touch(Finger::Right), touch(Finger::Left)])
+}
+
+/// Everything that is no measurement becomes NaN, and is counted.
+fn invalid_to_nan(
+    dict: &PtDict,
+    finger: Finger,
+    imprint: &mut DepthMap,
+    reference: Option<&DepthMap>,
+    notes: &mut Vec<Problem>,
+) {
+    let (mut nan, mut infinite, mut dropped) = (0usize, 0usize, 0usize);
+    for (i, value) in imprint.as_mut_slice().iter_mut().enumerate() {
+        if value.is_nan() {
+            nan += 1;
+        } else if value.is_infinite() {
+            infinite += 1;
+            *value = f32::NAN;
+        } else if reference.is_some_and(|r| (r.as_slice()[i] - *value).abs() < NO_DEPTH_M) {
+            dropped += 1;
+            *value = f32::NAN;
+        }
+    }
+    let percent = |n: usize| 100.0 * n as f64 / imprint.len() as f64;
+    let name = finger.name();
+    for (count, what) in [(nan, "NaN"), (infinite, "infinite"), (dropped, "at depth 0, which means not measured")] {
+        if count > 0 {
+            let what =
+                format!("key \"bubble_imprint\", {name} finger: {count} pixels ({:.2} %) are {what}", percent(count));
+            notes.push(problem(dict.file(), what, "these pixels are left out everywhere"));
+        }
+    }
+    let bad = reference.map_or(0, |r| r.as_slice().iter().filter(|v| !v.is_finite()).count());
+    if bad > 0 {
+        let what = format!(
+            "key \"bubble_depth_ref\", {name} finger: {bad} pixels ({:.2} %) are NaN or infinite",
+            percent(bad)
+        );
+        notes.push(problem(dict.file(), what, "these pixels are left out of every cloud"));
+    }
+}
+
+type Camera = (Intrinsics, DAffine3);
+
+/// Intrinsics and camera-to-grasp transform of each finger, where the file has them and they make sense.
+///
+/// Source: `ICP_dataset_cal.py` lines 222-240 and 443-463: both poses are given in the arm's base frame.
+fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Option<Camera>; 2], PtError> {
+    let k = optional(dict, dict.f64s("K", &[&[2, 3, 3], &[2, 1, 3, 3]]), without, notes)?;
+    let bubbles = optional(dict, dict.f64s("bubbles_tr_quat", &[&[2, 1, 7], &[2, 7]]), without, notes)?;
+    let grasp = optional(dict, dict.f64s("grasp_frame_quat", &[&[1, 7], &[7], &[1, 1, 7]]), without, notes)?;
+    let (Some(k), Some(bubbles), Some(grasp)) = (k, bubbles, grasp) else { return Ok([None, None]) };
+    let frame = |key: &str, values: &[f64], notes: &mut Vec<Problem>| {
+        let numbers: [f64; 7] = values.try_into().ok()?;
+        let length = numbers[3..].iter().map(|q| q * q).sum::<f64>().sqrt();
+        let affine = affine_from_xyz_quat(numbers);
+        if affine.is_none() {
+            let what = format!("key \"{key}\" {numbers:?} is no rigid transform: {without}");
+            notes.push(problem(dict.file(), what, "expected x y z qx qy qz qw, all finite"));
+        } else if (length - 1.0).abs() > 1e-3 {
+            let what = format!("key \"{key}\": the quaternion has length {length:.4}, not 1");
+            notes.push(problem(dict.file(), what, "expected x y z qx qy qz qw; check the order of the numbers"));
+        }
+        affine
+    };
+    let Some(base_from_grasp) = frame("grasp_frame_quat", &grasp, notes) else { return Ok([None, None]) };
+    let mut out = [None, None];
+    for finger in Finger::BOTH {
+        let i = finger.index();
+        let m = halves(&k)[i];
+        let intrinsics = Intrinsics { fx: m[0], fy: m[4], cx: m[2], cy: m[5] };
+        let base_from_camera = frame("bubbles_tr_quat", halves(&bubbles)[i], notes);
+        if intrinsics.is_plausible() {
+            out[i] = base_from_camera.map(|b| (intrinsics, base_from_grasp.inverse() * b));
+        } else {
+            let what = format!("key \"K\", {} finger: {intrinsics:?} is no camera: {without}", finger.name());
+            notes.push(problem(dict.file(), what, "expected 3 x 3 pinhole matrices in pixels of the 224 x 171 image"));
+        }
+    }
+    Ok(out)
+}
+
+fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[GelSlimTouch; 2], PtError> {
+    let mut raw = dict.f32s("gelslim", &[&GELSLIM_SHAPE])?;
+    let mut reference = dict.f32s("gelslim_ref", &[&GELSLIM_SHAPE])?;
+    let mut bad = 0usize;
+    for (a, b) in raw.iter_mut().zip(&mut reference) {
+        if !(a.is_finite() && b.is_finite()) {
+            bad += 1;
+            (*a, *b) = (0.0, 0.0);
+        }
+    }
+    if bad > 0 {
+        let percent = 100.0 * bad as f64 / raw.len() as f64;
+        let what = format!("keys \"gelslim\", \"gelslim_ref\": {bad} values ({percent:.2} %) are NaN or infinite");
+        notes.push(problem(dict.file(), what, "these values count as no difference"));
+    }
+    let picture = |values: &[f32]| -> RgbGrid {
+        let plane = gelslim::WIDTH * gelslim::HEIGHT;
+        Grid::from_fn(gelslim::WIDTH, gelslim::HEIGHT, |x, y| {
+            let at = y * gelslim::WIDTH + x;
+            [values[at], values[plane + at], values[2 * plane + at]]
+        })
+    };
+    let touch = |i: usize| {
+        GelSlimTouch::from_images(picture(halves(&raw)[i]), picture(halves(&reference)[i]))
+            .expect("both have the checked shape")
+    };
+    Ok([touch(0), touch(1)])
+}

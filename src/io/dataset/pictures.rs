@@ -1,0 +1,253 @@
+//! A folder of pictures: `NAME_gelslim.png` with `NAME_bubble.png`, optionally `NAME_vqvae.png`.
+//!
+//! Such pictures lost their scale: each was stretched to 0..255 on its own. What is assumed instead:
+//!
+//! * **Imprint**: 0 and 255 stand for [`ASSUMED_IMPRINT_RANGE_M`]. The picture is rotated by 180 degrees (the
+//!   lab's convention for display beside a GelSlim image) and is turned back; it is resampled to 175 x 140 px.
+//! * **GelSlim**: the picture shows a standardised difference image, so "no difference" is its most frequent
+//!   grey, and one grey level is worth [`CLEAN_GAIN`]. Pictures whose most frequent value is the darkest or
+//!   brightest one lost half of their range; they get the gain that brings their spread to [`DIFFERENCE_STD`].
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
+use crate::domain::grid::{DepthMap, Grid, RgbGrid};
+use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample, Scale};
+use crate::domain::sensor::bubble;
+use crate::io::images;
+
+use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem};
+
+/// What the darkest and brightest value of a bubble picture are taken for, metres.
+pub const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
+
+/// What to say beside every length of a picture folder.
+pub const ASSUMED_SCALE_NOTE: &str = "assumed scale: the pictures were stretched to 0..255, taken as -6.3 to 18.0 mm";
+
+/// Difference (0..255 scale) per grey level of an unclipped picture: red, green, blue.
+///
+/// Each channel was divided by its standard deviation (0.0989, 0.0746, 0.0731 of 0..1) before all three were
+/// stretched together, so the gains have this ratio; their common factor 0.039 makes the spread of pictures of
+/// this kind equal to [`DIFFERENCE_STD`] (each channel alone asks for 0.038 to 0.040, so the ratio holds).
+const CLEAN_GAIN: [f32; 3] = [0.039 * 0.0989 * 255.0, 0.039 * 0.0746 * 255.0, 0.039 * 0.0731 * 255.0];
+
+/// Standard deviation of the lab's difference images, 0..255 scale (its training set's 0.0687, 0.0428, 0.0576).
+const DIFFERENCE_STD: [f32; 3] = [0.0687 * 255.0, 0.0428 * 255.0, 0.0576 * 255.0];
+
+/// Position of the bubble's suffix in [`SUFFIXES`].
+pub(super) const BUBBLE: usize = 1;
+/// Position of the prediction's suffix in [`SUFFIXES`].
+pub(super) const VQVAE: usize = 2;
+
+const SUFFIXES: [&str; 3] = ["_gelslim.png", "_bubble.png", "_vqvae.png"];
+
+/// The files of a picture folder, in the order of the index: GelSlim, bubble, prediction.
+#[derive(Debug)]
+pub(super) struct Pictures {
+    pairs: Vec<[Option<PathBuf>; 3]>,
+}
+
+/// Looks for picture pairs directly in `folder`; `None` if there is no such picture.
+pub(super) fn scan(folder: &Path) -> Option<Scan> {
+    let mut problems = Vec::new();
+    let mut found: BTreeMap<String, [Option<PathBuf>; 3]> = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).ok()? {
+        let path = match entry {
+            Ok(entry) => entry.path(),
+            Err(err) => {
+                problems.push(problem(folder, format!("cannot list the folder: {err}"), "check its permissions"));
+                continue;
+            }
+        };
+        let Some(name) = path.file_name().map(|n| n.to_string_lossy().into_owned()) else { continue };
+        let lower = name.to_ascii_lowercase();
+        let Some(kind) = SUFFIXES.iter().position(|suffix| lower.ends_with(suffix)) else { continue };
+        if name.starts_with('.') {
+            continue;
+        }
+        // The suffix is ASCII, so the cut is at a character.
+        let stem = name[..name.len() - SUFFIXES[kind].len()].to_owned();
+        let slot = &mut found.entry(stem).or_default()[kind];
+        match slot {
+            Some(first) => problems.push(problem(
+                path.clone(),
+                format!("same name as {}", first.display()),
+                "rename or remove one of the two; the first is used",
+            )),
+            None => *slot = Some(path),
+        }
+    }
+    if found.values().all(|files| files[0].is_none() && files[BUBBLE].is_none()) {
+        return None;
+    }
+    let mut pairs: Vec<(PairEntry, [Option<PathBuf>; 3])> = Vec::new();
+    for (name, files) in found {
+        match (&files[0], &files[BUBBLE]) {
+            (Some(_), Some(_)) => {
+                let number = last_integer(&name);
+                pairs.push((PairEntry { name, tool: None, split: Split::None, number }, files));
+            }
+            (Some(file), None) => problems.push(half(file, &name, SUFFIXES[BUBBLE])),
+            (None, Some(file)) => problems.push(half(file, &name, SUFFIXES[0])),
+            (None, None) => {
+                let file = files[VQVAE].clone().unwrap_or_default();
+                problems.push(half(&file, &name, SUFFIXES[0]));
+            }
+        }
+    }
+    pairs.sort_by(|(a, _), (b, _)| (a.number, &a.name).cmp(&(b.number, &b.name)));
+    let (pairs, files) = pairs.into_iter().unzip();
+    Some(Scan {
+        root: folder.to_owned(),
+        pairs,
+        problems,
+        source: Source::Pictures(Pictures { pairs: files }),
+        kind: SourceKind::Pictures,
+    })
+}
+
+fn half(file: &Path, name: &str, missing: &str) -> Problem {
+    problem(file, format!("its other half {name}{missing} is missing"), "add the missing picture, or remove this one")
+}
+
+impl Pictures {
+    fn file(&self, id: PairId, kind: usize) -> Result<Option<&Path>, LoadError> {
+        let files = self.pairs.get(id.0 as usize).ok_or(LoadError::NoSuchPair { id })?;
+        Ok(files[kind].as_deref())
+    }
+
+    pub(super) fn files(&self, id: PairId) -> Vec<PathBuf> {
+        self.pairs.get(id.0 as usize).into_iter().flat_map(|files| files[..VQVAE].iter().flatten().cloned()).collect()
+    }
+
+    /// A grey picture as it is in the file.
+    pub(super) fn tile(&self, id: PairId, kind: usize) -> Result<Option<Grid<f32>>, LoadError> {
+        Ok(self.file(id, kind)?.map(images::read_grey).transpose()?)
+    }
+
+    /// The pair as the right finger's touch: which finger it was is not known.
+    pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
+        let mut notes = Vec::new();
+        let mut touch = FingerTouch::default();
+        if let Some(path) = self.file(id, 0)? {
+            let tile = images::read_rgb(path)?;
+            let difference = difference_from_tile(&tile);
+            if difference.as_slice().iter().all(|p| *p == [0.0; 3]) {
+                notes.push(problem(path, "the picture is a single colour", "check that the right picture was saved"));
+            }
+            touch.gelslim = Some(GelSlimTouch { images: None, difference });
+        }
+        if let Some(tile) = self.tile(id, BUBBLE)? {
+            let [w, h] = tile.size();
+            let path = self.file(id, BUBBLE)?.unwrap_or(Path::new(""));
+            if w < 16 || h < 16 {
+                notes.push(problem(
+                    path,
+                    format!("the picture has only {w} x {h} pixels"),
+                    "save it at 128 x 128 or more",
+                ));
+            }
+            if tile.as_slice().windows(2).all(|v| v[0] == v[1]) {
+                notes.push(problem(path, "the picture is a single grey", "check that the right picture was saved"));
+            }
+            touch.bubble = Some(BubbleTouch { imprint: imprint_from_tile(&tile), camera: None, truth: None });
+        }
+        let sample = Sample { fingers: [Some(touch), None], grasp_from_object: None, scale: Scale::Assumed };
+        Ok(Loaded { sample, notes })
+    }
+}
+
+/// Assumed metres, turned back by 180 degrees, at the lab's size.
+pub(super) fn imprint_from_tile(tile: &Grid<f32>) -> DepthMap {
+    let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
+    let metres = tile.rotated_180().map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32);
+    resized(&metres, bubble::WIDTH, bubble::HEIGHT)
+}
+
+/// Bilinear, pixel centres at half integers, no antialiasing: `torchvision.transforms.Resize` on tensors.
+fn resized(source: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
+    let axis = |size: usize, from: usize| -> Vec<(usize, usize, f64)> {
+        let step = from as f64 / size as f64;
+        (0..size)
+            .map(|i| {
+                let at = ((i as f64 + 0.5) * step - 0.5).max(0.0);
+                let low = (at as usize).min(from - 1);
+                (low, (low + 1).min(from - 1), at - low as f64)
+            })
+            .collect()
+    };
+    if source.is_empty() {
+        return Grid::filled(width, height, f32::NAN);
+    }
+    let (columns, rows) = (axis(width, source.width()), axis(height, source.height()));
+    Grid::from_fn(width, height, |x, y| {
+        let ((x0, x1, fx), (y0, y1, fy)) = (columns[x], rows[y]);
+        let row = |y: usize| f64::from(source[(x0, y)]) * (1.0 - fx) + f64::from(source[(x1, y)]) * fx;
+        (row(y0) * (1.0 - fy) + row(y1) * fy) as f32
+    })
+}
+
+fn difference_from_tile(tile: &RgbGrid) -> RgbGrid {
+    let mut zero = [0f32; 3];
+    let mut gain = CLEAN_GAIN;
+    for channel in 0..3 {
+        let mut counts = [0u32; 256];
+        for pixel in tile.as_slice() {
+            counts[pixel[channel].round().clamp(0.0, 255.0) as usize] += 1;
+        }
+        let mode =
+            counts.iter().enumerate().max_by_key(|&(level, &n)| (n, std::cmp::Reverse(level))).map_or(0, |m| m.0);
+        zero[channel] = mode as f32;
+        if mode == 0 || mode == 255 {
+            let spread = standard_deviation(tile.as_slice().iter().map(|p| f64::from(p[channel]))) as f32;
+            gain[channel] = if spread > 1.0 { DIFFERENCE_STD[channel] / spread } else { 0.0 };
+        }
+    }
+    tile.map(|pixel| std::array::from_fn(|c| (pixel[c] - zero[c]) * gain[c]))
+}
+
+fn standard_deviation(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for v in values {
+        n += 1.0;
+        sum += v;
+        squares += v * v;
+    }
+    if n == 0.0 { 0.0 } else { (squares / n - (sum / n) * (sum / n)).max(0.0).sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn resizing_agrees_with_torchvision() {
+        // torch.nn.functional.interpolate([[0, 1, 2, 3]], size=(1, 6), mode="bilinear", align_corners=False)
+        let line = Grid::from_vec(4, 1, vec![0.0, 1.0, 2.0, 3.0]).unwrap();
+        let out = resized(&line, 6, 1);
+        for (a, b) in out.as_slice().iter().zip([0.0, 0.5, 1.166_666_6, 1.833_333_3, 2.5, 3.0]) {
+            assert!((a - b).abs() < 1e-6, "{out:?}");
+        }
+        assert_eq!(resized(&line, 4, 1), line);
+    }
+
+    #[test]
+    fn a_tile_is_turned_back_and_scaled() {
+        let tile = Grid::from_fn(128, 128, |x, y| if x < 10 && y < 10 { 255.0 } else { 0.0 });
+        let imprint = imprint_from_tile(&tile);
+        assert_eq!(imprint.size(), [175, 140]);
+        assert!((imprint[(174, 139)] - 0.018).abs() < 1e-6);
+        assert!((imprint[(0, 0)] + 0.0063).abs() < 1e-6);
+    }
+
+    #[test]
+    fn grey_is_no_difference() {
+        let mut tile = Grid::filled(20, 20, [120.0; 3]);
+        tile[(3, 4)] = [220.0, 120.0, 20.0];
+        let difference = difference_from_tile(&tile);
+        assert_eq!(difference[(0, 0)], [0.0; 3]);
+        assert!((difference[(3, 4)][0] - 98.4).abs() < 0.1 && (difference[(3, 4)][2] + 72.7).abs() < 0.1);
+        assert_eq!(difference_from_tile(&Grid::filled(4, 4, [0.0; 3]))[(1, 1)], [0.0; 3]);
+    }
+}

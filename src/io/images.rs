@@ -1,0 +1,202 @@
+//! PNG pictures to and from [`Grid`]s.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use image::{DynamicImage, ExtendedColorType, ImageFormat, ImageReader};
+
+use crate::domain::grid::{Grid, RgbGrid};
+
+/// Why a picture cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The file cannot be opened, read or written.
+    #[error("cannot access the picture ({}): {source}", file.display())]
+    Io {
+        /// The file.
+        file: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file is no PNG, or a damaged one.
+    #[error("not a readable PNG: {source} ({})", file.display())]
+    Decode {
+        /// The file.
+        file: PathBuf,
+        /// The decoder's reason.
+        source: image::ImageError,
+    },
+    /// The picture has other channels or another depth than asked for.
+    #[error("the picture is {found}, expected {expected} ({})", file.display())]
+    Kind {
+        /// The file.
+        file: PathBuf,
+        /// What it is.
+        found: String,
+        /// What it should be.
+        expected: &'static str,
+    },
+}
+
+impl PictureError {
+    /// The file it is about.
+    pub fn file(&self) -> &Path {
+        match self {
+            Self::Io { file, .. } | Self::Decode { file, .. } | Self::Kind { file, .. } => file,
+        }
+    }
+
+    /// What to do about it.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::Io { .. } => "check that the file exists and may be read, and that the disk has room",
+            Self::Decode { .. } => "copy or save the picture again as PNG",
+            Self::Kind { .. } => "save the picture again in that form",
+        }
+    }
+}
+
+fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
+    let io = |source| PictureError::Io { file: path.to_owned(), source };
+    let bytes = std::fs::read(path).map_err(io)?;
+    // The decoder's default limits keep a small file from asking for gigabytes.
+    let mut reader = ImageReader::new(Cursor::new(bytes));
+    reader.set_format(ImageFormat::Png);
+    reader.decode().map_err(|source| PictureError::Decode { file: path.to_owned(), source })
+}
+
+/// Turns decoded bytes into a grid. The decoder guarantees the length.
+fn grid<T: Copy>(width: u32, height: u32, pixels: Vec<T>) -> Grid<T> {
+    let (width, height) = (width as usize, height as usize);
+    Grid::from_vec(width, height, pixels).expect("a decoder fills every pixel")
+}
+
+/// Reads any PNG as colour on the 0..255 scale; grey is repeated, 16 bits are scaled down, alpha is dropped.
+///
+/// # Errors
+/// [`PictureError`].
+pub fn read_rgb(path: &Path) -> Result<RgbGrid, PictureError> {
+    let image = decode(path)?;
+    let (w, h) = (image.width(), image.height());
+    Ok(match image {
+        DynamicImage::ImageRgb16(_) | DynamicImage::ImageRgba16(_) | DynamicImage::ImageLuma16(_) => {
+            let pixels = image.into_rgb16().pixels().map(|p| p.0.map(|v| f32::from(v) / 257.0)).collect();
+            grid(w, h, pixels)
+        }
+        other => grid(w, h, other.into_rgb8().pixels().map(|p| p.0.map(f32::from)).collect()),
+    })
+}
+
+/// Reads any PNG as grey on the 0..255 scale; 16 bits keep their fractions, colour is weighted, alpha is dropped.
+///
+/// # Errors
+/// [`PictureError`].
+pub fn read_grey(path: &Path) -> Result<Grid<f32>, PictureError> {
+    let image = decode(path)?;
+    let (w, h) = (image.width(), image.height());
+    Ok(match image {
+        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLumaA8(_) => {
+            grid(w, h, image.into_luma8().into_raw().into_iter().map(f32::from).collect())
+        }
+        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgba8(_) => {
+            grid(w, h, image.into_luma8().into_raw().into_iter().map(f32::from).collect())
+        }
+        other => grid(w, h, other.into_luma16().into_raw().into_iter().map(|v| f32::from(v) / 257.0).collect()),
+    })
+}
+
+/// Reads a PNG that must be 8-bit grey without alpha, value by value.
+///
+/// # Errors
+/// [`PictureError::Kind`] for any other kind.
+pub fn read_grey8(path: &Path) -> Result<Grid<u8>, PictureError> {
+    match decode(path)? {
+        DynamicImage::ImageLuma8(image) => Ok(grid(image.width(), image.height(), image.into_raw())),
+        other => Err(wrong_kind(path, &other, "8-bit grey")),
+    }
+}
+
+/// Reads a PNG that must be 16-bit grey without alpha, value by value.
+///
+/// # Errors
+/// [`PictureError::Kind`] for any other kind.
+pub fn read_grey16(path: &Path) -> Result<Grid<u16>, PictureError> {
+    match decode(path)? {
+        DynamicImage::ImageLuma16(image) => Ok(grid(image.width(), image.height(), image.into_raw())),
+        other => Err(wrong_kind(path, &other, "16-bit grey")),
+    }
+}
+
+fn wrong_kind(file: &Path, image: &DynamicImage, expected: &'static str) -> PictureError {
+    PictureError::Kind { file: file.to_owned(), found: format!("{:?}", image.color()), expected }
+}
+
+/// Writes 8-bit grey.
+///
+/// # Errors
+/// [`PictureError`].
+pub fn write_grey8(path: &Path, picture: &Grid<u8>) -> Result<(), PictureError> {
+    encode(path, picture.as_slice(), picture.size(), ExtendedColorType::L8)
+}
+
+/// Writes 16-bit grey.
+///
+/// # Errors
+/// [`PictureError`].
+pub fn write_grey16(path: &Path, picture: &Grid<u16>) -> Result<(), PictureError> {
+    // The encoder takes native-endian bytes and writes big-endian ones.
+    let bytes: Vec<u8> = picture.as_slice().iter().flat_map(|v| v.to_ne_bytes()).collect();
+    encode(path, &bytes, picture.size(), ExtendedColorType::L16)
+}
+
+/// Writes 8-bit colour; values are rounded and limited to 0..255, NaN becomes 0.
+///
+/// # Errors
+/// [`PictureError`].
+pub fn write_rgb8(path: &Path, picture: &RgbGrid) -> Result<(), PictureError> {
+    let bytes: Vec<u8> = picture.as_slice().iter().flatten().map(|v| v.round() as u8).collect();
+    encode(path, &bytes, picture.size(), ExtendedColorType::Rgb8)
+}
+
+fn encode(path: &Path, bytes: &[u8], [w, h]: [usize; 2], kind: ExtendedColorType) -> Result<(), PictureError> {
+    let mut png = Cursor::new(Vec::new());
+    image::write_buffer_with_format(&mut png, bytes, w as u32, h as u32, kind, ImageFormat::Png)
+        .map_err(|source| PictureError::Decode { file: path.to_owned(), source })?;
+    super::atomic::write_bytes(path, png.get_ref()).map_err(|source| PictureError::Io { file: path.to_owned(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_survives_the_round_trip() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.png");
+        let grey = Grid::from_fn(5, 3, |x, y| (x * 50 + y) as u8);
+        write_grey8(&path, &grey).unwrap();
+        assert_eq!(read_grey8(&path).unwrap(), grey);
+        assert_eq!(read_grey(&path).unwrap(), grey.map(|&v| f32::from(v)));
+        assert!(matches!(read_grey16(&path), Err(PictureError::Kind { .. })));
+        let deep = Grid::from_fn(4, 3, |x, y| (x * 20000 + y) as u16);
+        write_grey16(&path, &deep).unwrap();
+        assert_eq!(read_grey16(&path).unwrap(), deep);
+        assert!((read_grey(&path).unwrap()[(3, 0)] - 60000.0 / 257.0).abs() < 1e-3);
+        let colour = Grid::from_fn(3, 2, |x, y| [x as f32 * 100.0, y as f32, 7.4]);
+        write_rgb8(&path, &colour).unwrap();
+        assert_eq!(read_rgb(&path).unwrap()[(2, 1)], [200.0, 1.0, 7.0]);
+        assert!(read_grey8(&path).unwrap_err().to_string().contains("expected 8-bit grey"));
+    }
+
+    #[test]
+    fn damaged_pictures_are_errors() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.png");
+        write_grey8(&path, &Grid::filled(40, 40, 3)).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        for length in [0, 5, 20, whole.len() / 2] {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            assert!(matches!(read_rgb(&path), Err(PictureError::Decode { .. })), "{length}");
+        }
+    }
+}
