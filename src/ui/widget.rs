@@ -1,0 +1,9 @@
+//! Widgets that know nothing of the application's state.
+
+pub mod brush_cursor;
+pub mod colorbar;
+pub mod empty;
+pub mod help;
+pub mod image_canvas;
+pub mod progress;
+pub mod texture;

@@ -1,0 +1,220 @@
+//! The bar that says which colour is which value: numbers, unit, histogram, and a range that can be changed.
+
+use eframe::egui::{
+    self, Align2, Color32, FontId, Mesh, PointerButton, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
+};
+
+use crate::domain::colormap::{ColorMap, Range};
+use crate::ui::theme::{Palette, SMALL};
+use crate::ui::widget::texture::Histogram;
+
+/// Height of the whole bar, points.
+pub const HEIGHT: f32 = 36.0;
+
+/// A bar to be shown. Values are in millimetres.
+pub struct Colorbar<'a> {
+    /// The name for screen readers and tests, e.g. `Depth range`.
+    pub label: &'a str,
+    /// The colours.
+    pub map: ColorMap,
+    /// The range to fall back to on a double-click.
+    pub default: Range,
+    /// Both ends move together around zero.
+    pub symmetric: bool,
+    /// Of the picture above, in metres.
+    pub histogram: Option<&'a Histogram>,
+    /// Whether the range stays when another sample is shown; `None` shows no lock.
+    pub locked: Option<bool>,
+    /// Beside the unit, e.g. `assumed scale`.
+    pub note: &'a str,
+}
+
+/// What a person asked of the bar.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Asked {
+    /// This range, millimetres.
+    Range(Range),
+    /// The range of what is shown, once.
+    Auto,
+    /// The lock.
+    Lock(bool),
+}
+
+/// Ticks at round numbers, at most `most` of them.
+fn ticks(range: Range, most: usize) -> Vec<f32> {
+    let span = range.hi - range.lo;
+    if !(span > 0.0 && span.is_finite()) || most == 0 {
+        return Vec::new();
+    }
+    let raw = span / most as f32;
+    let base = 10f32.powf(raw.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * base).into_iter().find(|s| *s >= raw).unwrap_or(base * 10.0);
+    let first = (range.lo / step).ceil() as i64;
+    (0..=most as i64 + 1).map(|i| (first + i) as f32 * step).take_while(|v| *v <= range.hi + step * 1e-3).collect()
+}
+
+impl Colorbar<'_> {
+    /// Shows the bar over the width of `ui`; `range` is in millimetres.
+    pub fn show(self, ui: &mut Ui, range: Range) -> Option<Asked> {
+        let p = Palette::of(ui);
+        let mut asked = None;
+        ui.allocate_ui(vec2(ui.available_width(), HEIGHT), |ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.horizontal_centered(|ui| {
+                let mut edited = range;
+                let lo = end(ui, &mut edited.lo, &format!("{}, lower end", self.label));
+                let right = if self.locked.is_some() { 168.0 } else { 118.0 };
+                let note_width = if self.note.is_empty() { 0.0 } else { 84.0 };
+                let width = (ui.available_width() - right - note_width).max(24.0);
+                if let Some(new) = self.gradient(ui, width, range, p) {
+                    asked = Some(Asked::Range(new));
+                }
+                let hi = end(ui, &mut edited.hi, &format!("{}, upper end", self.label));
+                ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
+                if !self.note.is_empty() {
+                    ui.label(egui::RichText::new(self.note).size(SMALL).color(p.caution))
+                        .on_hover_text("The source lost its scale: the range in millimetres is an assumption");
+                }
+                let auto =
+                    ui.add(egui::Button::new(egui::RichText::new("Auto").size(SMALL)).min_size(vec2(30.0, 18.0)));
+                auto.widget_info(|| {
+                    WidgetInfo::labeled(Role::Button, true, format!("{}: set from what is shown", self.label))
+                });
+                if auto.on_hover_text("Set the range once from what is shown (C)").clicked() {
+                    asked = Some(Asked::Auto);
+                }
+                if let Some(locked) = self.locked {
+                    let text = egui::RichText::new("Lock").size(SMALL);
+                    let lock = ui.add(egui::Button::selectable(locked, text).min_size(vec2(30.0, 18.0)));
+                    lock.widget_info(|| {
+                        WidgetInfo::selected(Role::CheckBox, true, locked, format!("{}: lock", self.label))
+                    });
+                    let tip = "Locked: colours mean the same in every sample. Unlocked: set from each sample shown (O)";
+                    if lock.on_hover_text(tip).clicked() {
+                        asked = Some(Asked::Lock(!locked));
+                    }
+                }
+                if lo || hi {
+                    if self.symmetric {
+                        let size = if lo { edited.lo } else { edited.hi };
+                        edited = Range::symmetric(size);
+                    }
+                    if edited.hi - edited.lo >= 0.01 {
+                        asked = Some(Asked::Range(edited));
+                    }
+                }
+            });
+        });
+        asked
+    }
+
+    /// The colours with histogram and ticks; dragging a half moves its end, a double-click resets.
+    fn gradient(&self, ui: &mut Ui, width: f32, range: Range, p: &Palette) -> Option<Range> {
+        let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT - 4.0), Sense::click_and_drag());
+        let info = format!("{} {:.2} to {:.2} mm", self.label, range.lo, range.hi);
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &info));
+        let bar = Rect::from_min_max(pos2(rect.left(), rect.top() + 10.0), pos2(rect.right(), rect.top() + 19.0));
+        let painter = ui.painter_at(rect.expand2(vec2(12.0, 0.0)));
+        let mut mesh = Mesh::default();
+        const STEPS: u32 = 48;
+        for i in 0..=STEPS {
+            let t = i as f32 / STEPS as f32;
+            let [r, g, b] = self.map.rgb8(t);
+            let x = bar.left() + t * bar.width();
+            mesh.colored_vertex(pos2(x, bar.top()), Color32::from_rgb(r, g, b));
+            mesh.colored_vertex(pos2(x, bar.bottom()), Color32::from_rgb(r, g, b));
+            if i > 0 {
+                let k = 2 * i;
+                mesh.add_triangle(k - 2, k - 1, k);
+                mesh.add_triangle(k - 1, k, k + 1);
+            }
+        }
+        painter.add(Shape::mesh(mesh));
+        if let Some(histogram) = self.histogram {
+            paint_histogram(
+                &painter,
+                histogram,
+                range,
+                Rect::from_min_max(rect.min, pos2(bar.right(), bar.top() - 1.0)),
+                p,
+            );
+        }
+        for v in ticks(range, (width / 44.0) as usize) {
+            let x = bar.left() + range.unit(v) * bar.width();
+            painter.vline(x, bar.bottom()..=bar.bottom() + 2.0, Stroke::new(1.0, p.weak));
+            let text = if v.fract().abs() < 1e-3 { format!("{v:.0}") } else { format!("{v:.1}") };
+            painter.text(pos2(x, bar.bottom() + 2.0), Align2::CENTER_TOP, text, FontId::proportional(10.0), p.weak);
+        }
+        let response = response.on_hover_text(format!(
+            "{info}. Drag the left or right half to move that end; double-click resets to {:.2} to {:.2} mm",
+            self.default.lo, self.default.hi
+        ));
+        if response.double_clicked() {
+            return Some(self.default);
+        }
+        let moved = response.drag_delta().x;
+        if response.dragged_by(PointerButton::Primary) && moved != 0.0 {
+            let per_point = (range.hi - range.lo) / bar.width().max(1.0);
+            let origin = ui.input(|i| i.pointer.press_origin()).map_or(0.0, |o| o.x);
+            let mut new = range;
+            if origin < bar.center().x {
+                new.lo += moved * per_point
+            } else {
+                new.hi += moved * per_point
+            }
+            if self.symmetric {
+                new = Range::symmetric(if origin < bar.center().x { new.lo } else { new.hi });
+            }
+            return (new.hi - new.lo >= 0.01).then_some(new);
+        }
+        None
+    }
+}
+
+fn paint_histogram(painter: &egui::Painter, histogram: &Histogram, range: Range, rect: Rect, p: &Palette) {
+    // Most of an imprint is untouched membrane: a logarithm keeps the touch visible beside it.
+    let height = |n: u32| f64::from(n + 1).ln() as f32;
+    let most = histogram.counts.iter().copied().map(height).fold(0.0, f32::max);
+    if most <= 0.0 {
+        return;
+    }
+    let bins = histogram.counts.len() as f32;
+    let span = histogram.span.hi - histogram.span.lo;
+    for (i, n) in histogram.counts.iter().enumerate() {
+        // Histograms are of metres, the bar is in millimetres.
+        let at = |k: f32| (histogram.span.lo + span * k / bins) * 1e3;
+        let (a, b) = (at(i as f32), at(i as f32 + 1.0));
+        if *n == 0 || b < range.lo || a > range.hi {
+            continue;
+        }
+        let x = |v: f32| rect.left() + range.unit(v) * rect.width();
+        let top = rect.bottom() - rect.height() * height(*n) / most;
+        let right = x(b).max(x(a) + 1.0);
+        painter.rect_filled(
+            Rect::from_min_max(pos2(x(a), top), pos2(right, rect.bottom())),
+            0.0,
+            p.weak.gamma_multiply(0.6),
+        );
+    }
+}
+
+/// A number that can be typed or dragged. Returns whether it changed.
+fn end(ui: &mut Ui, value: &mut f32, label: &str) -> bool {
+    let drag = egui::DragValue::new(value).speed(0.05).fixed_decimals(2).range(-100.0..=100.0);
+    let response = ui.add_sized([44.0, 20.0], drag);
+    let response = response.accessible_name(label);
+    response.on_hover_text(format!("{label}, mm: drag, or click and type")).changed()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        assert_eq!(ticks(Range { lo: 0.0, hi: 18.0 }, 4), vec![0.0, 5.0, 10.0, 15.0]);
+        assert_eq!(ticks(Range { lo: -4.0, hi: 4.0 }, 4), vec![-4.0, -2.0, 0.0, 2.0, 4.0]);
+        assert!(ticks(Range { lo: 1.0, hi: 1.0 }, 4).is_empty());
+        assert!(ticks(Range { lo: f32::NAN, hi: 1.0 }, 4).is_empty());
+    }
+}

@@ -1,0 +1,51 @@
+//! The help mark of a pane: its mouse controls.
+
+use eframe::egui::{self, RichText, Ui};
+
+use crate::ui::theme::{Palette, SMALL, caption};
+
+/// Mouse controls of every image pane.
+pub const IMAGE: &[(&str, &str)] = &[
+    ("Wheel", "zoom at the pointer"),
+    ("Drag, middle drag or Space + drag", "move all linked images"),
+    ("Double-click or 0", "fit"),
+    ("Hover", "cross-hair in every image and point in 3D"),
+];
+
+/// Mouse controls of an image that can be painted on.
+pub const PAINT: &[(&str, &str)] = &[
+    ("Drag", "paint with the tool in hand"),
+    ("Ctrl + drag or right drag", "erase"),
+    ("[ and ], or Shift + wheel", "brush size"),
+    ("Wheel", "zoom at the pointer"),
+    ("Middle drag or Space + drag", "move all linked images"),
+    ("Double-click with middle or 0", "fit"),
+];
+
+/// Mouse controls of the 3D panes.
+pub const SCENE: &[(&str, &str)] = &[
+    ("Left drag", "orbit"),
+    ("Right or middle drag", "move"),
+    ("Wheel", "zoom"),
+    ("Double-click", "fit"),
+    ("Ctrl + Alt + 1 … 4", "from left, right, front, top"),
+    ("Hover", "cross-hair in the images"),
+];
+
+/// A question mark that lists `controls` under the pointer.
+pub fn mark(ui: &mut Ui, pane: &str, controls: &[(&str, &str)]) {
+    let p = Palette::of(ui);
+    let text = RichText::new("?").size(SMALL).color(p.weak);
+    let button = ui.add(egui::Button::new(text).frame(false).min_size(egui::vec2(16.0, 16.0)));
+    button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Mouse controls of {pane}")));
+    button.on_hover_ui(|ui| {
+        ui.label(RichText::new(format!("{pane}: mouse controls")).strong());
+        egui::Grid::new(("help", pane)).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
+            for (control, effect) in controls {
+                ui.label(caption(*control, Palette::of(ui)));
+                ui.label(RichText::new(*effect).size(SMALL));
+                ui.end_row();
+            }
+        });
+    });
+}

@@ -1,0 +1,230 @@
+//! Pictures on the graphics card, made again only when what they show changed.
+
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+
+use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions};
+
+use crate::domain::colormap::{ColorMap, Range};
+use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+
+/// Bars in a histogram.
+pub const BINS: usize = 64;
+
+/// How many values fall into each of [`BINS`] equal parts of a span.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Histogram {
+    /// Counts, from the lower end to the upper.
+    pub counts: [u32; BINS],
+    /// The span, in the unit of the data.
+    pub span: Range,
+}
+
+impl Histogram {
+    /// Of all finite values; `None` without one.
+    pub fn of(values: &[f32]) -> Option<Self> {
+        let span = Range::of(values)?;
+        let mut counts = [0; BINS];
+        for v in values.iter().filter(|v| v.is_finite()) {
+            let bin = (span.unit(*v) * BINS as f32) as usize;
+            counts[bin.min(BINS - 1)] += 1;
+        }
+        Some(Self { counts, span })
+    }
+}
+
+/// A picture on the graphics card with what belongs to it.
+pub struct Picture {
+    /// The texture.
+    pub texture: TextureHandle,
+    /// Of the values, where the picture is of values.
+    pub histogram: Option<Histogram>,
+    key: u64,
+    used: u64,
+    /// Holds what the key's address points to, so that no other picture can take that address.
+    _source: Option<Arc<dyn Any + Send + Sync>>,
+}
+
+/// All pictures, one per slot.
+#[derive(Default)]
+pub struct Textures {
+    slots: BTreeMap<u64, Picture>,
+    frame: u64,
+    /// Uploads since the start: tests hold on to it that an idle frame uploads nothing.
+    pub uploads: u64,
+}
+
+/// The identity of a shared value: its address, which cannot be reused while it is held.
+pub fn address<T: ?Sized>(value: &Arc<T>) -> usize {
+    Arc::as_ptr(value).cast::<u8>() as usize
+}
+
+impl Textures {
+    /// Starts a frame: pictures that were not shown for a while are dropped.
+    pub fn begin_frame(&mut self) {
+        self.frame += 1;
+        let frame = self.frame;
+        self.slots.retain(|_, picture| picture.used + 120 > frame);
+    }
+
+    /// The picture in `slot`; made with `make` if `key` (what it shows) or `nearest` changed.
+    ///
+    /// `source` is held as long as the picture, so that an address in `key` stays its own.
+    pub fn get(
+        &mut self,
+        ctx: &Context,
+        slot: impl Hash,
+        key: impl Hash,
+        nearest: bool,
+        source: Option<Arc<dyn Any + Send + Sync>>,
+        make: impl FnOnce() -> (ColorImage, Option<Histogram>),
+    ) -> &Picture {
+        let slot = hash(slot);
+        let key = hash((key, nearest));
+        let frame = self.frame;
+        let options = if nearest { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
+        let uploads = &mut self.uploads;
+        let picture = match self.slots.entry(slot) {
+            std::collections::btree_map::Entry::Vacant(entry) => {
+                *uploads += 1;
+                let (image, histogram) = make();
+                let texture = ctx.load_texture("picture", image, options);
+                entry.insert(Picture { texture, histogram, key, used: frame, _source: source })
+            }
+            std::collections::btree_map::Entry::Occupied(entry) => {
+                let picture = entry.into_mut();
+                if picture.key != key {
+                    *uploads += 1;
+                    let (image, histogram) = make();
+                    picture.texture.set(image, options);
+                    picture.histogram = histogram;
+                    picture.key = key;
+                    picture._source = source;
+                }
+                picture
+            }
+        };
+        picture.used = frame;
+        picture
+    }
+}
+
+fn hash(value: impl Hash) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    value.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// A depth map through a colour map.
+pub fn depth_image(depth: &DepthMap, map: ColorMap, range: Range) -> ColorImage {
+    let table = map.table();
+    let nan = map.rgb8(f32::NAN);
+    let pixel = |v: &f32| {
+        let unit = range.unit(*v);
+        let [r, g, b] = if unit.is_nan() { nan } else { table[(unit * 255.0 + 0.5) as usize] };
+        Color32::from_rgb(r, g, b)
+    };
+    ColorImage::new(depth.size(), depth.as_slice().iter().map(pixel).collect())
+}
+
+/// A colour image on the 0..255 scale. `centre` is added: 128 shows a signed difference around mid grey.
+pub fn rgb_image(image: &RgbGrid, gain: f32, centre: f32) -> ColorImage {
+    let byte = |v: f32| (v * gain + centre).round().clamp(0.0, 255.0) as u8;
+    let pixel = |p: &[f32; 3]| Color32::from_rgb(byte(p[0]), byte(p[1]), byte(p[2]));
+    ColorImage::new(image.size(), image.as_slice().iter().map(pixel).collect())
+}
+
+/// The gain that spreads a difference over the grey levels: 1 at the usual contrast, more for faint touches, and for
+/// values on a 0..1 scale. 1 for an empty or constant image.
+pub fn difference_gain(image: &Grid<[f32; 3]>) -> f32 {
+    let mut sizes: Vec<f32> =
+        image.as_slice().iter().flat_map(|p| p.iter().map(|v| v.abs())).filter(|v| v.is_finite()).collect();
+    if sizes.is_empty() {
+        return 1.0;
+    }
+    let at = (sizes.len() - 1) * 995 / 1000;
+    let (_, p99, _) = sizes.select_nth_unstable_by(at, f32::total_cmp);
+    if *p99 > 1e-6 { 120.0 / *p99 } else { 1.0 }
+}
+
+/// A mask as a transparent layer.
+pub fn mask_image(mask: &Mask, color: Color32) -> ColorImage {
+    let pixel = |on: &bool| if *on { color } else { Color32::TRANSPARENT };
+    ColorImage::new(mask.size(), mask.as_slice().iter().map(pixel).collect())
+}
+
+/// The sides of pixels between mask and background, as segments in pixel coordinates with (0, 0) at the *corner* of
+/// the top-left pixel. Runs along a row or column are one segment.
+pub fn outline(mask: &Mask) -> Vec<[[f32; 2]; 2]> {
+    let [w, h] = mask.size();
+    let on = |x: isize, y: isize| x >= 0 && y >= 0 && mask.get(x as usize, y as usize).is_some_and(|v| *v);
+    let mut segments = Vec::new();
+    let mut push_runs = |along: usize, across: usize, horizontal: bool| {
+        for line in 0..=across as isize {
+            let mut start = None;
+            for i in 0..=along as isize {
+                let edge = i < along as isize
+                    && if horizontal { on(i, line - 1) != on(i, line) } else { on(line - 1, i) != on(line, i) };
+                match (edge, start) {
+                    (true, None) => start = Some(i),
+                    (false, Some(from)) => {
+                        let (a, b, l) = (from as f32, i as f32, line as f32);
+                        segments.push(if horizontal { [[a, l], [b, l]] } else { [[l, a], [l, b]] });
+                        start = None;
+                    }
+                    _ => {}
+                }
+            }
+        }
+    };
+    push_runs(w, h, true);
+    push_runs(h, w, false);
+    segments
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_picture_is_uploaded_only_when_it_changed() {
+        let ctx = Context::default();
+        let mut textures = Textures::default();
+        let make = || (ColorImage::filled([2, 2], Color32::RED), None);
+        for _ in 0..3 {
+            textures.begin_frame();
+            textures.get(&ctx, "a", 1, true, None, make);
+        }
+        assert_eq!(textures.uploads, 1);
+        textures.get(&ctx, "a", 2, true, None, make);
+        textures.get(&ctx, "b", 2, true, None, make);
+        assert_eq!(textures.uploads, 3);
+    }
+
+    #[test]
+    fn the_outline_of_one_pixel_has_four_sides() {
+        let mut mask = Mask::filled(3, 3, false);
+        mask[(1, 1)] = true;
+        let sides = outline(&mask);
+        assert_eq!(sides.len(), 4);
+        assert!(sides.contains(&[[1.0, 1.0], [2.0, 1.0]]) && sides.contains(&[[2.0, 1.0], [2.0, 2.0]]));
+        assert_eq!(outline(&Mask::filled(4, 2, true)).len(), 4);
+        assert!(outline(&Mask::filled(0, 0, true)).is_empty());
+    }
+
+    #[test]
+    fn histograms_count_finite_values_only() {
+        let h = Histogram::of(&[0.0, f32::NAN, 1.0, 1.0, f32::INFINITY]).unwrap();
+        assert_eq!((h.counts[0], h.counts[BINS - 1]), (1, 2));
+        assert_eq!(Histogram::of(&[f32::NAN]), None);
+    }
+
+    #[test]
+    fn nan_has_its_own_colour() {
+        let depth = DepthMap::from_vec(2, 1, vec![f32::NAN, 0.0]).unwrap();
+        let image = depth_image(&depth, ColorMap::Viridis, Range { lo: 0.0, hi: 1.0 });
+        assert_ne!(image.pixels[0], image.pixels[1]);
+    }
+}
