@@ -13,8 +13,7 @@ mod schedule;
 mod tensor;
 
 pub use ddim::{
-    Denoiser, DiffusionError, GenerateConfig, Latent, ModelError, Prediction, Progress, Sampler,
-    sample, sample_seeds,
+    Denoiser, DiffusionError, GenerateConfig, Latent, ModelError, Prediction, Progress, Sampler, sample, sample_seeds,
 };
 pub use noise::GaussianNoise;
 pub use schedule::{Schedule, ScheduleError, Spacing, Step};

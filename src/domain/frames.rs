@@ -29,21 +29,13 @@ impl PlanarPose {
     ///
     /// Source: `evaluation/ICP_dataset_cal.py` of the lab's touch2touch repository, lines 90-102 and 766-769.
     pub fn object_from_grasp_of_lab(theta_rad: f64, x_m: f64, y_m: f64) -> Self {
-        Self {
-            theta_rad,
-            y_m: -x_m,
-            z_m: -y_m,
-        }
+        Self { theta_rad, y_m: -x_m, z_m: -y_m }
     }
 
     /// The opposite motion: turns `a_from_b` into `b_from_a`.
     pub fn inverse(self) -> Self {
         let t = rotate(-self.theta_rad, DVec2::new(-self.y_m, -self.z_m));
-        Self {
-            theta_rad: -self.theta_rad,
-            y_m: t.x,
-            z_m: t.y,
-        }
+        Self { theta_rad: -self.theta_rad, y_m: t.x, z_m: t.y }
     }
 
     /// Moves a point given as `(y, z)`.
@@ -77,28 +69,13 @@ pub fn affine_from_xyz_quat(v: [f64; 7]) -> Option<DAffine3> {
     if v.iter().any(|n| !n.is_finite()) || q.length() < 1e-6 {
         return None;
     }
-    Some(DAffine3::from_rotation_translation(
-        q.normalize(),
-        DVec3::new(x, y, z),
-    ))
+    Some(DAffine3::from_rotation_translation(q.normalize(), DVec3::new(x, y, z)))
 }
 
 /// The inverse of [`affine_from_xyz_quat`].
 pub fn xyz_quat_from_affine(a: &DAffine3) -> [f64; 7] {
-    let q = DQuat::from_mat3(&DMat3::from_cols(
-        a.matrix3.x_axis,
-        a.matrix3.y_axis,
-        a.matrix3.z_axis,
-    ));
-    [
-        a.translation.x,
-        a.translation.y,
-        a.translation.z,
-        q.x,
-        q.y,
-        q.z,
-        q.w,
-    ]
+    let q = DQuat::from_mat3(&DMat3::from_cols(a.matrix3.x_axis, a.matrix3.y_axis, a.matrix3.z_axis));
+    [a.translation.x, a.translation.y, a.translation.z, q.x, q.y, q.z, q.w]
 }
 
 #[cfg(test)]
@@ -107,11 +84,7 @@ mod tests {
 
     #[test]
     fn inverse_undoes_and_agrees_with_the_affine() {
-        let pose = PlanarPose {
-            theta_rad: 0.3,
-            y_m: 0.004,
-            z_m: -0.002,
-        };
+        let pose = PlanarPose { theta_rad: 0.3, y_m: 0.004, z_m: -0.002 };
         let p = DVec2::new(0.01, -0.02);
         let back = pose.inverse().transform_yz(pose.transform_yz(p));
         assert!((back - p).length() < 1e-15);

@@ -38,17 +38,9 @@ impl<T> Grid<T> {
     /// [`GridSizeError`] if `data.len() != width * height`.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Result<Self, GridSizeError> {
         if width.checked_mul(height) == Some(data.len()) {
-            Ok(Self {
-                width,
-                height,
-                data,
-            })
+            Ok(Self { width, height, data })
         } else {
-            Err(GridSizeError {
-                width,
-                height,
-                len: data.len(),
-            })
+            Err(GridSizeError { width, height, len: data.len() })
         }
     }
 
@@ -60,11 +52,7 @@ impl<T> Grid<T> {
                 data.push(f(x, y));
             }
         }
-        Self {
-            width,
-            height,
-            data,
-        }
+        Self { width, height, data }
     }
 
     /// Columns, in pixels.
@@ -119,40 +107,26 @@ impl<T> Grid<T> {
 
     /// A new image with every pixel passed through `f`.
     pub fn map<U>(&self, f: impl FnMut(&T) -> U) -> Grid<U> {
-        Grid {
-            width: self.width,
-            height: self.height,
-            data: self.data.iter().map(f).collect(),
-        }
+        Grid { width: self.width, height: self.height, data: self.data.iter().map(f).collect() }
     }
 }
 
 impl<T: Clone> Grid<T> {
     /// An image filled with `value`.
     pub fn filled(width: usize, height: usize, value: T) -> Self {
-        Self {
-            width,
-            height,
-            data: vec![value; width * height],
-        }
+        Self { width, height, data: vec![value; width * height] }
     }
 
     /// Both axes reversed: the lab's convention that lines a bubble image up with a GelSlim image.
     pub fn rotated_180(&self) -> Self {
         let mut data = self.data.clone();
         data.reverse();
-        Self {
-            width: self.width,
-            height: self.height,
-            data,
-        }
+        Self { width: self.width, height: self.height, data }
     }
 
     /// The order of the rows reversed (a vertical flip).
     pub fn rows_reversed(&self) -> Self {
-        Self::from_fn(self.width, self.height, |x, y| {
-            self[(x, self.height - 1 - y)].clone()
-        })
+        Self::from_fn(self.width, self.height, |x, y| self[(x, self.height - 1 - y)].clone())
     }
 }
 
@@ -160,24 +134,14 @@ impl<T> Index<(usize, usize)> for Grid<T> {
     type Output = T;
 
     fn index(&self, (x, y): (usize, usize)) -> &T {
-        assert!(
-            x < self.width && y < self.height,
-            "pixel ({x}, {y}) outside {} x {}",
-            self.width,
-            self.height
-        );
+        assert!(x < self.width && y < self.height, "pixel ({x}, {y}) outside {} x {}", self.width, self.height);
         &self.data[y * self.width + x]
     }
 }
 
 impl<T> IndexMut<(usize, usize)> for Grid<T> {
     fn index_mut(&mut self, (x, y): (usize, usize)) -> &mut T {
-        assert!(
-            x < self.width && y < self.height,
-            "pixel ({x}, {y}) outside {} x {}",
-            self.width,
-            self.height
-        );
+        assert!(x < self.width && y < self.height, "pixel ({x}, {y}) outside {} x {}", self.width, self.height);
         &mut self.data[y * self.width + x]
     }
 }
@@ -188,14 +152,7 @@ mod tests {
 
     #[test]
     fn wrong_length_is_an_error() {
-        assert_eq!(
-            Grid::from_vec(2, 3, vec![0; 5]),
-            Err(GridSizeError {
-                width: 2,
-                height: 3,
-                len: 5
-            })
-        );
+        assert_eq!(Grid::from_vec(2, 3, vec![0; 5]), Err(GridSizeError { width: 2, height: 3, len: 5 }));
         assert!(Grid::from_vec(usize::MAX, 2, vec![0; 5]).is_err());
     }
 

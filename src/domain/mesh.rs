@@ -20,18 +20,12 @@ impl TriMesh {
     /// Smallest and largest corner of the bounding box; `None` without vertices.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let first = *self.vertices.first()?;
-        Some(
-            self.vertices
-                .iter()
-                .fold([first, first], |[lo, hi], v| [lo.min(*v), hi.max(*v)]),
-        )
+        Some(self.vertices.iter().fold([first, first], |[lo, hi], v| [lo.min(*v), hi.max(*v)]))
     }
 
     /// Surface area, square metres.
     pub fn area(&self) -> f64 {
-        (0..self.triangles.len())
-            .map(|i| triangle_area(self.corners(i)))
-            .sum()
+        (0..self.triangles.len()).map(|i| triangle_area(self.corners(i))).sum()
     }
 
     /// Whether every edge belongs to exactly two triangles, once in each direction.
@@ -44,10 +38,7 @@ impl TriMesh {
         }
         edges.sort_unstable();
         let unique = edges.windows(2).all(|w| w[0] != w[1]);
-        unique
-            && edges
-                .iter()
-                .all(|&(a, b)| edges.binary_search(&(b, a)).is_ok())
+        unique && edges.iter().all(|&(a, b)| edges.binary_search(&(b, a)).is_ok())
     }
 }
 

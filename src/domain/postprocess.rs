@@ -78,11 +78,7 @@ pub enum ShiftMode {
 
 impl ShiftMode {
     /// All modes, in the order shown.
-    pub const ALL: [ShiftMode; 3] = [
-        ShiftMode::Raw,
-        ShiftMode::PaperShift,
-        ShiftMode::ExactInverse,
-    ];
+    pub const ALL: [ShiftMode; 3] = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse];
 
     /// What the user reads.
     pub fn label(self) -> &'static str {
@@ -139,9 +135,7 @@ pub enum PostprocessError {
     )]
     NoStatistics,
     /// Luma needs colours.
-    #[error(
-        "luma needs 3 channels, the prediction has {0}; the model's manifest should say \"mean\""
-    )]
+    #[error("luma needs 3 channels, the prediction has {0}; the model's manifest should say \"mean\"")]
     Channels(usize),
     /// No channels, or channels of different size.
     #[error("the prediction has no image, or channels of different size")]
@@ -196,22 +190,10 @@ pub struct Stats {
 impl Stats {
     /// Two passes in f64, so that a large mean does not swallow a small spread.
     pub fn of(image: &Grid<f32>) -> Self {
-        let values = || {
-            image
-                .as_slice()
-                .iter()
-                .filter(|v| v.is_finite())
-                .map(|&v| f64::from(v))
-        };
+        let values = || image.as_slice().iter().filter(|v| v.is_finite()).map(|&v| f64::from(v));
         let count = values().count();
         if count == 0 {
-            return Self {
-                min: f64::NAN,
-                max: f64::NAN,
-                mean: f64::NAN,
-                std: f64::NAN,
-                count,
-            };
+            return Self { min: f64::NAN, max: f64::NAN, mean: f64::NAN, std: f64::NAN, count };
         }
         let mean = values().sum::<f64>() / count as f64;
         let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / count as f64;
@@ -243,17 +225,11 @@ impl DepthChain {
     ///
     /// # Errors
     /// [`PostprocessError::NoStatistics`] for [`ShiftMode::PaperShift`] without `stats`.
-    pub fn with_mode(
-        mut self,
-        mode: ShiftMode,
-        stats: Option<ShiftStats>,
-    ) -> Result<Self, PostprocessError> {
+    pub fn with_mode(mut self, mode: ShiftMode, stats: Option<ShiftStats>) -> Result<Self, PostprocessError> {
         self.mapping = Mapping::Doubled;
         self.shift = match mode {
             ShiftMode::Raw => Shift::None,
-            ShiftMode::PaperShift => {
-                Shift::PaperMeanStd(stats.ok_or(PostprocessError::NoStatistics)?)
-            }
+            ShiftMode::PaperShift => Shift::PaperMeanStd(stats.ok_or(PostprocessError::NoStatistics)?),
             ShiftMode::ExactInverse => Shift::ExactInverse,
         };
         Ok(self)
@@ -271,18 +247,10 @@ impl DepthChain {
     ///
     /// # Errors
     /// See [`PostprocessError`].
-    pub fn run_with_ledger(
-        &self,
-        raw: &RawPrediction,
-    ) -> Result<(DepthMap, Vec<StageRecord>), PostprocessError> {
+    pub fn run_with_ledger(&self, raw: &RawPrediction) -> Result<(DepthMap, Vec<StageRecord>), PostprocessError> {
         let mut ledger = Vec::new();
         let depth = self.walk(raw, &mut |name, image, note| {
-            ledger.push(StageRecord {
-                name,
-                image: image.clone(),
-                stats: Stats::of(image),
-                note,
-            });
+            ledger.push(StageRecord { name, image: image.clone(), stats: Stats::of(image), note });
         })?;
         Ok((depth, ledger))
     }
@@ -300,28 +268,15 @@ impl DepthChain {
             return Err(PostprocessError::Rotation(self.rotation_deg));
         }
         let weights = self.weights(raw)?;
-        record(
-            "Decoder",
-            &combine(&raw.channels, &weights, f64::from),
-            None,
-        );
+        record("Decoder", &combine(&raw.channels, &weights, f64::from), None);
 
         // The lab clamps and maps each channel before it makes them one.
         let metres = combine(&raw.channels, &weights, |v| {
             let unit = (f64::from(v).clamp(-1.0, 1.0) + 1.0) / 2.0;
-            let unit = if self.mapping == Mapping::Doubled {
-                (unit + 1.0) / 2.0
-            } else {
-                unit
-            };
+            let unit = if self.mapping == Mapping::Doubled { (unit + 1.0) / 2.0 } else { unit };
             unit * (max_m - min_m) + min_m
         });
-        let clamped = raw
-            .channels
-            .iter()
-            .flat_map(|c| c.as_slice())
-            .filter(|v| v.abs() > 1.0)
-            .count();
+        let clamped = raw.channels.iter().flat_map(|c| c.as_slice()).filter(|v| v.abs() > 1.0).count();
         let note = (clamped > 0).then(|| format!("{clamped} values outside -1 to 1 were clamped"));
         record("Metres", &metres, note);
 
@@ -330,11 +285,7 @@ impl DepthChain {
 
         let [width, height] = self.size;
         let resized = self.resampling.resize(&shifted, width, height);
-        let turned = if self.rotation_deg == 180 {
-            resized.rotated_180()
-        } else {
-            resized
-        };
+        let turned = if self.rotation_deg == 180 { resized.rotated_180() } else { resized };
         record("Raw orientation", &turned, None);
         Ok(turned)
     }
@@ -355,11 +306,7 @@ impl DepthChain {
 
 fn combine(channels: &[Grid<f32>], weights: &[f64], map: impl Fn(f32) -> f64) -> Grid<f32> {
     Grid::from_fn(channels[0].width(), channels[0].height(), |x, y| {
-        channels
-            .iter()
-            .zip(weights)
-            .map(|(c, w)| w * map(c[(x, y)]))
-            .sum::<f64>() as f32
+        channels.iter().zip(weights).map(|(c, w)| w * map(c[(x, y)])).sum::<f64>() as f32
     })
 }
 
@@ -372,18 +319,14 @@ impl Shift {
             Shift::PaperMeanStd(s) => {
                 let size = s.pred_mean.abs().max(max_m.abs());
                 let no_spread = s.pred_std.is_nan() || s.pred_std <= RELATIVE_NO_SPREAD * size;
-                let gain = if no_spread {
-                    1.0
-                } else {
-                    s.gt_std / s.pred_std
-                };
+                let gain = if no_spread { 1.0 } else { s.gt_std / s.pred_std };
                 let note = no_spread.then(|| {
-                    format!("the predictions' deviation ({:e} m) is as good as zero: only the mean was shifted", s.pred_std)
+                    format!(
+                        "the predictions' deviation ({:e} m) is as good as zero: only the mean was shifted",
+                        s.pred_std
+                    )
                 });
-                (
-                    metres.map(|&d| ((f64::from(d) - s.pred_mean) * gain + s.gt_mean) as f32),
-                    note,
-                )
+                (metres.map(|&d| ((f64::from(d) - s.pred_mean) * gain + s.gt_mean) as f32), note)
             }
         }
     }

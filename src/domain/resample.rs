@@ -72,12 +72,8 @@ pub fn nearest_mask(mask: &Grid<bool>, width: usize, height: usize) -> Grid<bool
         return Grid::filled(width, height, false);
     }
     // Centre of the target pixel in source pixels, in whole numbers: (2i + 1)·in / (2·out).
-    let pick = |i: usize, source: usize, target: usize| {
-        ((2 * i + 1) * source / (2 * target)).min(source - 1)
-    };
-    Grid::from_fn(width, height, |x, y| {
-        mask[(pick(x, source_width, width), pick(y, source_height, height))]
-    })
+    let pick = |i: usize, source: usize, target: usize| ((2 * i + 1) * source / (2 * target)).min(source - 1);
+    Grid::from_fn(width, height, |x, y| mask[(pick(x, source_width, width), pick(y, source_height, height))])
 }
 
 /// What [`resize`] needs of a pixel: a weighted sum in f64.
@@ -145,11 +141,7 @@ fn taps(source: usize, target: usize, kind: Resampling) -> Vec<Vec<(usize, f64)>
                     let first = centre.floor();
                     let t = centre - first;
                     let index = |k: i64| (first as i64 + k).clamp(0, last as i64) as usize;
-                    cubic_weights(t)
-                        .iter()
-                        .zip(-1..)
-                        .map(|(&w, k)| (index(k), w))
-                        .collect()
+                    cubic_weights(t).iter().zip(-1..).map(|(&w, k)| (index(k), w)).collect()
                 }
                 Resampling::Area => {
                     // Whole-number floor and ceiling: the quotient in floating point may miss a pixel.
@@ -168,8 +160,7 @@ fn taps(source: usize, target: usize, kind: Resampling) -> Vec<Vec<(usize, f64)>
 /// Weights of the pixels at -1, 0, 1, 2 for a position `t` in [0, 1) after pixel 0.
 fn cubic_weights(t: f64) -> [f64; 4] {
     let near = |x: f64| ((BICUBIC_A + 2.0) * x - (BICUBIC_A + 3.0)) * x * x + 1.0;
-    let far =
-        |x: f64| ((BICUBIC_A * x - 5.0 * BICUBIC_A) * x + 8.0 * BICUBIC_A) * x - 4.0 * BICUBIC_A;
+    let far = |x: f64| ((BICUBIC_A * x - 5.0 * BICUBIC_A) * x + 8.0 * BICUBIC_A) * x - 4.0 * BICUBIC_A;
     [far(t + 1.0), near(t), near(1.0 - t), far(2.0 - t)]
 }
 
@@ -185,15 +176,10 @@ fn resize<P: Pixel>(image: &Grid<P>, width: usize, height: usize, kind: Resampli
     let mut narrow = Vec::with_capacity(width * image.height());
     for y in 0..image.height() {
         let row = image.row(y);
-        narrow.extend(columns.iter().map(|taps| {
-            taps.iter()
-                .fold(P::ZERO, |sum, &(x, w)| P::add(sum, row[x], w))
-        }));
+        narrow.extend(columns.iter().map(|taps| taps.iter().fold(P::ZERO, |sum, &(x, w)| P::add(sum, row[x], w))));
     }
     Grid::from_fn(width, height, |x, y| {
-        P::finish(rows[y].iter().fold(P::ZERO, |sum, &(row, w)| {
-            P::add_sum(sum, narrow[row * width + x], w)
-        }))
+        P::finish(rows[y].iter().fold(P::ZERO, |sum, &(row, w)| P::add_sum(sum, narrow[row * width + x], w)))
     })
 }
 
@@ -205,18 +191,13 @@ mod tests {
     fn grid(value: &Value) -> Grid<f32> {
         let rows = value.as_array().unwrap();
         let width = rows[0].as_array().unwrap().len();
-        let data = rows
-            .iter()
-            .flat_map(|r| r.as_array().unwrap())
-            .map(|v| v.as_f64().unwrap() as f32)
-            .collect();
+        let data = rows.iter().flat_map(|r| r.as_array().unwrap()).map(|v| v.as_f64().unwrap() as f32).collect();
         Grid::from_vec(width, rows.len(), data).unwrap()
     }
 
     #[test]
     fn agrees_with_torch() {
-        let reference: Value =
-            serde_json::from_str(include_str!("../../tests/data/resample.json")).unwrap();
+        let reference: Value = serde_json::from_str(include_str!("../../tests/data/resample.json")).unwrap();
         let cases = reference["cases"].as_array().unwrap();
         assert!(cases.len() >= 12);
         for case in cases {
@@ -225,11 +206,7 @@ mod tests {
             let found = kind.resize(&grid(&case["input"]), expected.width(), expected.height());
             for (a, b) in found.as_slice().iter().zip(expected.as_slice()) {
                 // torch computes weights in f32: about 1e-6 of the values' size (here up to 200).
-                assert!(
-                    (a - b).abs() < 5e-4,
-                    "{kind:?} {:?}: {a} for {b}",
-                    expected.size()
-                );
+                assert!((a - b).abs() < 5e-4, "{kind:?} {:?}: {a} for {b}", expected.size());
             }
         }
     }
@@ -240,10 +217,7 @@ mod tests {
         for kind in [Resampling::Bilinear, Resampling::Bicubic, Resampling::Area] {
             let resized = kind.resize_rgb(&image, 5, 12);
             for c in 0..3 {
-                assert_eq!(
-                    kind.resize(&image.map(|p| p[c]), 5, 12),
-                    resized.map(|p| p[c])
-                );
+                assert_eq!(kind.resize(&image.map(|p| p[c]), 5, 12), resized.map(|p| p[c]));
             }
         }
     }
@@ -253,29 +227,16 @@ mod tests {
         let mut image = Grid::filled(8, 8, 1.0f32);
         image[(0, 0)] = f32::NAN;
         let small = bilinear(&image, 4, 4);
-        assert!(
-            small[(0, 0)].is_nan() && small.as_slice().iter().filter(|v| v.is_nan()).count() == 1
-        );
-        assert!(
-            bicubic(&Grid::from_vec(0, 0, vec![]).unwrap(), 2, 2)
-                .as_slice()
-                .iter()
-                .all(|v| v.is_nan())
-        );
+        assert!(small[(0, 0)].is_nan() && small.as_slice().iter().filter(|v| v.is_nan()).count() == 1);
+        assert!(bicubic(&Grid::from_vec(0, 0, vec![]).unwrap(), 2, 2).as_slice().iter().all(|v| v.is_nan()));
         assert!(bilinear(&image, 0, 3).is_empty());
-        assert_eq!(
-            bilinear(&Grid::filled(1, 1, 7.0), 3, 3),
-            Grid::filled(3, 3, 7.0)
-        );
+        assert_eq!(bilinear(&Grid::filled(1, 1, 7.0), 3, 3), Grid::filled(3, 3, 7.0));
     }
 
     #[test]
     fn masks_keep_their_shape() {
         let mask = Grid::from_fn(4, 4, |x, _| x >= 2);
         assert_eq!(nearest_mask(&nearest_mask(&mask, 8, 12), 4, 4), mask);
-        assert_eq!(
-            nearest_mask(&Grid::from_vec(0, 0, vec![]).unwrap(), 2, 1),
-            Grid::filled(2, 1, false)
-        );
+        assert_eq!(nearest_mask(&Grid::from_vec(0, 0, vec![]).unwrap(), 2, 1), Grid::filled(2, 1, false));
     }
 }

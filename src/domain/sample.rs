@@ -64,10 +64,7 @@ impl GelSlimTouch {
             let (a, b) = (raw[(x, y)], reference[(x, y)]);
             [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
         });
-        Some(Self {
-            images: Some(GelSlimImages { raw, reference }),
-            difference,
-        })
+        Some(Self { images: Some(GelSlimImages { raw, reference }), difference })
     }
 }
 
@@ -117,17 +114,12 @@ impl Sample {
             .flatten()
             .map(|touch| {
                 let gel = touch.gelslim.as_ref().map_or(0, |g| {
-                    rgb(&g.difference)
-                        + g.images
-                            .as_ref()
-                            .map_or(0, |i| rgb(&i.raw) + rgb(&i.reference))
+                    rgb(&g.difference) + g.images.as_ref().map_or(0, |i| rgb(&i.raw) + rgb(&i.reference))
                 });
                 let bubble = touch.bubble.as_ref().map_or(0, |b| {
                     depth(&b.imprint)
                         + b.camera.as_ref().map_or(0, |c| depth(&c.depth_reference))
-                        + b.truth
-                            .as_ref()
-                            .map_or(0, |t| depth(&t.imprint) + t.contact.len())
+                        + b.truth.as_ref().map_or(0, |t| depth(&t.imprint) + t.contact.len())
                 });
                 gel + bubble
             })

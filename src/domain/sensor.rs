@@ -109,11 +109,7 @@ impl Intrinsics {
 
     /// Whether the numbers can be a camera's: finite, positive focal lengths.
     pub fn is_plausible(&self) -> bool {
-        [self.fx, self.fy, self.cx, self.cy]
-            .iter()
-            .all(|n| n.is_finite())
-            && self.fx > 1.0
-            && self.fy > 1.0
+        [self.fx, self.fy, self.cx, self.cy].iter().all(|n| n.is_finite()) && self.fx > 1.0 && self.fy > 1.0
     }
 }
 
@@ -123,12 +119,7 @@ mod tests {
 
     #[test]
     fn every_pixel_survives_depth_to_cloud_to_pixel() {
-        let k = Intrinsics {
-            fx: 212.0,
-            fy: 211.0,
-            cx: 112.3,
-            cy: 86.1,
-        };
+        let k = Intrinsics { fx: 212.0, fy: 211.0, cx: 112.3, cy: 86.1 };
         for v in 0..bubble::HEIGHT {
             for u in 0..bubble::WIDTH {
                 let z = 0.07 + 1e-4 * ((u * 7 + v * 13) % 200) as f64;

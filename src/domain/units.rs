@@ -18,11 +18,7 @@ pub fn text_deg(radians: f64) -> String {
 /// The angle brought into (-π, π].
 pub fn wrap_angle(radians: f64) -> f64 {
     let wrapped = radians.rem_euclid(std::f64::consts::TAU);
-    if wrapped > std::f64::consts::PI {
-        wrapped - std::f64::consts::TAU
-    } else {
-        wrapped
-    }
+    if wrapped > std::f64::consts::PI { wrapped - std::f64::consts::TAU } else { wrapped }
 }
 
 /// The size of the difference of two angles, in [0, π]: 359° and 1° are 2° apart.
@@ -36,9 +32,7 @@ mod tests {
 
     #[test]
     fn angle_error_wraps() {
-        assert!(
-            (angle_error(359f64.to_radians(), 1f64.to_radians()) - 2f64.to_radians()).abs() < 1e-12
-        );
+        assert!((angle_error(359f64.to_radians(), 1f64.to_radians()) - 2f64.to_radians()).abs() < 1e-12);
         assert!((angle_error(0.3, 0.3 + std::f64::consts::TAU)).abs() < 1e-12);
         assert_eq!(text_deg(-0.1), "-5.7°");
         assert_eq!(text_mm(0.00842), "8.42 mm");

@@ -47,13 +47,7 @@ pub struct GenerateConfig {
 
 impl Default for GenerateConfig {
     fn default() -> Self {
-        Self {
-            steps: 50,
-            eta: 0.0,
-            seed: 42,
-            sampler: Sampler::Ddim,
-            spacing: Spacing::Trailing,
-        }
+        Self { steps: 50, eta: 0.0, seed: 42, sampler: Sampler::Ddim, spacing: Spacing::Trailing }
     }
 }
 
@@ -132,12 +126,7 @@ pub trait Denoiser {
     ///
     /// # Errors
     /// [`ModelError`] if the model cannot be run.
-    fn predict(
-        &mut self,
-        latent: &Tensor,
-        timestep: u32,
-        condition: &Tensor,
-    ) -> Result<Tensor, ModelError>;
+    fn predict(&mut self, latent: &Tensor, timestep: u32, condition: &Tensor) -> Result<Tensor, ModelError>;
 
     /// What the output of [`Denoiser::predict`] means.
     fn prediction(&self) -> Prediction;
@@ -160,14 +149,7 @@ pub fn sample(
     condition: &Tensor,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<Latent, DiffusionError> {
-    sample_seeds(
-        denoiser,
-        schedule,
-        config,
-        &vec![config.seed; condition.batch()],
-        condition,
-        progress,
-    )
+    sample_seeds(denoiser, schedule, config, &vec![config.seed; condition.batch()], condition, progress)
 }
 
 /// As [`sample`], with a seed of its own for each entry of the batch (`config.seed` is not used).
@@ -186,10 +168,7 @@ pub fn sample_seeds(
         return Err(DiffusionError::Eta(config.eta));
     }
     if seeds.len() != condition.batch() {
-        return Err(DiffusionError::Batch {
-            seeds: seeds.len(),
-            conditions: condition.batch(),
-        });
+        return Err(DiffusionError::Batch { seeds: seeds.len(), conditions: condition.batch() });
     }
     let prediction = denoiser.prediction();
     let steps = schedule.steps(config.steps, config.spacing, prediction)?;
@@ -202,57 +181,32 @@ pub fn sample_seeds(
     let one = denoiser.latent_shape();
     let len: usize = one.iter().product();
     let shape: Vec<usize> = std::iter::once(seeds.len()).chain(one).collect();
-    let mut noises: Vec<GaussianNoise> =
-        seeds.iter().map(|&seed| GaussianNoise::new(seed)).collect();
+    let mut noises: Vec<GaussianNoise> = seeds.iter().map(|&seed| GaussianNoise::new(seed)).collect();
     // The trajectory is kept in f64; the model sees it rounded to f32.
-    let mut x: Vec<f64> = noises
-        .iter_mut()
-        .flat_map(|n| (0..len).map(|_| n.draw()).collect::<Vec<_>>())
-        .collect();
+    let mut x: Vec<f64> = noises.iter_mut().flat_map(|n| (0..len).map(|_| n.draw()).collect::<Vec<_>>()).collect();
     let mut input = Tensor::filled(shape.clone(), 0.0);
 
     for (done, step) in steps.iter().enumerate() {
         tell(done as u32)?;
-        input
-            .data_mut()
-            .iter_mut()
-            .zip(&x)
-            .for_each(|(to, &from)| *to = from as f32);
+        input.data_mut().iter_mut().zip(&x).for_each(|(to, &from)| *to = from as f32);
         let output = denoiser.predict(&input, step.timestep, condition)?;
         if output.shape() != shape {
             let (expected, found) = (shape.clone(), output.shape().to_vec());
-            return Err(ModelError::Shape {
-                graph: "denoiser".into(),
-                expected,
-                found,
-            }
-            .into());
+            return Err(ModelError::Shape { graph: "denoiser".into(), expected, found }.into());
         }
         let count = output.non_finite();
         if count > 0 {
-            return Err(ModelError::NonFinite {
-                graph: "denoiser".into(),
-                count,
-            }
-            .into());
+            return Err(ModelError::NonFinite { graph: "denoiser".into(), count }.into());
         }
         let update = Update::new(step, prediction, config.eta);
-        for ((x, output), noise) in x
-            .chunks_mut(len.max(1))
-            .zip(output.data().chunks(len.max(1)))
-            .zip(&mut noises)
-        {
+        for ((x, output), noise) in x.chunks_mut(len.max(1)).zip(output.data().chunks(len.max(1))).zip(&mut noises) {
             for (x, &output) in x.iter_mut().zip(output) {
                 *x = update.apply(*x, f64::from(output), noise);
             }
         }
     }
     tell(of)?;
-    input
-        .data_mut()
-        .iter_mut()
-        .zip(&x)
-        .for_each(|(to, &from)| *to = from as f32);
+    input.data_mut().iter_mut().zip(&x).for_each(|(to, &from)| *to = from as f32);
     Ok(input)
 }
 
@@ -290,19 +244,12 @@ impl Update {
         let (clean, epsilon) = match self.prediction {
             // signal > 0: Schedule::steps refuses pure noise for this prediction.
             Prediction::Epsilon => ((x - self.noise * output) / self.signal, output),
-            Prediction::V => (
-                self.signal * x - self.noise * output,
-                self.signal * output + self.noise * x,
-            ),
+            Prediction::V => (self.signal * x - self.noise * output, self.signal * output + self.noise * x),
             Prediction::Sample if self.noise == 0.0 => (output, 0.0),
             Prediction::Sample => (output, (x - self.signal * output) / self.noise),
         };
         let mean = self.signal_next * clean + self.direction_next * epsilon;
-        if self.sigma > 0.0 {
-            mean + self.sigma * noise.draw()
-        } else {
-            mean
-        }
+        if self.sigma > 0.0 { mean + self.sigma * noise.draw() } else { mean }
     }
 }
 

@@ -17,10 +17,7 @@ pub struct GaussianNoise {
 impl GaussianNoise {
     /// The stream of `seed`.
     pub fn new(seed: u64) -> Self {
-        Self {
-            rng: ChaCha8Rng::seed_from_u64(seed),
-            spare: None,
-        }
+        Self { rng: ChaCha8Rng::seed_from_u64(seed), spare: None }
     }
 
     /// Uniform in [0, 1), a multiple of 2⁻⁵³.
@@ -52,17 +49,8 @@ mod tests {
         let draws: Vec<f64> = (0..n).map(|_| noise.draw()).collect();
         let moment = |k: i32| draws.iter().map(|v| v.powi(k)).sum::<f64>() / f64::from(n);
         // Four standard errors: sqrt(1, 2, 15, 96) / sqrt(n).
-        for (k, expected, error) in [
-            (1, 0.0, 1.0f64),
-            (2, 1.0, 2.0),
-            (3, 0.0, 15.0),
-            (4, 3.0, 96.0),
-        ] {
-            assert!(
-                (moment(k) - expected).abs() < 4.0 * (error / f64::from(n)).sqrt(),
-                "moment {k}: {}",
-                moment(k)
-            );
+        for (k, expected, error) in [(1, 0.0, 1.0f64), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
+            assert!((moment(k) - expected).abs() < 4.0 * (error / f64::from(n)).sqrt(), "moment {k}: {}", moment(k));
         }
     }
 
@@ -80,9 +68,5 @@ mod tests {
         }
     }
 
-    const STREAM_42: [f64; 3] = [
-        1.440_254_079_119_1,
-        -0.465_213_078_008_070_1,
-        -0.735_682_235_615_744,
-    ];
+    const STREAM_42: [f64; 3] = [1.440_254_079_119_1, -0.465_213_078_008_070_1, -0.735_682_235_615_744];
 }

@@ -120,11 +120,7 @@ impl Schedule {
     ///
     /// # Errors
     /// As [`Self::linear`].
-    pub fn scaled_linear(
-        steps: usize,
-        beta_start: f64,
-        beta_end: f64,
-    ) -> Result<Self, ScheduleError> {
+    pub fn scaled_linear(steps: usize, beta_start: f64, beta_end: f64) -> Result<Self, ScheduleError> {
         check_betas(steps, beta_start, beta_end)?;
         let (start, end) = (beta_start.sqrt(), beta_end.sqrt());
         Self::from_betas((0..steps).map(|i| (start + fraction(i, steps) * (end - start)).powi(2)))
@@ -136,9 +132,7 @@ impl Schedule {
     /// No steps, or betas outside (0, 1).
     pub fn linear(steps: usize, beta_start: f64, beta_end: f64) -> Result<Self, ScheduleError> {
         check_betas(steps, beta_start, beta_end)?;
-        Self::from_betas(
-            (0..steps).map(|i| beta_start + fraction(i, steps) * (beta_end - beta_start)),
-        )
+        Self::from_betas((0..steps).map(|i| beta_start + fraction(i, steps) * (beta_end - beta_start)))
     }
 
     /// Nichol & Dhariwal (2021), equation 17: s = 0.008, betas at most 0.999.
@@ -149,14 +143,8 @@ impl Schedule {
         if steps == 0 || steps > 1_000_000 {
             return Err(ScheduleError::Length(steps));
         }
-        let share = |t: f64| {
-            ((t / steps as f64 + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2)
-                .cos()
-                .powi(2)
-        };
-        Self::from_betas(
-            (0..steps).map(|i| (1.0 - share(i as f64 + 1.0) / share(i as f64)).clamp(0.0, 0.999)),
-        )
+        let share = |t: f64| ((t / steps as f64 + 0.008) / 1.008 * std::f64::consts::FRAC_PI_2).cos().powi(2);
+        Self::from_betas((0..steps).map(|i| (1.0 - share(i as f64 + 1.0) / share(i as f64)).clamp(0.0, 0.999)))
     }
 
     /// ᾱ of every training step.
@@ -173,35 +161,21 @@ impl Schedule {
     ///
     /// # Errors
     /// [`ScheduleError::Steps`], and [`ScheduleError::PureNoise`] where `prediction` is noise and a visited ᾱ is (almost) 0.
-    pub fn steps(
-        &self,
-        steps: u32,
-        spacing: Spacing,
-        prediction: Prediction,
-    ) -> Result<Vec<Step>, ScheduleError> {
+    pub fn steps(&self, steps: u32, spacing: Spacing, prediction: Prediction) -> Result<Vec<Step>, ScheduleError> {
         let total = self.alpha_bar.len();
         let count = steps as usize;
         if count == 0 || count > total {
-            return Err(ScheduleError::Steps {
-                steps,
-                limit: total,
-            });
+            return Err(ScheduleError::Steps { steps, limit: total });
         }
         let timesteps: Vec<usize> = match spacing {
             Spacing::Trailing => {
                 // Rounded half up in whole numbers: (2·(T·S - i·T) + S) / (2·S).
-                (0..count)
-                    .map(|i| (2 * total * (count - i) + count) / (2 * count) - 1)
-                    .collect()
+                (0..count).map(|i| (2 * total * (count - i) + count) / (2 * count) - 1).collect()
             }
             Spacing::Lab => {
                 let stride = total / count;
                 // The "+ 1" runs over the end for a stride of 1 (and for a single training step): those are dropped.
-                let mut up: Vec<usize> = (0..total)
-                    .step_by(stride)
-                    .map(|t| t + 1)
-                    .filter(|&t| t < total)
-                    .collect();
+                let mut up: Vec<usize> = (0..total).step_by(stride).map(|t| t + 1).filter(|&t| t < total).collect();
                 if up.is_empty() {
                     up.push(total - 1);
                 }
@@ -209,11 +183,7 @@ impl Schedule {
                 up
             }
         };
-        let next = timesteps
-            .iter()
-            .skip(1)
-            .map(|&t| self.alpha_bar[t])
-            .chain(std::iter::once(1.0));
+        let next = timesteps.iter().skip(1).map(|&t| self.alpha_bar[t]).chain(std::iter::once(1.0));
         timesteps
             .iter()
             .zip(next)
@@ -222,22 +192,14 @@ impl Schedule {
                 if alpha_bar < MIN_SIGNAL_FOR_NOISE && prediction == Prediction::Epsilon {
                     return Err(ScheduleError::PureNoise { timestep: t as u32 });
                 }
-                Ok(Step {
-                    timestep: t as u32,
-                    alpha_bar,
-                    alpha_bar_next,
-                })
+                Ok(Step { timestep: t as u32, alpha_bar, alpha_bar_next })
             })
             .collect()
     }
 }
 
 fn fraction(i: usize, steps: usize) -> f64 {
-    if steps == 1 {
-        0.0
-    } else {
-        i as f64 / (steps - 1) as f64
-    }
+    if steps == 1 { 0.0 } else { i as f64 / (steps - 1) as f64 }
 }
 
 fn check_betas(steps: usize, start: f64, end: f64) -> Result<(), ScheduleError> {
@@ -245,11 +207,7 @@ fn check_betas(steps: usize, start: f64, end: f64) -> Result<(), ScheduleError> 
         return Err(ScheduleError::Length(steps));
     }
     let inside = |beta: f64| beta > 0.0 && beta < 1.0;
-    if inside(start) && inside(end) {
-        Ok(())
-    } else {
-        Err(ScheduleError::Betas { start, end })
-    }
+    if inside(start) && inside(end) { Ok(()) } else { Err(ScheduleError::Betas { start, end }) }
 }
 
 #[cfg(test)]
@@ -264,12 +222,9 @@ mod tests {
     fn the_labs_schedule_has_the_published_values() {
         let schedule = lab();
         // Values to the digits given for the lab's model.
-        for (step, expected, tolerance) in [
-            (0, 0.9985, 1e-9),
-            (1, 0.996_995_6, 5e-8),
-            (996, 0.000_700_70, 5e-9),
-            (999, 0.000_668_67, 5e-9),
-        ] {
+        for (step, expected, tolerance) in
+            [(0, 0.9985, 1e-9), (1, 0.996_995_6, 5e-8), (996, 0.000_700_70, 5e-9), (999, 0.000_668_67, 5e-9)]
+        {
             let found = schedule.alpha_bar()[step];
             assert!((found - expected).abs() < tolerance, "step {step}: {found}");
         }
@@ -279,12 +234,7 @@ mod tests {
     fn spacings_visit_the_documented_steps() {
         let schedule = lab();
         let visit = |n, spacing| -> Vec<u32> {
-            schedule
-                .steps(n, spacing, Prediction::Epsilon)
-                .unwrap()
-                .iter()
-                .map(|s| s.timestep)
-                .collect()
+            schedule.steps(n, spacing, Prediction::Epsilon).unwrap().iter().map(|s| s.timestep).collect()
         };
         let lab = visit(200, Spacing::Lab);
         assert_eq!((lab.len(), lab[0], lab[198], lab[199]), (200, 996, 6, 1));
@@ -302,10 +252,7 @@ mod tests {
         assert_eq!(visit(1000, Spacing::Trailing).len(), 1000);
         assert_eq!(
             schedule.steps(1001, Spacing::Lab, Prediction::V),
-            Err(ScheduleError::Steps {
-                steps: 1001,
-                limit: 1000
-            })
+            Err(ScheduleError::Steps { steps: 1001, limit: 1000 })
         );
         assert!(schedule.steps(0, Spacing::Trailing, Prediction::V).is_err());
     }
@@ -313,43 +260,20 @@ mod tests {
     #[test]
     fn the_last_step_ends_at_the_clean_latent() {
         for spacing in [Spacing::Lab, Spacing::Trailing] {
-            assert_eq!(
-                lab()
-                    .steps(50, spacing, Prediction::Epsilon)
-                    .unwrap()
-                    .last()
-                    .unwrap()
-                    .alpha_bar_next,
-                1.0
-            );
+            assert_eq!(lab().steps(50, spacing, Prediction::Epsilon).unwrap().last().unwrap().alpha_bar_next, 1.0);
         }
     }
 
     #[test]
     fn impossible_schedules_are_refused() {
-        assert!(matches!(
-            Schedule::from_alpha_bar(vec![]),
-            Err(ScheduleError::Length(0))
-        ));
+        assert!(matches!(Schedule::from_alpha_bar(vec![]), Err(ScheduleError::Length(0))));
         let risen = 0.5f64.next_up();
-        assert_eq!(
-            Schedule::from_alpha_bar(vec![0.9, 0.5, risen]),
-            Err(ScheduleError::Rising { step: 2 })
-        );
-        assert!(matches!(
-            Schedule::from_alpha_bar(vec![1.0, f64::NAN]),
-            Err(ScheduleError::Value { step: 1, .. })
-        ));
+        assert_eq!(Schedule::from_alpha_bar(vec![0.9, 0.5, risen]), Err(ScheduleError::Rising { step: 2 }));
+        assert!(matches!(Schedule::from_alpha_bar(vec![1.0, f64::NAN]), Err(ScheduleError::Value { step: 1, .. })));
         assert!(Schedule::from_alpha_bar(vec![1.1]).is_err());
         for (start, end) in [(0.0, 0.1), (0.1, 1.0), (f64::NAN, 0.1), (-0.1, 0.1)] {
-            assert!(matches!(
-                Schedule::linear(10, start, end),
-                Err(ScheduleError::Betas { .. })
-            ));
-            assert!(matches!(
-                Schedule::scaled_linear(10, start, end),
-                Err(ScheduleError::Betas { .. })
-            ));
+            assert!(matches!(Schedule::linear(10, start, end), Err(ScheduleError::Betas { .. })));
+            assert!(matches!(Schedule::scaled_linear(10, start, end), Err(ScheduleError::Betas { .. })));
         }
         assert!(Schedule::cosine(0).is_err() && Schedule::linear(usize::MAX, 0.1, 0.2).is_err());
         let to_zero = Schedule::from_alpha_bar(vec![0.9, 0.0]).unwrap();
@@ -362,11 +286,7 @@ mod tests {
 
     #[test]
     fn every_kind_of_schedule_falls_to_almost_nothing() {
-        for schedule in [
-            lab(),
-            Schedule::linear(1000, 1e-4, 0.02).unwrap(),
-            Schedule::cosine(1000).unwrap(),
-        ] {
+        for schedule in [lab(), Schedule::linear(1000, 1e-4, 0.02).unwrap(), Schedule::cosine(1000).unwrap()] {
             assert!(schedule.alpha_bar()[0] > 0.99 && schedule.alpha_bar()[999] < 1e-3);
         }
         assert_eq!(Schedule::cosine(1).unwrap().training_steps(), 1);

@@ -49,10 +49,7 @@ impl Tensor {
     pub fn item(&self, index: usize) -> Option<Tensor> {
         let shape = self.shape.get(1..)?.to_vec();
         let len: usize = shape.iter().product();
-        (index < self.batch()).then(|| Tensor {
-            data: self.data[index * len..(index + 1) * len].to_vec(),
-            shape,
-        })
+        (index < self.batch()).then(|| Tensor { data: self.data[index * len..(index + 1) * len].to_vec(), shape })
     }
 
     /// Joins tensors of one shape along a new first axis; `None` for none or for different shapes.
@@ -61,13 +58,8 @@ impl Tensor {
         if items.iter().any(|t| t.shape != first.shape) {
             return None;
         }
-        let shape = std::iter::once(items.len())
-            .chain(first.shape.iter().copied())
-            .collect();
-        Some(Tensor {
-            shape,
-            data: items.iter().flat_map(|t| t.data.iter().copied()).collect(),
-        })
+        let shape = std::iter::once(items.len()).chain(first.shape.iter().copied()).collect();
+        Some(Tensor { shape, data: items.iter().flat_map(|t| t.data.iter().copied()).collect() })
     }
 
     /// How many values are NaN or infinite.

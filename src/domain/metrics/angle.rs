@@ -22,21 +22,13 @@ pub struct AngleSummary {
 impl AngleSummary {
     /// From one error per grasp in *radians*, of either sign; NaN stands for a grasp without a pose.
     pub fn from_errors(errors: &[f64]) -> Self {
-        let mut degrees: Vec<f64> = errors
-            .iter()
-            .filter(|e| e.is_finite())
-            .map(|e| e.to_degrees().abs())
-            .collect();
+        let mut degrees: Vec<f64> = errors.iter().filter(|e| e.is_finite()).map(|e| e.to_degrees().abs()).collect();
         degrees.sort_by(f64::total_cmp);
         let n = degrees.len();
         // Rounding to 1e-9 degrees: five degrees turned to radians and back must stay within five degrees.
         let within = |limit: f64| {
             let hits = degrees.iter().filter(|&&d| d <= limit + 1e-9).count();
-            if errors.is_empty() {
-                0.0
-            } else {
-                100.0 * hits as f64 / errors.len() as f64
-            }
+            if errors.is_empty() { 0.0 } else { 100.0 * hits as f64 / errors.len() as f64 }
         };
         Self {
             mean_deg: (n > 0).then(|| degrees.iter().sum::<f64>() / n as f64),

@@ -65,11 +65,7 @@ impl FromIterator<Psnr> for PsnrMean {
                 Psnr::Equal => equal += 1,
             }
         }
-        Self {
-            db: (count > 0).then(|| sum / count as f64),
-            count,
-            equal,
-        }
+        Self { db: (count > 0).then(|| sum / count as f64), count, equal }
     }
 }
 
@@ -86,11 +82,7 @@ pub fn mse(prediction: &Grid<f32>, truth: &Grid<f32>) -> Result<f64, MetricError
             count += 1;
         }
     }
-    if count == 0 {
-        Err(MetricError::Nothing)
-    } else {
-        Ok(sum / count as f64)
-    }
+    if count == 0 { Err(MetricError::Nothing) } else { Ok(sum / count as f64) }
 }
 
 /// `20·log10(peak / √MSE)`. The lab's peak is 0.0225 m; images scaled to 0..1 have 1.
@@ -109,11 +101,7 @@ pub fn psnr_of_mse(mse: f64, peak: f64) -> Result<Psnr, MetricError> {
     if !(peak > 0.0 && peak.is_finite()) {
         return Err(MetricError::Range(peak));
     }
-    Ok(if mse == 0.0 {
-        Psnr::Equal
-    } else {
-        Psnr::Db(20.0 * peak.log10() - 10.0 * mse.log10())
-    })
+    Ok(if mse == 0.0 { Psnr::Equal } else { Psnr::Db(20.0 * peak.log10() - 10.0 * mse.log10()) })
 }
 
 /// The image stretched so that its smallest finite value becomes 0 and its largest 1.
@@ -139,10 +127,7 @@ pub(super) fn check_size(prediction: &Grid<f32>, truth: &Grid<f32>) -> Result<()
     if prediction.size() == truth.size() {
         Ok(())
     } else {
-        Err(MetricError::Size {
-            prediction: prediction.size(),
-            truth: truth.size(),
-        })
+        Err(MetricError::Size { prediction: prediction.size(), truth: truth.size() })
     }
 }
 
@@ -157,23 +142,13 @@ mod tests {
         assert_eq!(psnr(&a, &b, 1.0), Ok(Psnr::Db(-10.0 * 0.0625f64.log10())));
         assert_eq!(psnr(&a, &a, 1.0), Ok(Psnr::Equal));
         // The range decides the figure: 255 against 1 is 48.1 dB more.
-        let difference =
-            psnr(&a, &b, 255.0).unwrap().db().unwrap() - psnr(&a, &b, 1.0).unwrap().db().unwrap();
+        let difference = psnr(&a, &b, 255.0).unwrap().db().unwrap() - psnr(&a, &b, 1.0).unwrap().db().unwrap();
         assert!((difference - 20.0 * 255f64.log10()).abs() < 1e-9);
         for peak in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(psnr(&a, &b, peak), Err(MetricError::Range(_))));
         }
-        let mean: PsnrMean = [Psnr::Db(20.0), Psnr::Equal, Psnr::Db(30.0)]
-            .into_iter()
-            .collect();
-        assert_eq!(
-            mean,
-            PsnrMean {
-                db: Some(25.0),
-                count: 2,
-                equal: 1
-            }
-        );
+        let mean: PsnrMean = [Psnr::Db(20.0), Psnr::Equal, Psnr::Db(30.0)].into_iter().collect();
+        assert_eq!(mean, PsnrMean { db: Some(25.0), count: 2, equal: 1 });
         assert_eq!([Psnr::Equal].into_iter().collect::<PsnrMean>().db, None);
     }
 
@@ -183,14 +158,8 @@ mod tests {
         let b = Grid::filled(3, 1, 0.0f32);
         a[(1, 0)] = f32::NAN;
         assert_eq!(mse(&a, &b), Ok(1.0));
-        assert_eq!(
-            mse(&Grid::filled(3, 1, f32::NAN), &b),
-            Err(MetricError::Nothing)
-        );
-        assert!(matches!(
-            mse(&Grid::filled(1, 3, 0.0), &b),
-            Err(MetricError::Size { .. })
-        ));
+        assert_eq!(mse(&Grid::filled(3, 1, f32::NAN), &b), Err(MetricError::Nothing));
+        assert!(matches!(mse(&Grid::filled(1, 3, 0.0), &b), Err(MetricError::Size { .. })));
         let empty = Grid::from_vec(0, 0, vec![]).unwrap();
         assert_eq!(mse(&empty, &empty), Err(MetricError::Nothing));
     }
@@ -198,20 +167,9 @@ mod tests {
     #[test]
     fn the_unit_range_is_reached_and_special_values_survive() {
         let scaled = unit_range(&Grid::from_vec(4, 1, vec![-2.0, f32::NAN, 6.0, 0.0]).unwrap());
-        assert_eq!(
-            (scaled[(0, 0)], scaled[(2, 0)], scaled[(3, 0)]),
-            (0.0, 1.0, 0.25)
-        );
+        assert_eq!((scaled[(0, 0)], scaled[(2, 0)], scaled[(3, 0)]), (0.0, 1.0, 0.25));
         assert!(scaled[(1, 0)].is_nan());
-        assert_eq!(
-            unit_range(&Grid::filled(2, 2, 0.09)),
-            Grid::filled(2, 2, 0.0)
-        );
-        assert!(
-            unit_range(&Grid::filled(2, 2, f32::INFINITY))
-                .as_slice()
-                .iter()
-                .all(|v| v.is_nan())
-        );
+        assert_eq!(unit_range(&Grid::filled(2, 2, 0.09)), Grid::filled(2, 2, 0.0));
+        assert!(unit_range(&Grid::filled(2, 2, f32::INFINITY)).as_slice().iter().all(|v| v.is_nan()));
     }
 }

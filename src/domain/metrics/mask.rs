@@ -21,11 +21,7 @@ impl MaskScore {
         if first.size() != second.size() {
             return None;
         }
-        let mut score = Self {
-            both: 0,
-            only_first: 0,
-            only_second: 0,
-        };
+        let mut score = Self { both: 0, only_first: 0, only_second: 0 };
         for (&a, &b) in first.as_slice().iter().zip(second.as_slice()) {
             match (a, b) {
                 (true, true) => score.both += 1,
@@ -44,19 +40,12 @@ impl MaskScore {
 
     /// Dice coefficient, 0 to 1; 1 for two empty masks.
     pub fn dice(self) -> f64 {
-        ratio(
-            2 * self.both,
-            2 * self.both + self.only_first + self.only_second,
-        )
+        ratio(2 * self.both, 2 * self.both + self.only_first + self.only_second)
     }
 }
 
 fn ratio(part: usize, whole: usize) -> f64 {
-    if whole == 0 {
-        1.0
-    } else {
-        part as f64 / whole as f64
-    }
+    if whole == 0 { 1.0 } else { part as f64 / whole as f64 }
 }
 
 #[cfg(test)]
@@ -69,14 +58,7 @@ mod tests {
         let left = Grid::from_fn(4, 2, |x, _| x < 2);
         let middle = Grid::from_fn(4, 2, |x, _| x == 1 || x == 2);
         let score = MaskScore::of(&left, &middle).unwrap();
-        assert_eq!(
-            score,
-            MaskScore {
-                both: 2,
-                only_first: 2,
-                only_second: 2
-            }
-        );
+        assert_eq!(score, MaskScore { both: 2, only_first: 2, only_second: 2 });
         assert!((score.iou() - 1.0 / 3.0).abs() < 1e-12 && (score.dice() - 0.5).abs() < 1e-12);
         let empty = Grid::filled(4, 2, false);
         assert_eq!(MaskScore::of(&empty, &empty).unwrap().iou(), 1.0);

@@ -43,37 +43,19 @@ pub struct Ssim {
 /// # Source
 /// Wang et al. 2004; window, padding and borders as in the lab's `ssim.py` lines 9-210. Checked against an independent
 /// implementation by `tests/data/ssim.json`.
-pub fn ssim(
-    prediction: &Grid<f32>,
-    truth: &Grid<f32>,
-    range: SsimRange,
-) -> Result<Ssim, MetricError> {
+pub fn ssim(prediction: &Grid<f32>, truth: &Grid<f32>, range: SsimRange) -> Result<Ssim, MetricError> {
     check_size(prediction, truth)?;
     let valid = |p: f32, t: f32| p.is_finite() && t.is_finite();
-    let pairs = || {
-        prediction
-            .as_slice()
-            .iter()
-            .zip(truth.as_slice())
-            .map(|(&p, &t)| (p, t))
-    };
+    let pairs = || prediction.as_slice().iter().zip(truth.as_slice()).map(|(&p, &t)| (p, t));
     let used = pairs().filter(|&(p, t)| valid(p, t)).count();
     if used == 0 {
         return Err(MetricError::Nothing);
     }
-    let offset = pairs()
-        .filter(|&(p, t)| valid(p, t))
-        .map(|(_, t)| f64::from(t))
-        .sum::<f64>()
-        / used as f64;
+    let offset = pairs().filter(|&(p, t)| valid(p, t)).map(|(_, t)| f64::from(t)).sum::<f64>() / used as f64;
     let range = match range {
         SsimRange::Explicit(range) => range,
         SsimRange::OfPrediction => {
-            let values = || {
-                pairs()
-                    .filter(|&(p, t)| valid(p, t))
-                    .map(|(p, _)| f64::from(p))
-            };
+            let values = || pairs().filter(|&(p, t)| valid(p, t)).map(|(p, _)| f64::from(p));
             values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
         }
     };
@@ -84,49 +66,29 @@ pub fn ssim(
     let (width, height) = (prediction.width(), prediction.height());
     // Ignored pixels take the truth's mean in both images.
     let centred = |pick: fn((f32, f32)) -> f32| -> Vec<f64> {
-        pairs()
-            .map(|(p, t)| {
-                if valid(p, t) {
-                    f64::from(pick((p, t))) - offset
-                } else {
-                    0.0
-                }
-            })
-            .collect()
+        pairs().map(|(p, t)| if valid(p, t) { f64::from(pick((p, t))) - offset } else { 0.0 }).collect()
     };
     let (p, t) = (centred(|(p, _)| p), centred(|(_, t)| t));
-    let product =
-        |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
     // Outside the image the lab pads with zero, which is -offset once the offset is taken out.
     let blur = |values: &[f64], outside: f64| convolve(values, width, height, outside);
     let (mean_p, mean_t) = (blur(&p, -offset), blur(&t, -offset));
     let squared = offset * offset;
-    let (pp, tt, pt) = (
-        blur(&product(&p, &p), squared),
-        blur(&product(&t, &t), squared),
-        blur(&product(&p, &t), squared),
-    );
+    let (pp, tt, pt) =
+        (blur(&product(&p, &p), squared), blur(&product(&t, &t), squared), blur(&product(&p, &t), squared));
 
     let (c1, c2) = ((K1 * range).powi(2), (K2 * range).powi(2));
     let scores: Vec<f64> = (0..p.len())
         .map(|i| {
             let (mp, mt) = (mean_p[i], mean_t[i]);
-            let (vp, vt, cov) = (
-                (pp[i] - mp * mp).max(0.0),
-                (tt[i] - mt * mt).max(0.0),
-                pt[i] - mp * mt,
-            );
+            let (vp, vt, cov) = ((pp[i] - mp * mp).max(0.0), (tt[i] - mt * mt).max(0.0), pt[i] - mp * mt);
             let (mp, mt) = (mp + offset, mt + offset);
             (2.0 * mp * mt + c1) * (2.0 * cov + c2) / ((mp * mp + mt * mt + c1) * (vp + vt + c2))
         })
         .collect();
     let mean = scores.iter().sum::<f64>() / scores.len() as f64;
     let map = Grid::from_fn(width, height, |x, y| scores[y * width + x] as f32);
-    Ok(Ssim {
-        mean,
-        map,
-        ignored: p.len() - used,
-    })
+    Ok(Ssim { mean, map, ignored: p.len() - used })
 }
 
 /// The normalised Gaussian of the window, one axis.
@@ -150,11 +112,7 @@ fn convolve(values: &[f64], width: usize, height: usize, outside: f64) -> Vec<f6
                 .enumerate()
                 .map(|(k, w)| {
                     let j = (i + k).wrapping_sub(WINDOW / 2);
-                    w * if j < length {
-                        source[start + j * stride]
-                    } else {
-                        outside
-                    }
+                    w * if j < length { source[start + j * stride] } else { outside }
                 })
                 .sum();
         }
@@ -176,27 +134,17 @@ mod tests {
     use serde_json::Value;
 
     fn textured(offset: f32) -> (Grid<f32>, Grid<f32>) {
-        let truth = Grid::from_fn(31, 24, |x, y| {
-            offset + 0.01 * ((x as f32 * 0.4).sin() + (y as f32 * 0.3).cos())
-        });
-        let prediction = Grid::from_fn(31, 24, |x, y| {
-            truth[(x, y)] + 0.002 * ((x * 7 + y * 5) % 11) as f32 - 0.01
-        });
+        let truth = Grid::from_fn(31, 24, |x, y| offset + 0.01 * ((x as f32 * 0.4).sin() + (y as f32 * 0.3).cos()));
+        let prediction = Grid::from_fn(31, 24, |x, y| truth[(x, y)] + 0.002 * ((x * 7 + y * 5) % 11) as f32 - 0.01);
         (prediction, truth)
     }
 
     #[test]
     fn agrees_with_an_independent_implementation() {
-        let reference: Value =
-            serde_json::from_str(include_str!("../../../tests/data/ssim.json")).unwrap();
+        let reference: Value = serde_json::from_str(include_str!("../../../tests/data/ssim.json")).unwrap();
         for case in reference["cases"].as_array().unwrap() {
             let grid = |key: &str| {
-                let data = case[key]
-                    .as_array()
-                    .unwrap()
-                    .iter()
-                    .map(|v| v.as_f64().unwrap() as f32)
-                    .collect();
+                let data = case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
                 let size = |k: &str| case[k].as_u64().unwrap() as usize;
                 Grid::from_vec(size("width"), size("height"), data).unwrap()
             };
@@ -207,11 +155,7 @@ mod tests {
             let found = ssim(&grid("prediction"), &grid("truth"), range).unwrap();
             let expected = case["ssim"].as_f64().unwrap();
             // Both sides work in f64 on the same f32 pixels.
-            assert!(
-                (found.mean - expected).abs() < 1e-9,
-                "{} for {expected}",
-                found.mean
-            );
+            assert!((found.mean - expected).abs() < 1e-9, "{} for {expected}", found.mean);
         }
     }
 
@@ -223,15 +167,8 @@ mod tests {
             assert!((found.mean - 1.0).abs() < 1e-12);
         }
         let flat = Grid::filled(20, 20, 0.09f32);
-        assert_eq!(
-            ssim(&flat, &truth, SsimRange::Explicit(1.0))
-                .err()
-                .map(|e| e.to_string().is_empty()),
-            Some(false)
-        );
-        assert!(
-            matches!(ssim(&flat, &flat, SsimRange::OfPrediction), Err(MetricError::Range(r)) if r == 0.0)
-        );
+        assert_eq!(ssim(&flat, &truth, SsimRange::Explicit(1.0)).err().map(|e| e.to_string().is_empty()), Some(false));
+        assert!(matches!(ssim(&flat, &flat, SsimRange::OfPrediction), Err(MetricError::Range(r)) if r == 0.0));
         assert!(ssim(&flat, &flat, SsimRange::Explicit(f64::NAN)).is_err());
     }
 
@@ -240,14 +177,7 @@ mod tests {
         for offset in [0.0, 0.09, 1.0] {
             let (prediction, truth) = textured(offset);
             let found = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
-            assert!(
-                found
-                    .map
-                    .as_slice()
-                    .iter()
-                    .all(|s| (-1.0..=1.0).contains(s)),
-                "offset {offset}"
-            );
+            assert!(found.map.as_slice().iter().all(|s| (-1.0..=1.0).contains(s)), "offset {offset}");
         }
         // In f64 from f64 images there is no rounding of the pixels: the f32 images must agree within their own.
         let (prediction, truth) = textured(1.0);
@@ -265,9 +195,6 @@ mod tests {
         let found = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
         assert!(found.ignored == 1 && found.mean.is_finite());
         let none = Grid::filled(31, 24, f32::NAN);
-        assert_eq!(
-            ssim(&none, &truth, SsimRange::Explicit(1.0)),
-            Err(MetricError::Nothing)
-        );
+        assert_eq!(ssim(&none, &truth, SsimRange::Explicit(1.0)), Err(MetricError::Nothing));
     }
 }

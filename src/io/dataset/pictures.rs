@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 
 use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
+use crate::domain::resample;
 use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample, Scale};
 use crate::domain::sensor::bubble;
 use crate::io::images;
@@ -162,30 +163,8 @@ impl Pictures {
 pub(super) fn imprint_from_tile(tile: &Grid<f32>) -> DepthMap {
     let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
     let metres = tile.rotated_180().map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32);
-    resized(&metres, bubble::WIDTH, bubble::HEIGHT)
-}
-
-/// Bilinear, pixel centres at half integers, no antialiasing: `torchvision.transforms.Resize` on tensors.
-fn resized(source: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
-    let axis = |size: usize, from: usize| -> Vec<(usize, usize, f64)> {
-        let step = from as f64 / size as f64;
-        (0..size)
-            .map(|i| {
-                let at = ((i as f64 + 0.5) * step - 0.5).max(0.0);
-                let low = (at as usize).min(from - 1);
-                (low, (low + 1).min(from - 1), at - low as f64)
-            })
-            .collect()
-    };
-    if source.is_empty() {
-        return Grid::filled(width, height, f32::NAN);
-    }
-    let (columns, rows) = (axis(width, source.width()), axis(height, source.height()));
-    Grid::from_fn(width, height, |x, y| {
-        let ((x0, x1, fx), (y0, y1, fy)) = (columns[x], rows[y]);
-        let row = |y: usize| f64::from(source[(x0, y)]) * (1.0 - fx) + f64::from(source[(x1, y)]) * fx;
-        (row(y0) * (1.0 - fy) + row(y1) * fy) as f32
-    })
+    // The lab made these pictures with torchvision's resize, so they are undone with the same one.
+    resample::bilinear(&metres, bubble::WIDTH, bubble::HEIGHT)
 }
 
 fn difference_from_tile(tile: &RgbGrid) -> RgbGrid {
@@ -220,17 +199,6 @@ fn standard_deviation(values: impl Iterator<Item = f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn resizing_agrees_with_torchvision() {
-        // torch.nn.functional.interpolate([[0, 1, 2, 3]], size=(1, 6), mode="bilinear", align_corners=False)
-        let line = Grid::from_vec(4, 1, vec![0.0, 1.0, 2.0, 3.0]).unwrap();
-        let out = resized(&line, 6, 1);
-        for (a, b) in out.as_slice().iter().zip([0.0, 0.5, 1.166_666_6, 1.833_333_3, 2.5, 3.0]) {
-            assert!((a - b).abs() < 1e-6, "{out:?}");
-        }
-        assert_eq!(resized(&line, 4, 1), line);
-    }
 
     #[test]
     fn a_tile_is_turned_back_and_scaled() {

@@ -20,11 +20,7 @@ struct Gaussian {
 
 fn express(prediction: Prediction, x: f64, clean: f64, alpha_bar: f64) -> f64 {
     let (signal, noise) = (alpha_bar.sqrt(), (1.0 - alpha_bar).sqrt());
-    let epsilon = if noise > 0.0 {
-        (x - signal * clean) / noise
-    } else {
-        0.0
-    };
+    let epsilon = if noise > 0.0 { (x - signal * clean) / noise } else { 0.0 };
     match prediction {
         Prediction::Epsilon => epsilon,
         Prediction::V => signal * epsilon - noise * clean,
@@ -33,19 +29,12 @@ fn express(prediction: Prediction, x: f64, clean: f64, alpha_bar: f64) -> f64 {
 }
 
 impl Denoiser for Perfect {
-    fn predict(
-        &mut self,
-        latent: &Tensor,
-        timestep: u32,
-        _: &Tensor,
-    ) -> Result<Tensor, ModelError> {
+    fn predict(&mut self, latent: &Tensor, timestep: u32, _: &Tensor) -> Result<Tensor, ModelError> {
         self.calls += 1;
         let alpha_bar = self.schedule.alpha_bar()[timestep as usize];
         let clean = self.clean.iter().cycle();
         let data = latent.data().iter().zip(clean);
-        let data = data
-            .map(|(&x, &c)| express(self.prediction, x.into(), c.into(), alpha_bar) as f32)
-            .collect();
+        let data = data.map(|(&x, &c)| express(self.prediction, x.into(), c.into(), alpha_bar) as f32).collect();
         Ok(Tensor::new(latent.shape().to_vec(), data).unwrap())
     }
 
@@ -59,24 +48,14 @@ impl Denoiser for Perfect {
 }
 
 impl Denoiser for Gaussian {
-    fn predict(
-        &mut self,
-        latent: &Tensor,
-        timestep: u32,
-        _: &Tensor,
-    ) -> Result<Tensor, ModelError> {
+    fn predict(&mut self, latent: &Tensor, timestep: u32, _: &Tensor) -> Result<Tensor, ModelError> {
         let a = self.schedule.alpha_bar()[timestep as usize];
         let variance = self.std * self.std;
-        let data = latent
-            .data()
-            .iter()
-            .zip(self.mean.iter().cycle())
-            .map(|(&x, &mean)| {
-                let x = f64::from(x);
-                let clean =
-                    mean + variance * a.sqrt() * (x - a.sqrt() * mean) / (a * variance + 1.0 - a);
-                express(self.prediction, x, clean, a) as f32
-            });
+        let data = latent.data().iter().zip(self.mean.iter().cycle()).map(|(&x, &mean)| {
+            let x = f64::from(x);
+            let clean = mean + variance * a.sqrt() * (x - a.sqrt() * mean) / (a * variance + 1.0 - a);
+            express(self.prediction, x, clean, a) as f32
+        });
         Ok(Tensor::new(latent.shape().to_vec(), data.collect()).unwrap())
     }
 
@@ -99,14 +78,8 @@ fn condition(batch: usize) -> Tensor {
     Tensor::filled(vec![batch, 1, 2, 2], 0.0)
 }
 
-fn run(
-    denoiser: &mut dyn Denoiser,
-    schedule: &Schedule,
-    config: GenerateConfig,
-) -> Result<Tensor, DiffusionError> {
-    sample(denoiser, schedule, &config, &condition(1), &mut |_| {
-        ControlFlow::Continue(())
-    })
+fn run(denoiser: &mut dyn Denoiser, schedule: &Schedule, config: GenerateConfig) -> Result<Tensor, DiffusionError> {
+    sample(denoiser, schedule, &config, &condition(1), &mut |_| ControlFlow::Continue(()))
 }
 
 #[test]
@@ -116,24 +89,11 @@ fn a_perfect_prediction_returns_the_clean_latent() {
         for steps in [1, 2, 7, 50, 1000] {
             for spacing in [Spacing::Lab, Spacing::Trailing] {
                 for eta in [0.0, 1.0] {
-                    let mut model = Perfect {
-                        schedule: lab(),
-                        clean: clean.clone(),
-                        prediction,
-                        calls: 0,
-                    };
-                    let config = GenerateConfig {
-                        steps,
-                        eta,
-                        spacing,
-                        ..Default::default()
-                    };
+                    let mut model = Perfect { schedule: lab(), clean: clean.clone(), prediction, calls: 0 };
+                    let config = GenerateConfig { steps, eta, spacing, ..Default::default() };
                     let found = run(&mut model, &lab(), config).unwrap();
                     for (a, b) in found.data().iter().zip(&clean) {
-                        assert!(
-                            (a - b).abs() < 1e-5,
-                            "{prediction:?} {steps} {spacing:?} {eta}: {a} for {b}"
-                        );
+                        assert!((a - b).abs() < 1e-5, "{prediction:?} {steps} {spacing:?} {eta}: {a} for {b}");
                     }
                 }
             }
@@ -148,35 +108,14 @@ fn gaussian_data_comes_back_with_its_mean_and_spread() {
     let means: Vec<f64> = (0..1024).map(|i| f64::from(i % 7) - 3.0).collect();
     for prediction in KINDS {
         for eta in [0.0, 0.5, 1.0] {
-            let mut model = Gaussian {
-                schedule: lab(),
-                mean: means.clone(),
-                std: 0.5,
-                prediction,
-            };
-            let config = GenerateConfig {
-                steps: 250,
-                eta,
-                seed: 3,
-                ..Default::default()
-            };
+            let mut model = Gaussian { schedule: lab(), mean: means.clone(), std: 0.5, prediction };
+            let config = GenerateConfig { steps: 250, eta, seed: 3, ..Default::default() };
             let found = run(&mut model, &lab(), config).unwrap();
-            let rest: Vec<f64> = found
-                .data()
-                .iter()
-                .zip(&means)
-                .map(|(&x, m)| f64::from(x) - m)
-                .collect();
+            let rest: Vec<f64> = found.data().iter().zip(&means).map(|(&x, m)| f64::from(x) - m).collect();
             let mean = rest.iter().sum::<f64>() / 1024.0;
             let std = (rest.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 1024.0).sqrt();
-            assert!(
-                mean.abs() < 0.07,
-                "{prediction:?} eta {eta}: mean off by {mean}"
-            );
-            assert!(
-                (std - 0.5).abs() < 0.05,
-                "{prediction:?} eta {eta}: spread {std}"
-            );
+            assert!(mean.abs() < 0.07, "{prediction:?} eta {eta}: mean off by {mean}");
+            assert!((std - 0.5).abs() < 0.05, "{prediction:?} eta {eta}: spread {std}");
         }
     }
 }
@@ -188,21 +127,8 @@ fn deterministic_sampling_follows_the_exact_flow() {
     let (mean, std) = (0.8, 0.3);
     let mut errors = Vec::new();
     for steps in [50, 1000] {
-        let mut model = Gaussian {
-            schedule: lab(),
-            mean: vec![mean],
-            std,
-            prediction: Prediction::Epsilon,
-        };
-        let found = run(
-            &mut model,
-            &lab(),
-            GenerateConfig {
-                steps,
-                ..Default::default()
-            },
-        )
-        .unwrap();
+        let mut model = Gaussian { schedule: lab(), mean: vec![mean], std, prediction: Prediction::Epsilon };
+        let found = run(&mut model, &lab(), GenerateConfig { steps, ..Default::default() }).unwrap();
         let a = lab().alpha_bar()[999];
         let mut noise = GaussianNoise::new(42);
         let worst = found.data().iter().map(|&x| {
@@ -218,21 +144,11 @@ fn deterministic_sampling_follows_the_exact_flow() {
 
 #[test]
 fn every_step_count_and_eta_stays_finite() {
-    let mut model = Gaussian {
-        schedule: lab(),
-        mean: vec![0.0],
-        std: 1.0,
-        prediction: Prediction::Epsilon,
-    };
+    let mut model = Gaussian { schedule: lab(), mean: vec![0.0], std: 1.0, prediction: Prediction::Epsilon };
     for steps in (1..=12).chain([20, 33, 64, 100, 333, 501, 999, 1000]) {
         for eta in [0.0, 0.3, 1.0] {
             for spacing in [Spacing::Lab, Spacing::Trailing] {
-                let config = GenerateConfig {
-                    steps,
-                    eta,
-                    spacing,
-                    ..Default::default()
-                };
+                let config = GenerateConfig { steps, eta, spacing, ..Default::default() };
                 assert_eq!(run(&mut model, &lab(), config).unwrap().non_finite(), 0);
             }
         }
@@ -242,40 +158,21 @@ fn every_step_count_and_eta_stays_finite() {
 #[test]
 fn extreme_schedules_are_finite_or_refused() {
     // No noise at all, all noise at the end, a plateau, almost no signal, and one step.
-    let shares = [
-        vec![1.0, 1.0],
-        vec![1.0, 0.5, 0.0],
-        vec![0.5, 0.5, 0.5],
-        vec![1.0, 1e-300],
-        vec![1e-12],
-    ];
+    let shares = [vec![1.0, 1.0], vec![1.0, 0.5, 0.0], vec![0.5, 0.5, 0.5], vec![1.0, 1e-300], vec![1e-12]];
     for shares in shares {
         let schedule = Schedule::from_alpha_bar(shares.clone()).unwrap();
         for prediction in KINDS {
             for eta in [0.0, 1.0] {
                 for spacing in [Spacing::Lab, Spacing::Trailing] {
-                    let mut model = Perfect {
-                        schedule: schedule.clone(),
-                        clean: vec![0.5; 4],
-                        prediction,
-                        calls: 0,
-                    };
-                    let config = GenerateConfig {
-                        steps: shares.len() as u32,
-                        eta,
-                        spacing,
-                        ..Default::default()
-                    };
+                    let mut model = Perfect { schedule: schedule.clone(), clean: vec![0.5; 4], prediction, calls: 0 };
+                    let config = GenerateConfig { steps: shares.len() as u32, eta, spacing, ..Default::default() };
                     match run(&mut model, &schedule, config) {
                         Ok(latent) => {
                             assert_eq!(latent.non_finite(), 0, "{shares:?} {prediction:?} {eta}")
                         }
                         Err(err) => assert!(
                             prediction == Prediction::Epsilon
-                                && matches!(
-                                    err,
-                                    DiffusionError::Schedule(ScheduleError::PureNoise { .. })
-                                ),
+                                && matches!(err, DiffusionError::Schedule(ScheduleError::PureNoise { .. })),
                             "{shares:?} {prediction:?}: {err}"
                         ),
                     }
@@ -288,27 +185,11 @@ fn extreme_schedules_are_finite_or_refused() {
 #[test]
 fn a_batch_gives_what_its_entries_give_alone() {
     let means: Vec<f64> = vec![0.2];
-    let mut model = Gaussian {
-        schedule: lab(),
-        mean: means,
-        std: 0.7,
-        prediction: Prediction::V,
-    };
-    let config = GenerateConfig {
-        steps: 5,
-        eta: 0.8,
-        ..Default::default()
-    };
+    let mut model = Gaussian { schedule: lab(), mean: means, std: 0.7, prediction: Prediction::V };
+    let config = GenerateConfig { steps: 5, eta: 0.8, ..Default::default() };
     let mut go = |seeds: &[u64]| {
-        sample_seeds(
-            &mut model,
-            &lab(),
-            &config,
-            seeds,
-            &condition(seeds.len()),
-            &mut |_| ControlFlow::Continue(()),
-        )
-        .unwrap()
+        sample_seeds(&mut model, &lab(), &config, seeds, &condition(seeds.len()), &mut |_| ControlFlow::Continue(()))
+            .unwrap()
     };
     let batch = go(&[5, 6, 5]);
     assert_eq!(batch.item(0), go(&[5]).item(0));
@@ -319,33 +200,16 @@ fn a_batch_gives_what_its_entries_give_alone() {
 
 #[test]
 fn cancelling_stops_within_one_step() {
-    let mut model = Perfect {
-        schedule: lab(),
-        clean: vec![0.0; 4],
-        prediction: Prediction::Epsilon,
-        calls: 0,
-    };
+    let mut model = Perfect { schedule: lab(), clean: vec![0.0; 4], prediction: Prediction::Epsilon, calls: 0 };
     let mut seen = Vec::new();
-    let config = GenerateConfig {
-        steps: 20,
-        ..Default::default()
-    };
+    let config = GenerateConfig { steps: 20, ..Default::default() };
     let result = sample(&mut model, &lab(), &config, &condition(1), &mut |p| {
         seen.push(p);
-        if p.step == 3 {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
+        if p.step == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     assert_eq!(result, Err(DiffusionError::Cancelled));
     assert_eq!(model.calls, 3);
-    assert_eq!(
-        seen,
-        (0..=3)
-            .map(|step| Progress { step, of: 20 })
-            .collect::<Vec<_>>()
-    );
+    assert_eq!(seen, (0..=3).map(|step| Progress { step, of: 20 }).collect::<Vec<_>>());
 }
 
 #[test]
@@ -366,36 +230,14 @@ fn wrong_parameters_and_models_are_errors() {
     let with = |shape: Vec<usize>, value, config| run(&mut Broken(shape, value), &lab(), config);
     assert!(matches!(
         with(vec![1, 1, 2, 2], f32::NAN, config),
-        Err(DiffusionError::Model(ModelError::NonFinite {
-            count: 4,
-            ..
-        }))
+        Err(DiffusionError::Model(ModelError::NonFinite { count: 4, .. }))
     ));
-    assert!(matches!(
-        with(vec![1, 4], 0.0, config),
-        Err(DiffusionError::Model(ModelError::Shape { .. }))
-    ));
+    assert!(matches!(with(vec![1, 4], 0.0, config), Err(DiffusionError::Model(ModelError::Shape { .. }))));
     for eta in [-0.1, 1.1, f64::NAN] {
         let config = GenerateConfig { eta, ..config };
-        assert!(matches!(
-            with(vec![1, 1, 2, 2], 0.0, config),
-            Err(DiffusionError::Eta(_))
-        ));
+        assert!(matches!(with(vec![1, 1, 2, 2], 0.0, config), Err(DiffusionError::Eta(_))));
     }
     let mut model = Broken(vec![1, 1, 2, 2], 0.0);
-    let result = sample_seeds(
-        &mut model,
-        &lab(),
-        &config,
-        &[1, 2],
-        &condition(1),
-        &mut |_| ControlFlow::Continue(()),
-    );
-    assert_eq!(
-        result,
-        Err(DiffusionError::Batch {
-            seeds: 2,
-            conditions: 1
-        })
-    );
+    let result = sample_seeds(&mut model, &lab(), &config, &[1, 2], &condition(1), &mut |_| ControlFlow::Continue(()));
+    assert_eq!(result, Err(DiffusionError::Batch { seeds: 2, conditions: 1 }));
 }
