@@ -1,0 +1,98 @@
+// Point clouds as discs that face the eye: six vertices per point, read from a storage buffer.
+// Rust twins: gpu::points::{PointVertex, PointsUniform}.
+#import <common/view.wgsl>
+#import <common/color.wgsl>
+
+struct PointVertex {
+    position: vec3<f32>,
+    // Colour modes: 0 = a colour as rgba8, 1 = the bits of an f32, 2 = unused.
+    attribute: u32,
+}
+
+struct PointsUniform {
+    world_from_points: mat4x4<f32>,
+    // One colour for all (mode 2).
+    color: vec4<f32>,
+    highlight: vec4<f32>,
+    // Values at the ends of the colour map (mode 1).
+    lo: f32,
+    hi: f32,
+    // Disc diameter: pixels, or metres if size_in_metres != 0.
+    size: f32,
+    size_in_metres: u32,
+    color_mode: u32,
+    map: u32,
+    // Every stride-th point is drawn.
+    stride: u32,
+    // Instances before the one extra instance that is the highlighted point.
+    drawn: u32,
+    // Index of the highlighted point; 0xffffffff for none.
+    selected: u32,
+    unused_0: u32,
+    unused_1: u32,
+    unused_2: u32,
+}
+
+@group(1) @binding(0) var<uniform> cloud: PointsUniform;
+@group(1) @binding(1) var<storage, read> points: array<PointVertex>;
+
+struct Varying {
+    @builtin(position) clip: vec4<f32>,
+    @location(0) corner: vec2<f32>,
+    @location(1) @interpolate(flat) color: vec4<f32>,
+    // Radius in pixels, plus 1 for a highlighted point's ring (in y).
+    @location(2) @interpolate(flat) radius: vec2<f32>,
+}
+
+@vertex
+fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Varying {
+    var out: Varying;
+    out.clip = NOWHERE;
+    let is_extra = instance == cloud.drawn;
+    let index = select(instance * cloud.stride, cloud.selected, is_extra);
+    let point = points[index];
+    if is_hidden(point.position) {
+        return out;
+    }
+    var clip = view.clip_from_world * (cloud.world_from_points * vec4<f32>(point.position, 1.0));
+    if clip.w <= 0.0 {
+        return out;
+    }
+    var diameter = cloud.size;
+    if cloud.size_in_metres != 0u {
+        diameter = cloud.size * view.px_per_m / clip.w;
+    }
+    // Below one pixel a disc would vanish between the samples.
+    var radius = max(0.5 * diameter, 0.5);
+    if is_extra {
+        radius = max(radius * 2.0, radius + 3.0);
+        // In front of its neighbours, and of the unmarked disc of the same point.
+        clip.z = min(clip.z * 1.02 , clip.w);
+    }
+    out.corner = quad_corner(vertex);
+    out.clip = offset_px(clip, out.corner * radius);
+    out.radius = vec2<f32>(radius, f32(is_extra));
+    if is_extra {
+        out.color = cloud.highlight;
+    } else if cloud.color_mode == 0u {
+        out.color = unpack4x8unorm(point.attribute);
+    } else if cloud.color_mode == 1u {
+        out.color = vec4<f32>(scalar_color(cloud.map, point.attribute, cloud.lo, cloud.hi), 1.0);
+    } else {
+        out.color = cloud.color;
+    }
+    return out;
+}
+
+@fragment
+fn fs_main(in: Varying) -> @location(0) vec4<f32> {
+    // Discs of one or two pixels are squares: cutting their corners leaves holes.
+    if in.radius.x > 1.25 && dot(in.corner, in.corner) > 1.0 {
+        discard;
+    }
+    if in.radius.y > 0.5 && dot(in.corner, in.corner) > 0.55 {
+        // A dark rim keeps the highlight visible on any colour.
+        return vec4<f32>(in.color.rgb * 0.15, 1.0);
+    }
+    return vec4<f32>(in.color.rgb, 1.0);
+}

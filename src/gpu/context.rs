@@ -1,0 +1,98 @@
+//! The graphics device, and its errors as values.
+
+use std::sync::Arc;
+use std::task::{Context, Poll, Waker};
+
+use super::{GpuError, wgpu};
+
+/// A device with its queue, and what the renderer needs to know about them. Cheap to clone.
+#[derive(Clone, Debug)]
+pub struct Gpu {
+    /// Creates buffers, textures and pipelines.
+    pub device: wgpu::Device,
+    /// Takes uploads and commands.
+    pub queue: wgpu::Queue,
+    /// Samples per pixel: 4 where the adapter can, else 1.
+    pub samples: u32,
+    /// Name and driver of the adapter, for the log and the about box.
+    pub adapter: String,
+}
+
+impl Gpu {
+    /// Wraps a device that somebody else made (the window). From now on an error that no scope catches is logged
+    /// instead of ending the program.
+    pub fn new(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let four = |format| {
+            let flags = adapter.get_texture_format_features(format).flags;
+            flags.contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_X4)
+        };
+        let resolves = adapter
+            .get_texture_format_features(super::target::COLOR_FORMAT)
+            .flags
+            .contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
+        let can = resolves && four(super::target::COLOR_FORMAT) && four(super::target::DEPTH_FORMAT);
+        let info = adapter.get_info();
+        device.on_uncaptured_error(Arc::new(|error| log::error!("graphics device: {error}")));
+        Self {
+            device,
+            queue,
+            samples: if can { 4 } else { 1 },
+            adapter: format!("{} ({})", info.name, info.driver_info),
+        }
+    }
+
+    /// A device without a window, on the best adapter there is; a software renderer will do.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] and [`GpuError::NoDevice`].
+    pub fn headless() -> Result<Self, GpuError> {
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+        let options = wgpu::RequestAdapterOptions {
+            power_preference: wgpu::PowerPreference::HighPerformance,
+            ..Default::default()
+        };
+        let adapter = block_on(instance.request_adapter(&options)).map_err(|e| GpuError::NoAdapter(e.to_string()))?;
+        let limits = wgpu::Limits::default().or_better_values_from(&adapter.limits());
+        let limits = if limits.check_limits(&adapter.limits()) { limits } else { adapter.limits() };
+        let descriptor =
+            wgpu::DeviceDescriptor { label: Some("touch2touch"), required_limits: limits, ..Default::default() };
+        let (device, queue) = block_on(adapter.request_device(&descriptor))
+            .map_err(|e| GpuError::NoDevice { adapter: adapter.get_info().name, reason: e.to_string() })?;
+        Ok(Self::new(&adapter, device, queue))
+    }
+
+    /// Runs `work` and turns the first error that the device reports meanwhile into a value.
+    ///
+    /// # Errors
+    /// [`GpuError::Device`] with `what`, or what `work` returns.
+    pub fn guarded<T>(&self, what: &str, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
+        let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let result = work();
+        let invalid = block_on(validation.pop());
+        let full = block_on(memory.pop());
+        let value = result?;
+        match invalid.or(full) {
+            None => Ok(value),
+            Some(error) => Err(GpuError::Device { what: what.to_owned(), reason: error.to_string() }),
+        }
+    }
+
+    /// Largest storage buffer that a shader can read, bytes.
+    pub(super) fn max_storage_bytes(&self) -> u64 {
+        let limits = self.device.limits();
+        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+    }
+}
+
+/// Waits for a future. The futures of the native back ends are ready at once; this is all the executor they need.
+pub(super) fn block_on<F: Future>(future: F) -> F::Output {
+    let mut future = std::pin::pin!(future);
+    let mut context = Context::from_waker(Waker::noop());
+    loop {
+        match future.as_mut().poll(&mut context) {
+            Poll::Ready(value) => return value,
+            Poll::Pending => std::thread::yield_now(),
+        }
+    }
+}

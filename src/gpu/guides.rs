@@ -1,0 +1,87 @@
+//! Lines that give a scene its scale: a floor grid, the axes, a bar of known length, the edges of a box.
+
+use glam::DVec3;
+
+use super::lines::Segment;
+
+/// sRGB of the x, y and z axes.
+pub const AXIS_COLORS: [[u8; 4]; 3] = [[226, 88, 80, 255], [108, 184, 92, 255], [84, 140, 236, 255]];
+
+/// A square grid in the plane through `centre` that `u` and `v` (unit vectors) span, `cells` cells of `spacing`
+/// metres to each side. Every fifth line from the centre is stronger. Empty if a number makes no sense.
+pub fn grid(centre: DVec3, [u, v]: [DVec3; 2], spacing: f64, cells: u32, rgb: [u8; 3]) -> Vec<Segment> {
+    let cells = cells.min(500) as i32;
+    let reach = spacing * f64::from(cells);
+    if !(reach.is_finite() && reach > 0.0 && centre.is_finite()) {
+        return Vec::new();
+    }
+    let [r, g, b] = rgb;
+    let line = |i: i32, across: DVec3, along: DVec3| {
+        let middle = centre + across * (f64::from(i) * spacing);
+        let alpha = if i % 5 == 0 { 150 } else { 60 };
+        Segment { ends: [middle - along * reach, middle + along * reach], rgba: [r, g, b, alpha] }
+    };
+    (-cells..=cells).flat_map(|i| [line(i, u, v), line(i, v, u)]).collect()
+}
+
+/// The axes x (red), y (green) and z (blue) at `origin`, `length` metres long, with arrow heads.
+pub fn axes(origin: DVec3, length: f64) -> Vec<Segment> {
+    let mut out = Vec::with_capacity(9);
+    for (axis, rgba) in AXIS_COLORS.into_iter().enumerate() {
+        let along = DVec3::AXES[axis] * length;
+        let across = DVec3::AXES[(axis + 1) % 3] * (length * 0.05);
+        let tip = origin + along;
+        out.push(Segment { ends: [origin, tip], rgba });
+        for side in [across, -across] {
+            out.push(Segment { ends: [tip, origin + along * 0.86 + side], rgba });
+        }
+    }
+    out
+}
+
+/// A bar of `length` metres from `start` along the unit vector `along`, with end marks along the unit vector `mark`.
+pub fn scale_bar(start: DVec3, along: DVec3, mark: DVec3, length: f64, rgba: [u8; 4]) -> Vec<Segment> {
+    let end = start + along * length;
+    let half = mark * (0.12 * length);
+    [[start, end], [start - half, start + half], [end - half, end + half]].map(|ends| Segment { ends, rgba }).to_vec()
+}
+
+/// The twelve edges of the box `[smallest, largest]`.
+pub fn box_edges([lo, hi]: [DVec3; 2], rgba: [u8; 4]) -> Vec<Segment> {
+    let corner = |i: usize| {
+        let at = |axis: usize| if i >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
+        DVec3::new(at(0), at(1), at(2))
+    };
+    let mut out = Vec::with_capacity(12);
+    for i in 0..8 {
+        for axis in 0..3 {
+            if i >> axis & 1 == 0 {
+                out.push(Segment { ends: [corner(i), corner(i | 1 << axis)], rgba });
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn length(s: &Segment) -> f64 {
+        (s.ends[1] - s.ends[0]).length()
+    }
+
+    #[test]
+    fn lengths_and_counts() {
+        let bar = scale_bar(DVec3::ONE, DVec3::X, DVec3::Z, 0.01, [255; 4]);
+        assert!((length(&bar[0]) - 0.01).abs() < 1e-15);
+        let lines = grid(DVec3::ZERO, [DVec3::X, DVec3::Y], 0.005, 4, [90; 3]);
+        assert_eq!(lines.len(), 18);
+        assert!(lines.iter().all(|s| (length(s) - 0.04).abs() < 1e-15 && s.ends[0].z == 0.0));
+        assert!(grid(DVec3::ZERO, [DVec3::X, DVec3::Y], f64::NAN, 4, [90; 3]).is_empty());
+        let edges = box_edges([DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)], [255; 4]);
+        assert_eq!(edges.len(), 12);
+        assert!((edges.iter().map(length).sum::<f64>() - 24.0).abs() < 1e-12);
+        assert_eq!(axes(DVec3::ZERO, 0.02).iter().filter(|s| s.ends[0] == DVec3::ZERO).count(), 3);
+    }
+}

@@ -1,0 +1,129 @@
+//! Line segments of a width in pixels: grids, axes, correspondences.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, DVec3};
+
+use super::buffer::{Elements, Uniform};
+use super::pipelines::Pipelines;
+use super::{Gpu, GpuError, view, wgpu};
+
+/// Lines to be shown.
+#[derive(Clone, Debug)]
+pub struct LinesItem {
+    /// Tells line sets of one scene apart and labels their buffers.
+    pub name: String,
+    /// Must change whenever `segments` change; nothing else makes them go to the device.
+    pub revision: u64,
+    /// The segments; one with an end that is not finite is left out.
+    pub segments: Arc<[Segment]>,
+    /// Everything that may change at every frame.
+    pub style: LinesStyle,
+}
+
+/// A straight line between two points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Both ends, metres, in the lines' own frame.
+    pub ends: [DVec3; 2],
+    /// sRGB and opacity.
+    pub rgba: [u8; 4],
+}
+
+/// How lines look and where they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinesStyle {
+    /// From the lines' frame to the world (the grasp frame).
+    pub world_from_lines: DAffine3,
+    /// Physical pixels.
+    pub width_px: f32,
+    /// 0..1, on top of each segment's own.
+    pub opacity: f32,
+    /// Drawn over everything instead of hidden by what is in front.
+    pub overlay: bool,
+}
+
+impl Default for LinesStyle {
+    fn default() -> Self {
+        Self { world_from_lines: DAffine3::IDENTITY, width_px: 1.5, opacity: 1.0, overlay: false }
+    }
+}
+
+/// One end of a segment; twin of the struct in `shaders/lines.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(super) struct LineVertex {
+    pub(super) position: [f32; 3],
+    pub(super) color: u32,
+}
+
+/// Twin of the struct in `shaders/lines.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(super) struct LinesUniform {
+    pub(super) world_from_lines: [f32; 16],
+    pub(super) width_px: f32,
+    pub(super) opacity: f32,
+    pub(super) unused_0: f32,
+    pub(super) unused_1: f32,
+}
+
+/// Lines on the device.
+#[derive(Debug)]
+pub(super) struct LinesData {
+    uploaded: u64,
+    ends: Elements,
+    uniform: Uniform<LinesUniform>,
+    bindings: wgpu::BindGroup,
+}
+
+impl LinesData {
+    /// Uploads what changed since `old`. Returns whether lines were uploaded, and whether numbers were.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub(super) fn update(
+        gpu: &Gpu,
+        pipelines: &Pipelines,
+        old: Option<Self>,
+        item: &LinesItem,
+    ) -> Result<(Self, [bool; 2]), GpuError> {
+        let (mut data, uploaded) = match old {
+            Some(data) if data.uploaded == item.revision => (data, false),
+            old => {
+                let label = format!("Lines::{}", item.name);
+                let (buffer, uniform) = old.map_or((None, None), |d| (Some(d.ends.buffer), Some(d.uniform)));
+                let usage = wgpu::BufferUsages::STORAGE;
+                let ends = Elements::upload(gpu, &label, &vertices(&item.segments), usage, buffer)?;
+                let uniform = uniform.unwrap_or_else(|| Uniform::new(gpu, &label));
+                let bindings = pipelines.bind(gpu, &label, &uniform.buffer, Some(&ends.buffer));
+                (Self { uploaded: item.revision, ends, uniform, bindings }, true)
+            }
+        };
+        let written = data.uniform.set(
+            gpu,
+            LinesUniform {
+                world_from_lines: view::matrix(&item.style.world_from_lines),
+                width_px: if item.style.width_px.is_finite() { item.style.width_px.max(0.5) } else { 1.0 },
+                opacity: item.style.opacity.clamp(0.0, 1.0),
+                unused_0: 0.0,
+                unused_1: 0.0,
+            },
+        );
+        Ok((data, [uploaded, written]))
+    }
+
+    /// Draws with the view bound to group 0.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_bind_group(1, &self.bindings, &[]);
+        pass.draw(0..6, 0..self.ends.count / 2);
+    }
+}
+
+/// Both ends of every segment.
+fn vertices(segments: &[Segment]) -> Vec<LineVertex> {
+    let end =
+        |s: &Segment, i: usize| LineVertex { position: view::position(s.ends[i]), color: u32::from_le_bytes(s.rgba) };
+    segments.iter().flat_map(|s| [end(s, 0), end(s, 1)]).collect()
+}

@@ -1,0 +1,163 @@
+//! The render pipelines, built once per device and shared by all views.
+
+use super::target::{COLOR_FORMAT, DEPTH_FORMAT};
+use super::{Gpu, GpuError, mesh, shaders, wgpu};
+
+/// All pipelines and the layouts of their bindings.
+#[derive(Debug)]
+pub struct Pipelines {
+    pub(super) view_layout: wgpu::BindGroupLayout,
+    /// A uniform.
+    pub(super) plain_layout: wgpu::BindGroupLayout,
+    /// A uniform and a storage buffer.
+    pub(super) pulled_layout: wgpu::BindGroupLayout,
+    pub(super) points: wgpu::RenderPipeline,
+    /// Hides what is behind it.
+    pub(super) mesh_solid: wgpu::RenderPipeline,
+    /// Hides nothing.
+    pub(super) mesh_xray: wgpu::RenderPipeline,
+    pub(super) lines: wgpu::RenderPipeline,
+    /// Hidden by nothing.
+    pub(super) lines_overlay: wgpu::RenderPipeline,
+}
+
+/// What differs between the pipelines.
+struct Variant<'a> {
+    label: &'a str,
+    module: &'a wgpu::ShaderModule,
+    item_layout: &'a wgpu::BindGroupLayout,
+    vertices: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    blend: bool,
+    depth_write: bool,
+    depth_test: bool,
+}
+
+impl Pipelines {
+    /// Compiles the shaders and builds every pipeline.
+    ///
+    /// # Errors
+    /// [`GpuError::Shader`] with file and line, or [`GpuError::Device`] with the driver's reason: to be shown in
+    /// place of the view.
+    pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+        let [points, mesh, lines] = ["points.wgsl", "mesh.wgsl", "lines.wgsl"].map(|name| shaders::compile(gpu, name));
+        let (points, mesh, lines) = (points?, mesh?, lines?);
+        gpu.guarded("building the render pipelines", || {
+            let uniform = binding(0, wgpu::BufferBindingType::Uniform);
+            let storage = binding(1, wgpu::BufferBindingType::Storage { read_only: true });
+            let layout = |label, entries: &[_]| {
+                gpu.device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries })
+            };
+            let view_layout = layout("Pipelines::view_layout", &[uniform]);
+            let plain_layout = layout("Pipelines::plain_layout", &[uniform]);
+            let pulled_layout = layout("Pipelines::pulled_layout", &[uniform, storage]);
+            let build = |variant: Variant<'_>| build(gpu, &view_layout, &variant);
+            let pulled = Variant {
+                label: "Points::pipeline",
+                module: &points,
+                item_layout: &pulled_layout,
+                vertices: &[],
+                blend: false,
+                depth_write: true,
+                depth_test: true,
+            };
+            let lit = Variant {
+                label: "Mesh::solid",
+                module: &mesh,
+                item_layout: &plain_layout,
+                vertices: &[Some(mesh::VERTEX_LAYOUT)],
+                blend: true,
+                ..pulled
+            };
+            Ok(Self {
+                points: build(Variant { ..pulled }),
+                mesh_solid: build(Variant { ..lit }),
+                mesh_xray: build(Variant { label: "Mesh::xray", depth_write: false, ..lit }),
+                lines: build(Variant { label: "Lines::pipeline", module: &lines, blend: true, ..pulled }),
+                lines_overlay: build(Variant {
+                    label: "Lines::overlay",
+                    module: &lines,
+                    blend: true,
+                    depth_write: false,
+                    depth_test: false,
+                    ..pulled
+                }),
+                view_layout,
+                plain_layout,
+                pulled_layout,
+            })
+        })
+    }
+
+    /// Binds the uniform of an item, and its storage buffer if it has one.
+    pub(super) fn bind(
+        &self,
+        gpu: &Gpu,
+        label: &str,
+        uniform: &wgpu::Buffer,
+        storage: Option<&wgpu::Buffer>,
+    ) -> wgpu::BindGroup {
+        let layout = if storage.is_some() { &self.pulled_layout } else { &self.plain_layout };
+        let entries: Vec<wgpu::BindGroupEntry<'_>> = [Some(uniform), storage]
+            .into_iter()
+            .flatten()
+            .zip(0..)
+            .map(|(buffer, binding)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+    }
+}
+
+/// One buffer for both stages.
+fn binding(binding: u32, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding,
+        visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
+        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+        count: None,
+    }
+}
+
+/// Builds one pipeline.
+fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) -> wgpu::RenderPipeline {
+    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(variant.label),
+        bind_group_layouts: &[Some(view_layout), Some(variant.item_layout)],
+        immediate_size: 0,
+    });
+    let compare = if variant.depth_test { wgpu::CompareFunction::GreaterEqual } else { wgpu::CompareFunction::Always };
+    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(variant.label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: variant.module,
+            entry_point: Some("vs_main"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: variant.vertices,
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: Some(wgpu::DepthStencilState {
+            format: DEPTH_FORMAT,
+            depth_write_enabled: Some(variant.depth_write),
+            depth_compare: Some(compare),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        multisample: wgpu::MultisampleState { count: gpu.samples, ..Default::default() },
+        fragment: Some(wgpu::FragmentState {
+            module: variant.module,
+            entry_point: Some("fs_main"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(wgpu::ColorTargetState {
+                format: COLOR_FORMAT,
+                blend: variant.blend.then_some(OVER),
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// Blends colours by alpha; the picture itself stays opaque.
+const OVER: wgpu::BlendState =
+    wgpu::BlendState { color: wgpu::BlendState::ALPHA_BLENDING.color, alpha: wgpu::BlendComponent::OVER };

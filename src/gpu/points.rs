@@ -1,0 +1,213 @@
+//! Point clouds, drawn as discs that face the eye.
+
+use std::sync::Arc;
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, DVec3};
+
+use super::buffer::{Elements, Uniform};
+use super::pipelines::Pipelines;
+use super::{Gpu, GpuError, view, wgpu};
+use crate::domain::colormap::{ColorMap, NAN_COLOR, Range};
+
+/// A cloud to be shown.
+#[derive(Clone, Debug)]
+pub struct CloudItem {
+    /// Tells clouds of one scene apart and labels their buffers.
+    pub name: String,
+    /// Must change whenever `points` or `colors` change; nothing else makes them go to the device.
+    pub revision: u64,
+    /// Positions, metres, in the cloud's own frame. One that is not finite is left out; the others keep their index.
+    pub points: Arc<[DVec3]>,
+    /// Colours.
+    pub colors: PointColors,
+    /// Everything that may change at every frame.
+    pub style: CloudStyle,
+}
+
+/// What colours the points.
+#[derive(Clone, Debug)]
+pub enum PointColors {
+    /// [`CloudStyle::color`] for all.
+    One,
+    /// sRGB per point; a missing one is drawn as NaN.
+    PerPoint(Arc<[[u8; 3]]>),
+    /// A value per point, shown through [`CloudStyle::map`] and [`CloudStyle::range`]; a missing one is NaN.
+    Scalar(Arc<[f32]>),
+}
+
+/// The diameter of a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PointSize {
+    /// Physical pixels, at any distance.
+    Px(f32),
+    /// Metres; at least one pixel.
+    Metres(f32),
+}
+
+/// How a cloud looks and where it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CloudStyle {
+    /// From the cloud's frame to the world (the grasp frame).
+    pub world_from_points: DAffine3,
+    /// sRGB, 0..1, for [`PointColors::One`].
+    pub color: [f32; 3],
+    /// For [`PointColors::Scalar`].
+    pub map: ColorMap,
+    /// For [`PointColors::Scalar`].
+    pub range: Range,
+    /// Diameter.
+    pub size: PointSize,
+    /// Index of a point to mark; one that does not exist marks nothing.
+    pub selected: Option<usize>,
+    /// sRGB, 0..1, of the marked point.
+    pub highlight: [f32; 3],
+}
+
+impl Default for CloudStyle {
+    fn default() -> Self {
+        Self {
+            world_from_points: DAffine3::IDENTITY,
+            color: [0.2, 0.6, 1.0],
+            map: ColorMap::Viridis,
+            range: Range { lo: 0.0, hi: 1.0 },
+            size: PointSize::Px(3.0),
+            selected: None,
+            highlight: [1.0, 0.85, 0.1],
+        }
+    }
+}
+
+/// Twin of the struct in `shaders/points.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(super) struct PointVertex {
+    pub(super) position: [f32; 3],
+    pub(super) attribute: u32,
+}
+
+/// Twin of the struct in `shaders/points.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(super) struct PointsUniform {
+    pub(super) world_from_points: [f32; 16],
+    pub(super) color: [f32; 4],
+    pub(super) highlight: [f32; 4],
+    pub(super) lo: f32,
+    pub(super) hi: f32,
+    pub(super) size: f32,
+    pub(super) size_in_metres: u32,
+    pub(super) color_mode: u32,
+    pub(super) map: u32,
+    pub(super) stride: u32,
+    pub(super) drawn: u32,
+    pub(super) selected: u32,
+    pub(super) unused_0: u32,
+    pub(super) unused_1: u32,
+    pub(super) unused_2: u32,
+}
+
+/// A cloud on the device.
+#[derive(Debug)]
+pub(super) struct PointsData {
+    /// Revision, colour mode and number of points of what is in the buffer.
+    uploaded: (u64, u32, usize),
+    points: Elements,
+    uniform: Uniform<PointsUniform>,
+    bindings: wgpu::BindGroup,
+    instances: u32,
+}
+
+impl PointsData {
+    /// Uploads what changed since `old`. Returns whether points were uploaded, and whether numbers were.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub(super) fn update(
+        gpu: &Gpu,
+        pipelines: &Pipelines,
+        old: Option<Self>,
+        item: &CloudItem,
+        stride: u32,
+    ) -> Result<(Self, [bool; 2]), GpuError> {
+        let wanted = (item.revision, color_mode(&item.colors), item.points.len());
+        let (mut data, uploaded) = match old {
+            Some(data) if data.uploaded == wanted => (data, false),
+            old => {
+                let label = format!("Points::{}", item.name);
+                let (buffer, uniform) = old.map_or((None, None), |d| (Some(d.points.buffer), Some(d.uniform)));
+                let usage = wgpu::BufferUsages::STORAGE;
+                let points = Elements::upload(gpu, &label, &vertices(item), usage, buffer)?;
+                let uniform = uniform.unwrap_or_else(|| Uniform::new(gpu, &label));
+                let bindings = pipelines.bind(gpu, &label, &uniform.buffer, Some(&points.buffer));
+                (Self { uploaded: wanted, points, uniform, bindings, instances: 0 }, true)
+            }
+        };
+        let count = data.points.count;
+        let stride = stride.max(1);
+        let drawn = count.div_ceil(stride);
+        let selected = item.style.selected.and_then(|i| u32::try_from(i).ok()).filter(|i| *i < count);
+        data.instances = drawn + u32::from(selected.is_some());
+        let written = data.uniform.set(gpu, uniform(&item.style, wanted.1, stride, drawn, selected));
+        Ok((data, [uploaded, written]))
+    }
+
+    /// Draws with the view bound to group 0.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_bind_group(1, &self.bindings, &[]);
+        pass.draw(0..6, 0..self.instances);
+    }
+}
+
+/// The number of the mode in the shader.
+fn color_mode(colors: &PointColors) -> u32 {
+    match colors {
+        PointColors::PerPoint(_) => 0,
+        PointColors::Scalar(_) => 1,
+        PointColors::One => 2,
+    }
+}
+
+/// The points as the shader reads them.
+fn vertices(item: &CloudItem) -> Vec<PointVertex> {
+    let nan = NAN_COLOR.map(|c| (c * 255.0 + 0.5) as u8);
+    let attribute = |i: usize| match &item.colors {
+        PointColors::One => 0,
+        PointColors::PerPoint(colors) => {
+            let [r, g, b] = colors.get(i).copied().unwrap_or(nan);
+            u32::from_le_bytes([r, g, b, 255])
+        }
+        PointColors::Scalar(values) => values.get(i).copied().unwrap_or(f32::NAN).to_bits(),
+    };
+    let vertex = |(i, p): (usize, &DVec3)| PointVertex { position: view::position(*p), attribute: attribute(i) };
+    item.points.iter().enumerate().map(vertex).collect()
+}
+
+/// The numbers that go with a cloud.
+fn uniform(style: &CloudStyle, color_mode: u32, stride: u32, drawn: u32, selected: Option<u32>) -> PointsUniform {
+    let (size, size_in_metres) = match style.size {
+        PointSize::Px(px) => (px, 0),
+        PointSize::Metres(m) => (m, 1),
+    };
+    let opaque = |[r, g, b]: [f32; 3]| [r, g, b, 1.0];
+    // An empty or infinite range shows the middle colour, as on the CPU.
+    let sound = (style.range.hi - style.range.lo).is_finite();
+    let range = if sound { style.range } else { Range { lo: 0.0, hi: 0.0 } };
+    PointsUniform {
+        world_from_points: view::matrix(&style.world_from_points),
+        color: opaque(style.color),
+        highlight: opaque(style.highlight),
+        lo: range.lo,
+        hi: range.hi,
+        size: if size.is_finite() { size } else { 1.0 },
+        size_in_metres,
+        color_mode,
+        map: style.map as u32,
+        stride,
+        drawn,
+        selected: selected.unwrap_or(u32::MAX),
+        unused_0: 0,
+        unused_1: 0,
+        unused_2: 0,
+    }
+}

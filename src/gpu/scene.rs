@@ -1,0 +1,249 @@
+//! A scene, and the renderer of one view of it.
+//!
+//! Draw order: lines, opaque meshes, points, translucent meshes, x-ray meshes, overlay lines.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::buffer::Uniform;
+use super::lines::{LinesData, LinesItem};
+use super::mesh::{Look, MeshData, MeshItem};
+use super::pipelines::Pipelines;
+use super::points::{CloudItem, PointsData};
+use super::target::Target;
+use super::view::{Camera, ViewUniform};
+use super::{Gpu, GpuError, wgpu};
+
+/// Everything that one view shows. Cheap to make anew for every frame: the geometry is shared.
+#[derive(Clone, Debug)]
+pub struct SceneData {
+    /// sRGB, 0..1.
+    pub background: [f32; 3],
+    /// Point clouds, with different names.
+    pub clouds: Vec<CloudItem>,
+    /// Meshes, with different names.
+    pub meshes: Vec<MeshItem>,
+    /// Lines, with different names.
+    pub lines: Vec<LinesItem>,
+    /// The camera is being moved: only so many points are drawn as [`SceneRenderer::moving_points`] allows.
+    pub moving: bool,
+}
+
+impl Default for SceneData {
+    fn default() -> Self {
+        Self { background: [0.1, 0.11, 0.13], clouds: vec![], meshes: vec![], lines: vec![], moving: false }
+    }
+}
+
+impl SceneData {
+    /// The box around all finite points and meshes in the world, for [`Camera::fit`]; `None` if there are none.
+    /// Walks all geometry: call it when a person asks, not at every frame.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let points =
+            self.clouds.iter().flat_map(|c| c.points.iter().map(|p| c.style.world_from_points.transform_point3(*p)));
+        let corners = self
+            .meshes
+            .iter()
+            .flat_map(|m| m.mesh.vertices.iter().map(|p| m.style.world_from_mesh.transform_point3(*p)));
+        points.chain(corners).filter(|p| p.is_finite()).fold(None, |bounds, p| {
+            let [lo, hi] = bounds.unwrap_or([p, p]);
+            Some([lo.min(p), hi.max(p)])
+        })
+    }
+}
+
+/// What a renderer has done since it was made: proof that nothing is done twice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Geometry sent to the device, items.
+    pub uploads: u64,
+    /// Small blocks of numbers (camera, pose, colours) sent to the device.
+    pub uniforms: u64,
+    /// Pictures drawn.
+    pub renders: u64,
+}
+
+/// Draws one view. Every view has its own.
+#[derive(Debug)]
+pub struct SceneRenderer {
+    /// Points drawn while the camera moves, over all clouds: every n-th, so that orbiting stays smooth.
+    pub moving_points: u32,
+    pipelines: Arc<Pipelines>,
+    view: Uniform<ViewUniform>,
+    view_bindings: wgpu::BindGroup,
+    clouds: BTreeMap<String, PointsData>,
+    meshes: BTreeMap<String, MeshData>,
+    lines: BTreeMap<String, LinesData>,
+    shown: Option<Shown>,
+    counters: Counters,
+}
+
+/// What the picture was drawn from, apart from the contents of the buffers.
+#[derive(Clone, Debug, PartialEq)]
+struct Shown {
+    target: u64,
+    background: [f32; 3],
+    order: Vec<(Layer, String)>,
+}
+
+/// When an item is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Layer {
+    Lines,
+    OpaqueMesh,
+    Points,
+    TranslucentMesh,
+    XRayMesh,
+    OverlayLines,
+}
+
+impl SceneRenderer {
+    /// A renderer that has drawn nothing yet.
+    ///
+    /// # Errors
+    /// [`GpuError::Device`].
+    pub fn new(gpu: &Gpu, pipelines: Arc<Pipelines>) -> Result<Self, GpuError> {
+        gpu.guarded("preparing a 3D view", || {
+            let view = Uniform::new(gpu, "Scene::view");
+            let view_bindings = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("Scene::view"),
+                layout: &pipelines.view_layout,
+                entries: &[wgpu::BindGroupEntry { binding: 0, resource: view.buffer.as_entire_binding() }],
+            });
+            Ok(Self {
+                moving_points: 60_000,
+                pipelines,
+                view,
+                view_bindings,
+                clouds: BTreeMap::new(),
+                meshes: BTreeMap::new(),
+                lines: BTreeMap::new(),
+                shown: None,
+                counters: Counters::default(),
+            })
+        })
+    }
+
+    /// What was done so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// Brings the picture in `target` up to date; returns whether it had to be drawn.
+    ///
+    /// Does nothing at all if scene, camera and target are as they were at the last call. A target must not be drawn
+    /// into by two renderers.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] and [`GpuError::Device`]; the next call starts afresh.
+    pub fn render(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, target: &Target) -> Result<bool, GpuError> {
+        let before = self.shown.take();
+        let result = gpu.guarded("drawing a 3D view", || {
+            let changed = self.update(gpu, scene, camera, target.size())?;
+            let shown = Shown { target: target.generation(), background: scene.background, order: order(scene) };
+            let draw = changed || before.as_ref() != Some(&shown);
+            if draw {
+                self.draw(gpu, &shown, target);
+            }
+            Ok((shown, draw))
+        });
+        match result {
+            Ok((shown, drawn)) => {
+                self.shown = Some(shown);
+                Ok(drawn)
+            }
+            Err(error) => {
+                // Buffers may not hold what their revision says.
+                self.clouds.clear();
+                self.meshes.clear();
+                self.lines.clear();
+                Err(error)
+            }
+        }
+    }
+
+    /// Sends what changed; returns whether anything did.
+    fn update(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, size: [u32; 2]) -> Result<bool, GpuError> {
+        let mut done =
+            Counters { uniforms: u64::from(self.view.set(gpu, camera.uniform(size))), ..Counters::default() };
+        let mut count = |[uploaded, written]: [bool; 2]| {
+            done.uploads += u64::from(uploaded);
+            done.uniforms += u64::from(written);
+        };
+        let total: usize = scene.clouds.iter().map(|c| c.points.len()).sum();
+        let stride = match scene.moving {
+            true => u32::try_from(total.div_ceil(self.moving_points.max(1) as usize)).unwrap_or(u32::MAX),
+            false => 1,
+        };
+        // Each list is rebuilt from the old one, so that what is no longer shown is freed.
+        let mut old = std::mem::take(&mut self.clouds);
+        for item in &scene.clouds {
+            let (data, did) = PointsData::update(gpu, &self.pipelines, old.remove(&item.name), item, stride)?;
+            count(did);
+            self.clouds.insert(item.name.clone(), data);
+        }
+        let mut old = std::mem::take(&mut self.meshes);
+        for item in &scene.meshes {
+            let (data, did) = MeshData::update(gpu, &self.pipelines, old.remove(&item.name), item)?;
+            count(did);
+            self.meshes.insert(item.name.clone(), data);
+        }
+        let mut old = std::mem::take(&mut self.lines);
+        for item in &scene.lines {
+            let (data, did) = LinesData::update(gpu, &self.pipelines, old.remove(&item.name), item)?;
+            count(did);
+            self.lines.insert(item.name.clone(), data);
+        }
+        self.counters.uploads += done.uploads;
+        self.counters.uniforms += done.uniforms;
+        Ok(done != Counters::default())
+    }
+
+    /// Draws the picture.
+    fn draw(&mut self, gpu: &Gpu, shown: &Shown, target: &Target) {
+        let label = Some("Scene::encoder");
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
+        {
+            let mut pass = target.begin(&mut encoder, shown.background);
+            pass.set_bind_group(0, &self.view_bindings, &[]);
+            for (layer, name) in &shown.order {
+                pass.set_pipeline(match layer {
+                    Layer::Lines => &self.pipelines.lines,
+                    Layer::OpaqueMesh | Layer::TranslucentMesh => &self.pipelines.mesh_solid,
+                    Layer::Points => &self.pipelines.points,
+                    Layer::XRayMesh => &self.pipelines.mesh_xray,
+                    Layer::OverlayLines => &self.pipelines.lines_overlay,
+                });
+                match layer {
+                    Layer::Lines | Layer::OverlayLines => self.lines.get(name).map(|d| d.draw(&mut pass)),
+                    Layer::Points => self.clouds.get(name).map(|d| d.draw(&mut pass)),
+                    _ => self.meshes.get(name).map(|d| d.draw(&mut pass)),
+                };
+            }
+        }
+        gpu.queue.submit([encoder.finish()]);
+        self.counters.renders += 1;
+    }
+}
+
+/// All items of a scene in the order in which they are drawn; items of one layer keep the order of their list.
+fn order(scene: &SceneData) -> Vec<(Layer, String)> {
+    let lines = scene.lines.iter().map(|l| {
+        let layer = if l.style.overlay { Layer::OverlayLines } else { Layer::Lines };
+        (layer, l.name.clone())
+    });
+    let meshes = scene.meshes.iter().map(|m| {
+        let layer = match m.style.look {
+            Look::XRay => Layer::XRayMesh,
+            Look::Solid if m.style.opacity < 1.0 => Layer::TranslucentMesh,
+            Look::Solid => Layer::OpaqueMesh,
+        };
+        (layer, m.name.clone())
+    });
+    let clouds = scene.clouds.iter().map(|c| (Layer::Points, c.name.clone()));
+    let mut all: Vec<_> = lines.chain(meshes).chain(clouds).collect();
+    all.sort_by_key(|(layer, _)| *layer);
+    all
+}

@@ -1,0 +1,181 @@
+//! An off-screen picture with its own depth: what a 3D view draws into and the window shows as an image.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::{Gpu, GpuError, wgpu};
+
+/// sRGB-encoded bytes behind a plain format: the window toolkit samples its images so, and blends so.
+pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+/// Depth is reversed (1 near, 0 far), which spreads the precision of a float evenly.
+pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Colour (multisampled where possible), its resolved picture and depth, in physical pixels.
+#[derive(Debug)]
+pub struct Target {
+    size: [u32; 2],
+    generation: u64,
+    resolved: wgpu::Texture,
+    resolved_view: wgpu::TextureView,
+    multisampled: Option<wgpu::TextureView>,
+    depth: wgpu::TextureView,
+}
+
+impl Target {
+    /// A target of `size` pixels (width, height); sizes that the device cannot hold are brought into its range.
+    ///
+    /// # Errors
+    /// [`GpuError::Device`], for one if there is no memory for it.
+    pub fn new(gpu: &Gpu, size: [u32; 2]) -> Result<Self, GpuError> {
+        static GENERATION: AtomicU64 = AtomicU64::new(0);
+        let size = Self::possible(gpu, size);
+        gpu.guarded("creating the off-screen picture", || {
+            let texture = |label, format, samples, usage| {
+                gpu.device.create_texture(&wgpu::TextureDescriptor {
+                    label: Some(label),
+                    size: extent(size),
+                    mip_level_count: 1,
+                    sample_count: samples,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage,
+                    view_formats: &[],
+                })
+            };
+            let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
+            let shown = attachment | wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
+            let view = |t: wgpu::Texture| t.create_view(&wgpu::TextureViewDescriptor::default());
+            let resolved = texture("Target::resolved", COLOR_FORMAT, 1, shown);
+            let resolved_view = view(resolved.clone());
+            let multisampled =
+                (gpu.samples > 1).then(|| view(texture("Target::multisampled", COLOR_FORMAT, gpu.samples, attachment)));
+            let depth = view(texture("Target::depth", DEPTH_FORMAT, gpu.samples, attachment));
+            let generation = GENERATION.fetch_add(1, Ordering::Relaxed);
+            Ok(Self { size, generation, resolved, resolved_view, multisampled, depth })
+        })
+    }
+
+    /// Makes the target `size` pixels large; does nothing if it is already. Returns whether the texture is a new one,
+    /// so that it has to be registered again where it is shown.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; the old target stays.
+    pub fn resize(&mut self, gpu: &Gpu, size: [u32; 2]) -> Result<bool, GpuError> {
+        if Self::possible(gpu, size) == self.size {
+            return Ok(false);
+        }
+        *self = Self::new(gpu, size)?;
+        Ok(true)
+    }
+
+    /// Width and height, pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Tells two targets, and a target before and after a change of size, apart.
+    pub fn generation(&self) -> u64 {
+        self.generation
+    }
+
+    /// The finished picture, for sampling: sRGB-encoded, opaque.
+    pub fn view(&self) -> &wgpu::TextureView {
+        &self.resolved_view
+    }
+
+    /// Starts a pass that clears everything to `background` (sRGB).
+    pub(super) fn begin<'e>(
+        &self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        background: [f32; 3],
+    ) -> wgpu::RenderPass<'e> {
+        let [r, g, b] = background.map(f64::from);
+        let (view, resolve_target, store) = match &self.multisampled {
+            // The samples are not needed once they are resolved.
+            Some(samples) => (samples, Some(&self.resolved_view), wgpu::StoreOp::Discard),
+            None => (&self.resolved_view, None, wgpu::StoreOp::Store),
+        };
+        encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("Scene::pass"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view,
+                depth_slice: None,
+                resolve_target,
+                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth,
+                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Discard }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        })
+    }
+
+    /// Waits for the picture and copies it to memory, for tests and screenshots.
+    ///
+    /// # Errors
+    /// [`GpuError::Device`].
+    pub fn read(&self, gpu: &Gpu) -> Result<Picture, GpuError> {
+        const WHAT: &str = "reading the picture back";
+        let failed = |reason: String| GpuError::Device { what: WHAT.to_owned(), reason };
+        let [width, height] = self.size;
+        let row = width * 4;
+        let padded = row.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+        let buffer = gpu.guarded(WHAT, || {
+            let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("Target::read"),
+                size: u64::from(padded) * u64::from(height),
+                usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+                mapped_at_creation: false,
+            });
+            let mut encoder =
+                gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("Target::read") });
+            let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: None };
+            encoder.copy_texture_to_buffer(
+                self.resolved.as_image_copy(),
+                wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+                extent(self.size),
+            );
+            gpu.queue.submit([encoder.finish()]);
+            Ok(buffer)
+        })?;
+        let (send, receive) = std::sync::mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+            // The receiver lives until the answer is there.
+            send.send(result).unwrap_or_default();
+        });
+        gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(e.to_string()))?;
+        receive.recv().map_err(|e| failed(e.to_string()))?.map_err(|e| failed(e.to_string()))?;
+        let bytes = buffer.get_mapped_range(..).map_err(|e| failed(e.to_string()))?;
+        let rgba = bytes.chunks_exact(padded as usize).flat_map(|r| &r[..row as usize]).copied().collect();
+        Ok(Picture { size: self.size, rgba })
+    }
+
+    /// The nearest size that the device can hold.
+    fn possible(gpu: &Gpu, size: [u32; 2]) -> [u32; 2] {
+        size.map(|s| s.clamp(1, gpu.device.limits().max_texture_dimension_2d))
+    }
+}
+
+/// A picture in memory.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// sRGB and alpha, four bytes per pixel, row by row from the top.
+    pub rgba: Vec<u8>,
+}
+
+impl Picture {
+    /// The colour of a pixel; `None` outside.
+    pub fn rgb(&self, x: u32, y: u32) -> Option<[u8; 3]> {
+        let [width, height] = self.size;
+        let start = (y as usize * width as usize + x as usize) * 4;
+        (x < width && y < height).then(|| [self.rgba[start], self.rgba[start + 1], self.rgba[start + 2]])
+    }
+}
+
+/// `size` for the device.
+fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
+    wgpu::Extent3d { width, height, depth_or_array_layers: 1 }
+}

@@ -1,0 +1,409 @@
+//! The camera, and the only place where f64 metres become the f32 of the device.
+//!
+//! World = the grasp frame (see [`crate::domain::frames`]): x = closing axis with the left finger at negative x,
+//! +z = the direction the tool points, y = lateral. On screen the wrist is up (-z), so the tool hangs down.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, DMat4, DVec2, DVec3, DVec4, Vec3};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, PI};
+
+/// Up on the screen, in world coordinates.
+const UP: DVec3 = DVec3::NEG_Z;
+/// Distances that make sense for things between a hair and a room, metres.
+const DISTANCE: std::ops::RangeInclusive<f64> = 1e-4..=100.0;
+/// x of a point that is not finite; see `is_hidden` in `shaders/common/view.wgsl`.
+pub(super) const HIDDEN: f32 = f32::MAX;
+
+/// The sides from which the lab draws a grasp.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, strum::EnumIter)]
+pub enum Preset {
+    /// From the left finger (negative x) along the closing axis.
+    Left,
+    /// From the right finger (positive x) along the closing axis.
+    Right,
+    /// Along the lateral axis, with the left finger on the left.
+    Front,
+    /// From the wrist down the tool, with the left finger on the left.
+    Top,
+}
+
+impl Preset {
+    /// `Left`, `Right`, `Front`, `Top`: for buttons.
+    pub fn name(self) -> &'static str {
+        ["Left", "Right", "Front", "Top"][self as usize]
+    }
+
+    /// Yaw and pitch, radians.
+    fn angles(self) -> (f64, f64) {
+        match self {
+            Self::Left => (PI, 0.0),
+            Self::Right => (0.0, 0.0),
+            Self::Front => (FRAC_PI_2, 0.0),
+            Self::Top => (FRAC_PI_2, FRAC_PI_2),
+        }
+    }
+}
+
+/// A half line in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts, metres.
+    pub origin: DVec3,
+    /// Unit vector into the scene.
+    pub direction: DVec3,
+}
+
+impl Ray {
+    /// Where it meets the plane through `point` with `normal`; `None` if it is parallel or points away.
+    pub fn meets_plane(&self, point: DVec3, normal: DVec3) -> Option<DVec3> {
+        let along = self.direction.dot(normal);
+        let t = (point - self.origin).dot(normal) / along;
+        (along.abs() > 1e-12 && t >= 0.0).then(|| self.origin + self.direction * t)
+    }
+}
+
+/// A camera that looks at `target` from `distance`. Plain numbers, so that views can be linked and stored.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Camera {
+    /// The point in the middle of the screen, metres, world.
+    pub target: DVec3,
+    /// From the eye to the target, metres.
+    pub distance: f64,
+    /// Direction of the eye seen from the target, radians about the vertical; 0 = positive x, growing towards y.
+    pub yaw_rad: f64,
+    /// Elevation of the eye over the horizontal plane, radians in -π/2..π/2; positive = from the wrist's side.
+    pub pitch_rad: f64,
+    /// Vertical angle of view, radians.
+    pub fov_rad: f64,
+    /// Parallel projection of the same size at the target: lengths on the screen can be compared.
+    pub orthographic: bool,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Self { target: DVec3::ZERO, distance: 0.15, yaw_rad: 0.9, pitch_rad: 0.35, fov_rad: 0.6, orthographic: false }
+    }
+}
+
+impl Camera {
+    /// The unit vectors right, up and towards the eye, in world coordinates.
+    pub fn axes(&self) -> [DVec3; 3] {
+        let (sy, cy) = self.yaw_rad.sin_cos();
+        let (sp, cp) = self.pitch_rad.sin_cos();
+        let back = DVec3::new(cp * cy, cp * sy, 0.0) + UP * sp;
+        // From the yaw alone, so that looking straight down is no special case.
+        let right = DVec3::new(sy, -cy, 0.0);
+        [right, back.cross(right), back]
+    }
+
+    /// Where the eye is, metres, world.
+    pub fn eye(&self) -> DVec3 {
+        self.target + self.axes()[2] * self.distance
+    }
+
+    /// Turns by a drag of `px` pixels (y down): the scene follows the pointer.
+    pub fn orbit(&mut self, px: DVec2) {
+        const RAD_PER_PX: f64 = 0.008;
+        self.yaw_rad = (self.yaw_rad + px.x * RAD_PER_PX).rem_euclid(2.0 * PI);
+        self.pitch_rad = (self.pitch_rad + px.y * RAD_PER_PX).clamp(-FRAC_PI_2, FRAC_PI_2);
+    }
+
+    /// Moves by a drag of `px` pixels (y down) in a view of `size` pixels: the target's plane follows the pointer.
+    pub fn pan(&mut self, px: DVec2, size: [u32; 2]) {
+        let [right, up, _] = self.axes();
+        self.target += (up * px.y - right * px.x) / self.px_per_m(size);
+    }
+
+    /// Divides the distance by `factor` (> 1 = closer); what is under `anchor` (pixels) stays there if given.
+    pub fn zoom(&mut self, factor: f64, anchor: Option<DVec2>, size: [u32; 2]) {
+        if !(factor.is_finite() && factor > 0.0) {
+            return;
+        }
+        let old = self.distance;
+        let fixed = anchor.and_then(|px| self.ray(px, size).meets_plane(self.target, self.axes()[2]));
+        self.distance = (old / factor).clamp(*DISTANCE.start(), *DISTANCE.end());
+        if let Some(fixed) = fixed {
+            self.target = fixed + (self.target - fixed) * (self.distance / old);
+        }
+    }
+
+    /// Turns to a side; target and distance stay.
+    pub fn look_from(&mut self, preset: Preset) {
+        (self.yaw_rad, self.pitch_rad) = preset.angles();
+    }
+
+    /// Moves so that the box `[smallest, largest]` (metres, world) fills the view from the present side. Does
+    /// nothing for a box that is not finite.
+    pub fn fit(&mut self, bounds: [DVec3; 2], size: [u32; 2]) {
+        let [lo, hi] = bounds;
+        let radius = 0.5 * (hi - lo).length();
+        if !(lo.is_finite() && hi.is_finite() && radius.is_finite()) {
+            return;
+        }
+        self.target = 0.5 * (lo + hi);
+        let aspect = aspect(size);
+        let half = (0.5 * self.fov_rad).tan() * aspect.min(1.0);
+        let angle = half.atan();
+        self.distance = (radius.max(1e-3) / angle.sin()).clamp(*DISTANCE.start(), *DISTANCE.end());
+    }
+
+    /// Whether every number is one that can be drawn with: stored state is outside data.
+    pub fn is_valid(&self) -> bool {
+        self.target.is_finite()
+            && DISTANCE.contains(&self.distance)
+            && self.yaw_rad.is_finite()
+            && self.pitch_rad.abs() <= FRAC_PI_2 + 1e-9
+            && (0.01..3.0).contains(&self.fov_rad)
+    }
+
+    /// Pixels per metre at the target.
+    pub fn px_per_m(&self, size: [u32; 2]) -> f64 {
+        0.5 * f64::from(size[1].max(1)) / ((0.5 * self.fov_rad).tan() * self.distance)
+    }
+
+    /// The matrix from world to clip coordinates (depth reversed: 1 near, 0 far).
+    pub fn clip_from_world(&self, size: [u32; 2]) -> DMat4 {
+        let [right, up, back] = self.axes();
+        let eye = self.eye();
+        let row = |axis: DVec3| axis.extend(-axis.dot(eye));
+        let [x, y, z] = [right, up, back].map(row);
+        let aspect = aspect(size);
+        let focal = 1.0 / (0.5 * self.fov_rad).tan();
+        let rows = if self.orthographic {
+            // Depth 0..1 over 40 distances to both sides of the target: parallel rays have no near side.
+            let scale = focal / self.distance;
+            let reach = 40.0 * self.distance;
+            let depth = z / (2.0 * reach) + DVec4::W * (0.5 + self.distance / (2.0 * reach));
+            [x * (scale / aspect), y * scale, depth, DVec4::W]
+        } else {
+            // Infinite far plane; nearer than 2 % of the distance is cut.
+            [x * (focal / aspect), y * focal, DVec4::W * (0.02 * self.distance), -z]
+        };
+        DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose()
+    }
+
+    /// Where a point (metres, world) appears: pixels from the upper left corner, and its distance in front of the
+    /// eye in metres. `None` behind the eye and for a point that is not finite.
+    pub fn project(&self, p_in_world: DVec3, size: [u32; 2]) -> Option<(DVec2, f64)> {
+        Projector::new(self, &DAffine3::IDENTITY, size).project(p_in_world)
+    }
+
+    /// The ray through pixel position `px` (from the upper left corner; the middle of the first pixel is 0.5, 0.5).
+    pub fn ray(&self, px: DVec2, size: [u32; 2]) -> Ray {
+        let [right, up, back] = self.axes();
+        let [width, height] = size.map(|s| f64::from(s.max(1)));
+        let half = (0.5 * self.fov_rad).tan();
+        let x = (2.0 * px.x / width - 1.0) * half * aspect(size);
+        let y = (1.0 - 2.0 * px.y / height) * half;
+        if self.orthographic {
+            Ray { origin: self.eye() + (right * x + up * y) * self.distance, direction: -back }
+        } else {
+            Ray { origin: self.eye(), direction: (right * x + up * y - back).normalize() }
+        }
+    }
+
+    /// The camera for the device.
+    pub(super) fn uniform(&self, size: [u32; 2]) -> ViewUniform {
+        let [_, up, back] = self.axes();
+        let eye = if self.orthographic { back.extend(0.0) } else { self.eye().extend(1.0) };
+        let at_one = if self.orthographic { 1.0 } else { self.distance };
+        ViewUniform {
+            clip_from_world: self.clip_from_world(size).as_mat4().to_cols_array(),
+            eye_in_world: eye.as_vec4().to_array(),
+            up_in_world: up.extend(0.0).as_vec4().to_array(),
+            size_px: size.map(|s| s.max(1) as f32),
+            px_per_m: (self.px_per_m(size) * at_one) as f32,
+            unused: 0.0,
+        }
+    }
+}
+
+/// Projects many points with one matrix.
+pub(super) struct Projector {
+    clip: DMat4,
+    size: DVec2,
+    depth_row: DVec4,
+}
+
+impl Projector {
+    /// For points in a frame that `world_from_points` maps to the world.
+    pub(super) fn new(camera: &Camera, world_from_points: &DAffine3, size: [u32; 2]) -> Self {
+        let back = camera.axes()[2];
+        let world = DMat4::from(*world_from_points);
+        let row = (-back).extend(back.dot(camera.eye()));
+        Self {
+            clip: camera.clip_from_world(size) * world,
+            size: DVec2::new(f64::from(size[0].max(1)), f64::from(size[1].max(1))),
+            depth_row: world.transpose() * row,
+        }
+    }
+
+    /// As [`Camera::project`].
+    pub(super) fn project(&self, p: DVec3) -> Option<(DVec2, f64)> {
+        let p = p.extend(1.0);
+        let clip = self.clip * p;
+        let depth = self.depth_row.dot(p);
+        let at = DVec2::new(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w) * self.size;
+        // Reversed depth: in front of the near plane means z <= w.
+        (at.is_finite() && clip.w > 0.0 && clip.z <= clip.w && clip.z >= 0.0).then_some((at, depth))
+    }
+}
+
+/// Width over height.
+fn aspect(size: [u32; 2]) -> f64 {
+    f64::from(size[0].max(1)) / f64::from(size[1].max(1))
+}
+
+/// The camera as the shaders see it; twin of the struct in `shaders/common/view.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(super) struct ViewUniform {
+    pub(super) clip_from_world: [f32; 16],
+    pub(super) eye_in_world: [f32; 4],
+    pub(super) up_in_world: [f32; 4],
+    pub(super) size_px: [f32; 2],
+    pub(super) px_per_m: f32,
+    pub(super) unused: f32,
+}
+
+/// A position for the device; one that is not finite (or not in reach of f32) becomes one that shaders leave out.
+pub(super) fn position(p: DVec3) -> [f32; 3] {
+    let q: Vec3 = p.as_vec3();
+    if q.is_finite() && q.x.abs() < 1e30 { q.to_array() } else { [HIDDEN, 0.0, 0.0] }
+}
+
+/// A transform for the device.
+pub(super) fn matrix(a: &DAffine3) -> [f32; 16] {
+    DMat4::from(*a).as_mat4().to_cols_array()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: [u32; 2] = [800, 500];
+
+    fn cameras() -> Vec<Camera> {
+        let mut out = Vec::new();
+        for orthographic in [false, true] {
+            for preset in [Preset::Left, Preset::Right, Preset::Front, Preset::Top] {
+                let mut c = Camera { orthographic, target: DVec3::new(0.01, -0.02, 0.03), ..Camera::default() };
+                out.push(c);
+                c.look_from(preset);
+                out.push(c);
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn the_ray_through_a_projected_point_meets_it() {
+        for camera in cameras() {
+            for p in [DVec3::new(0.02, 0.01, 0.0), DVec3::new(-0.01, -0.03, 0.05), camera.target] {
+                let (px, depth) = camera.project(p, SIZE).unwrap();
+                let ray = camera.ray(px, SIZE);
+                let along = (p - ray.origin).dot(ray.direction);
+                assert!((ray.origin + ray.direction * along - p).length() < 1e-12);
+                assert!((depth - (camera.eye() - p).dot(camera.axes()[2])).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn presets_show_the_sides_that_their_names_say() {
+        let on_screen = |preset, p| {
+            let mut c = Camera::default();
+            c.look_from(preset);
+            c.project(p, SIZE).unwrap().0 - DVec2::new(400.0, 250.0)
+        };
+        let tip = DVec3::new(0.0, 0.0, 0.02);
+        for preset in [Preset::Left, Preset::Right, Preset::Front] {
+            assert!(on_screen(preset, tip).y > 10.0, "the tool hangs down from {preset:?}");
+        }
+        let left_finger = DVec3::new(-0.02, 0.0, 0.0);
+        assert!(on_screen(Preset::Front, left_finger).x < -10.0);
+        assert!(on_screen(Preset::Top, left_finger).x < -10.0);
+        let eye = |preset| {
+            let mut c = Camera::default();
+            c.look_from(preset);
+            c.eye()
+        };
+        assert!(eye(Preset::Left).x < -0.1 && eye(Preset::Right).x > 0.1 && eye(Preset::Top).z < -0.1);
+        let lateral = DVec3::new(0.0, 0.01, 0.0);
+        assert!(on_screen(Preset::Left, lateral).x * on_screen(Preset::Right, lateral).x < 0.0, "they mirror");
+    }
+
+    #[test]
+    fn axes_are_right_handed_and_depth_is_reversed() {
+        for camera in cameras() {
+            let [right, up, back] = camera.axes();
+            assert!((right.cross(up) - back).length() < 1e-12);
+            assert!(up.dot(UP) >= -1e-12);
+            let m = camera.clip_from_world(SIZE);
+            let ndc = |p: DVec3| {
+                let c = m * p.extend(1.0);
+                c.z / c.w
+            };
+            let near = ndc(camera.target + back * 0.05);
+            let far = ndc(camera.target - back * 0.05);
+            assert!(1.0 > near && near > far && far > 0.0, "{near} {far}");
+        }
+    }
+
+    #[test]
+    fn fit_shows_the_whole_box_and_zoom_keeps_the_anchor() {
+        for mut camera in cameras() {
+            for size in [[800, 500], [200, 700]] {
+                let bounds = [DVec3::new(-0.01, -0.03, 0.0), DVec3::new(0.01, 0.03, 0.09)];
+                camera.fit(bounds, size);
+                for i in 0..8 {
+                    let pick = |bit: usize, axis: usize| bounds[i >> bit & 1][axis];
+                    let corner = DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2));
+                    let (px, _) = camera.project(corner, size).unwrap();
+                    assert!(px.x >= 0.0 && px.y >= 0.0 && px.x <= size[0].into() && px.y <= size[1].into(), "{px}");
+                }
+                let anchor = DVec2::new(150.0, 90.0);
+                let before = camera.ray(anchor, size).meets_plane(camera.target, camera.axes()[2]).unwrap();
+                camera.zoom(1.7, Some(anchor), size);
+                assert!((camera.project(before, size).unwrap().0 - anchor).length() < 1e-6);
+                let before = camera.target;
+                camera.pan(DVec2::new(30.0, -20.0), size);
+                let moved = camera.project(before, size).unwrap().0
+                    - DVec2::new(f64::from(size[0]) / 2.0, f64::from(size[1]) / 2.0);
+                assert!((moved - DVec2::new(30.0, -20.0)).length() < 1e-6, "{moved}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_scene_follows_an_orbiting_pointer() {
+        let mut camera = Camera::default();
+        let front = camera.target + camera.axes()[2] * 0.01;
+        let before = camera.project(front, SIZE).unwrap().0;
+        camera.orbit(DVec2::new(20.0, 10.0));
+        let moved = camera.project(front, SIZE).unwrap().0 - before;
+        assert!(moved.x > 0.0 && moved.y > 0.0, "{moved}");
+        camera.orbit(DVec2::new(0.0, 1e9));
+        assert_eq!(camera.pitch_rad, FRAC_PI_2);
+    }
+
+    #[test]
+    fn bad_input_is_refused() {
+        let camera = Camera::default();
+        assert_eq!(camera.project(DVec3::NAN, SIZE), None);
+        assert_eq!(camera.project(camera.eye() + camera.axes()[2], SIZE), None);
+        assert!(camera.is_valid());
+        assert!(!Camera { distance: f64::NAN, ..camera }.is_valid());
+        let mut same = camera;
+        same.fit([DVec3::NAN, DVec3::ONE], SIZE);
+        same.zoom(0.0, None, SIZE);
+        assert_eq!(same, camera);
+        assert_eq!(position(DVec3::new(f64::NAN, 1.0, 1.0))[0], HIDDEN);
+        assert_eq!(position(DVec3::new(1e300, 1.0, 1.0))[0], HIDDEN);
+        let json = serde_json::to_string(&camera).unwrap();
+        assert_eq!(serde_json::from_str::<Camera>(&json).unwrap(), camera);
+        assert!(camera.project(camera.target, [0, 0]).is_some());
+    }
+}
