@@ -6,7 +6,7 @@
 struct PointVertex {
     position: vec3<f32>,
     // Colour modes: 0 = a colour as rgba8, 1 = the bits of an f32, 2 = unused.
-    attribute: u32,
+    payload: u32,
 }
 
 struct PointsUniform {
@@ -75,9 +75,9 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
     if is_extra {
         out.color = cloud.highlight;
     } else if cloud.color_mode == 0u {
-        out.color = unpack4x8unorm(point.attribute);
+        out.color = unpack4x8unorm(point.payload);
     } else if cloud.color_mode == 1u {
-        out.color = vec4<f32>(scalar_color(cloud.map, point.attribute, cloud.lo, cloud.hi), 1.0);
+        out.color = vec4<f32>(scalar_color(cloud.map, point.payload, cloud.lo, cloud.hi), 1.0);
     } else {
         out.color = cloud.color;
     }

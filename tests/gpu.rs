@@ -1,1 +1,437 @@
-//! (filled by its layer)
+//! The renderer on a real or software adapter: properties of single pixels, never whole pictures.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests, too")]
+
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec2, DVec3};
+use touch2touch::domain::colormap::{ColorMap, Range};
+use touch2touch::domain::mesh::TriMesh;
+use touch2touch::gpu::lines::{LinesItem, LinesStyle, Segment};
+use touch2touch::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
+use touch2touch::gpu::pick;
+use touch2touch::gpu::pipelines::Pipelines;
+use touch2touch::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
+use touch2touch::gpu::scene::{SceneData, SceneRenderer};
+use touch2touch::gpu::target::{Picture, Target};
+use touch2touch::gpu::view::{Camera, Preset};
+use touch2touch::gpu::{Gpu, GpuError, guides, shaders};
+
+use crate::support;
+
+const SIZE: [u32; 2] = [320, 240];
+const BACKGROUND: [u8; 3] = [26, 28, 33];
+
+/// A device, or `None` with a note where there is no adapter; with `REQUIRE_GPU=1` that is a failure.
+fn gpu_or_skip() -> Option<Gpu> {
+    match Gpu::headless() {
+        Ok(gpu) => Some(gpu),
+        Err(error) if support::require("REQUIRE_GPU") => panic!("REQUIRE_GPU is set, but: {error}"),
+        Err(error) => {
+            eprintln!("GPU test left out: {error}");
+            None
+        }
+    }
+}
+
+/// One view, ready to draw.
+struct View {
+    gpu: Gpu,
+    renderer: SceneRenderer,
+    target: Target,
+    camera: Camera,
+}
+
+impl View {
+    fn new() -> Option<Self> {
+        let gpu = gpu_or_skip()?;
+        let pipelines = Arc::new(Pipelines::new(&gpu).unwrap());
+        let renderer = SceneRenderer::new(&gpu, pipelines).unwrap();
+        let target = Target::new(&gpu, SIZE).unwrap();
+        Some(Self { gpu, renderer, target, camera: Camera::default() })
+    }
+
+    fn render(&mut self, scene: &SceneData) -> bool {
+        self.renderer.render(&self.gpu, scene, &self.camera, &self.target).unwrap()
+    }
+
+    fn picture(&mut self, scene: &SceneData) -> Picture {
+        self.render(scene);
+        self.target.read(&self.gpu).unwrap()
+    }
+
+    /// The pixel that shows a point in the world.
+    fn pixel(&self, p: DVec3) -> [u32; 2] {
+        let (px, _) = self.camera.project(p, self.target.size()).unwrap();
+        [px.x as u32, px.y as u32]
+    }
+}
+
+fn scene() -> SceneData {
+    SceneData { background: BACKGROUND.map(|b| f32::from(b) / 255.0), ..SceneData::default() }
+}
+
+fn cloud(points: &[DVec3], colors: &[[u8; 3]], size: PointSize) -> CloudItem {
+    CloudItem {
+        name: "cloud".into(),
+        revision: 0,
+        points: points.into(),
+        colors: PointColors::PerPoint(colors.into()),
+        style: CloudStyle { size, ..CloudStyle::default() },
+    }
+}
+
+/// A square of side `2 * half` in the plane through `centre` that faces `normal`.
+fn square(centre: DVec3, normal: DVec3, half: f64) -> TriMesh {
+    let (u, v) = normal.any_orthonormal_pair();
+    let corner = |a: f64, b: f64| centre + (u * a + v * b) * half;
+    TriMesh {
+        vertices: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    }
+}
+
+fn mesh_item(mesh: TriMesh, style: MeshStyle) -> MeshItem {
+    MeshItem { name: "mesh".into(), revision: 0, mesh: Arc::new(mesh), shading: Shading::Flat, style }
+}
+
+/// Pixels that are not background.
+fn inked(picture: &Picture) -> Vec<[u32; 2]> {
+    let [w, h] = picture.size;
+    let all = (0..h).flat_map(|y| (0..w).map(move |x| [x, y]));
+    all.filter(|[x, y]| picture.rgb(*x, *y) != Some(BACKGROUND)).collect()
+}
+
+#[test]
+fn a_point_appears_at_its_pixel_in_its_colour_and_size() {
+    let Some(mut view) = View::new() else { return };
+    for orthographic in [false, true] {
+        for preset in [None, Some(Preset::Left), Some(Preset::Top)] {
+            view.camera = Camera { orthographic, ..Camera::default() };
+            if let Some(preset) = preset {
+                view.camera.look_from(preset);
+            }
+            let world_from_points = DAffine3::from_translation(DVec3::new(0.001, 0.008, -0.006));
+            let p = DVec3::new(0.004, 0.003, 0.002);
+            let mut item = cloud(&[DVec3::NAN, p], &[[255, 0, 0], [10, 200, 90]], PointSize::Px(9.0));
+            item.revision = u64::from(orthographic) * 10 + preset.map_or(0, |p| 1 + p as u64);
+            item.style.world_from_points = world_from_points;
+            let picture = view.picture(&SceneData { clouds: vec![item], ..scene() });
+            let (at, _) = view.camera.project(world_from_points.transform_point3(p), SIZE).unwrap();
+            assert_eq!(picture.rgb(at.x as u32, at.y as u32), Some([10, 200, 90]));
+            let ink = inked(&picture);
+            // A disc of 9 px has 63.6 px; multisampling and its rim give or take a ring of pixels.
+            assert!((50..=90).contains(&ink.len()), "{}", ink.len());
+            let centre = ink.iter().fold(DVec2::ZERO, |s, [x, y]| s + DVec2::new(f64::from(*x), f64::from(*y)));
+            let centre = centre / ink.len() as f64 + 0.5;
+            assert!((centre - at).length() < 0.6, "{centre} for {at}");
+        }
+    }
+}
+
+#[test]
+fn size_in_metres_shrinks_with_distance() {
+    let Some(mut view) = View::new() else { return };
+    let scene = SceneData { clouds: vec![cloud(&[DVec3::ZERO], &[[255; 3]], PointSize::Metres(0.01))], ..scene() };
+    for distance in [0.1, 0.2] {
+        view.camera.distance = distance;
+        let diameter = 0.01 * view.camera.px_per_m(SIZE);
+        let want = std::f64::consts::FRAC_PI_4 * diameter * diameter;
+        let got = inked(&view.picture(&scene)).len() as f64;
+        // Half a pixel of rim all around.
+        assert!((got - want).abs() < 2.0 * diameter + 4.0, "{got} for {want}");
+    }
+}
+
+#[test]
+fn the_near_disc_hides_the_far_one_in_either_order() {
+    let Some(mut view) = View::new() else { return };
+    let back = view.camera.axes()[2];
+    let (near, far) = (back * 0.01, back * -0.01);
+    for (revision, order) in [[near, far], [far, near]].into_iter().enumerate() {
+        let colors = order.map(|p| if p == near { [0, 255, 0] } else { [255, 0, 0] });
+        let mut item = cloud(&order, &colors, PointSize::Px(11.0));
+        item.revision = revision as u64;
+        let picture = view.picture(&SceneData { clouds: vec![item], ..scene() });
+        let [x, y] = view.pixel(near);
+        assert_eq!(picture.rgb(x, y), Some([0, 255, 0]));
+    }
+}
+
+#[test]
+fn a_solid_mesh_hides_what_is_behind_and_an_xray_does_not() {
+    let Some(mut view) = View::new() else { return };
+    let back = view.camera.axes()[2];
+    let behind = cloud(&[back * -0.01], &[[255, 0, 0]], PointSize::Px(9.0));
+    let before = cloud(&[back * 0.01], &[[255, 0, 0]], PointSize::Px(9.0));
+    let style = MeshStyle { color: [0.2, 0.4, 0.9], ..MeshStyle::default() };
+    let wall = mesh_item(square(DVec3::ZERO, back, 0.02), style);
+    let [x, y] = view.pixel(DVec3::ZERO);
+    let look = |view: &mut View, cloud: &CloudItem, revision, mesh: MeshItem| {
+        let clouds = vec![CloudItem { revision, ..cloud.clone() }];
+        view.picture(&SceneData { clouds, meshes: vec![mesh], ..scene() }).rgb(x, y).unwrap()
+    };
+    let [r, g, b] = look(&mut view, &behind, 1, wall.clone());
+    assert!(b > 150 && r < 80 && g < b, "the wall: {r} {g} {b}");
+    assert_eq!(look(&mut view, &before, 2, wall.clone()), [255, 0, 0]);
+    let xray = MeshItem { style: MeshStyle { opacity: 0.3, look: Look::XRay, ..style }, ..wall.clone() };
+    let [r, _, b] = look(&mut view, &behind, 3, xray.clone());
+    assert!(r > 150 && b > 20, "the point through the wall: {r} {b}");
+    let half = MeshItem { style: MeshStyle { opacity: 0.5, ..style }, ..wall.clone() };
+    let [r, _, b] = look(&mut view, &behind, 4, half);
+    assert!((90..170).contains(&r) && b > 60, "tinted: {r} {b}");
+    // Moved away by its pose alone.
+    let moved = MeshStyle { world_from_mesh: DAffine3::from_translation(back * -0.05), ..style };
+    assert_eq!(look(&mut view, &behind, 5, MeshItem { style: moved, ..wall }), [255, 0, 0]);
+}
+
+#[test]
+fn faces_that_turn_away_are_darker() {
+    let Some(mut view) = View::new() else { return };
+    let [right, _, back] = view.camera.axes();
+    let mut bright = |normal: DVec3, revision| {
+        let style = MeshStyle { color: [0.8; 3], ..MeshStyle::default() };
+        let item = MeshItem { revision, ..mesh_item(square(DVec3::ZERO, normal, 0.02), style) };
+        let [x, y] = view.pixel(DVec3::ZERO);
+        view.picture(&SceneData { meshes: vec![item], ..scene() }).rgb(x, y).unwrap()[0]
+    };
+    let facing = bright(back, 1);
+    let away = bright(-back, 2);
+    let oblique = bright((back + right * 1.5).normalize(), 3);
+    assert_eq!(facing, away, "both sides are lit alike");
+    assert!(facing > oblique + 20, "{facing} {oblique}");
+}
+
+#[test]
+fn grid_axes_and_scale_bar_are_where_they_belong() {
+    let Some(mut view) = View::new() else { return };
+    let lines = |name: &str, segments: Vec<Segment>, overlay| LinesItem {
+        name: name.into(),
+        revision: 0,
+        segments: segments.into(),
+        style: LinesStyle { width_px: 3.0, overlay, ..LinesStyle::default() },
+    };
+    let floor = DVec3::new(0.0, 0.0, 0.02);
+    let bar_start = DVec3::new(-0.02, 0.02, 0.0);
+    let mut scene = SceneData {
+        lines: vec![
+            lines("grid", guides::grid(floor, [DVec3::X, DVec3::Y], 0.01, 2, [200; 3]), false),
+            lines("axes", guides::axes(DVec3::ZERO, 0.02), false),
+            lines("bar", guides::scale_bar(bar_start, DVec3::X, DVec3::Z, 0.01, [255; 4]), false),
+        ],
+        ..scene()
+    };
+    let picture = view.picture(&scene);
+    for axis in 0..3 {
+        let [x, y] = view.pixel(DVec3::AXES[axis] * 0.01);
+        let [r, g, b, _] = guides::AXIS_COLORS[axis];
+        assert_eq!(picture.rgb(x, y), Some([r, g, b]));
+    }
+    for p in [DVec3::new(0.013, 0.01, 0.02), DVec3::new(-0.02, -0.007, 0.02)] {
+        let [x, y] = view.pixel(p);
+        assert_ne!(picture.rgb(x, y), Some(BACKGROUND), "a grid line");
+    }
+    let [x, y] = view.pixel(DVec3::new(0.015, 0.005, 0.02));
+    assert_eq!(picture.rgb(x, y), Some(BACKGROUND), "inside a cell");
+    let [x, y] = view.pixel(bar_start + DVec3::X * 0.005);
+    assert_eq!(picture.rgb(x, y), Some([255; 3]));
+    // Lines hide behind a mesh, overlay lines do not.
+    let back = view.camera.axes()[2];
+    scene.meshes =
+        vec![mesh_item(square(back * 0.04, back, 0.01), MeshStyle { color: [0.0; 3], ..Default::default() })];
+    let at = |picture: &Picture, p| {
+        let [x, y] = view.camera.project(p, SIZE).map(|(px, _)| [px.x as u32, px.y as u32]).unwrap();
+        picture.rgb(x, y).unwrap()
+    };
+    let x_axis = DVec3::X * 0.004;
+    view.renderer.render(&view.gpu, &scene, &view.camera, &view.target).unwrap();
+    assert_eq!(at(&view.target.read(&view.gpu).unwrap(), x_axis), [0; 3]);
+    scene.lines[1].style.overlay = true;
+    view.renderer.render(&view.gpu, &scene, &view.camera, &view.target).unwrap();
+    assert_eq!(at(&view.target.read(&view.gpu).unwrap(), x_axis), [226, 88, 80]);
+}
+
+#[test]
+fn a_line_that_passes_the_eye_is_cut_not_lost() {
+    let Some(mut view) = View::new() else { return };
+    let [_, up, back] = view.camera.axes();
+    // From the middle of the picture past the eye, a little below it.
+    let ends = [DVec3::ZERO, back * 0.5 - up * 0.02];
+    let item = LinesItem {
+        name: "line".into(),
+        revision: 0,
+        segments: vec![
+            Segment { ends, rgba: [255, 255, 0, 255] },
+            Segment { ends: [DVec3::NAN, DVec3::ZERO], rgba: [255; 4] },
+        ]
+        .into(),
+        style: LinesStyle { width_px: 3.0, ..LinesStyle::default() },
+    };
+    let picture = view.picture(&SceneData { lines: vec![item], ..scene() });
+    let column: Vec<bool> = (0..SIZE[1]).map(|y| picture.rgb(SIZE[0] / 2, y) != Some(BACKGROUND)).collect();
+    assert!(column[122..].iter().all(|on| *on), "from the middle to the lower edge");
+    assert!(!column[..117].iter().any(|on| *on), "nothing above the middle");
+}
+
+#[test]
+fn the_colour_maps_of_gpu_and_cpu_are_the_same() {
+    let Some(mut view) = View::new() else { return };
+    view.camera.orthographic = true;
+    view.camera.look_from(Preset::Front);
+    let mut values: Vec<f32> = (0..=60).map(|i| -0.02 + 0.04 * i as f32 / 60.0).collect();
+    values.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 1.0]);
+    let place = |i: usize| {
+        let [column, row] = [i % 10, i / 10].map(|n| n as f64);
+        DVec3::new((column - 4.5) * 0.004, 0.0, (row - 3.0) * 0.004)
+    };
+    let points: Arc<[DVec3]> = (0..values.len()).map(place).collect();
+    for (revision, (map, range)) in [
+        (ColorMap::Viridis, Range { lo: -0.02, hi: 0.02 }),
+        (ColorMap::Diverging, Range::symmetric(0.015)),
+        (ColorMap::Gray, Range { lo: -0.01, hi: 0.02 }),
+        (ColorMap::Viridis, Range { lo: 0.01, hi: 0.01 }),
+        (ColorMap::Viridis, Range { lo: f32::NAN, hi: 0.01 }),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let item = CloudItem {
+            name: "scale".into(),
+            revision: revision as u64,
+            points: points.clone(),
+            colors: PointColors::Scalar(values.clone().into()),
+            style: CloudStyle { map, range, size: PointSize::Px(7.0), ..CloudStyle::default() },
+        };
+        let picture = view.picture(&SceneData { clouds: vec![item], ..scene() });
+        for (i, value) in values.iter().enumerate() {
+            let [x, y] = view.pixel(place(i));
+            let (gpu, cpu) = (picture.rgb(x, y).unwrap(), map.rgb8(range.unit(*value)));
+            for (a, b) in gpu.iter().zip(cpu) {
+                // One step: the device may round a half to the other side.
+                assert!(a.abs_diff(b) <= 1, "{map:?} {value}: {gpu:?} on the GPU, {cpu:?} on the CPU");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_unchanged_scene_costs_nothing_and_each_change_costs_what_it_must() {
+    let Some(mut view) = View::new() else { return };
+    let mut data = SceneData {
+        clouds: vec![cloud(&[DVec3::ZERO], &[[255; 3]], PointSize::Px(5.0))],
+        meshes: vec![mesh_item(square(DVec3::ZERO, DVec3::X, 0.01), MeshStyle::default())],
+        lines: vec![LinesItem {
+            name: "axes".into(),
+            revision: 0,
+            segments: guides::axes(DVec3::ZERO, 0.01).into(),
+            style: LinesStyle::default(),
+        }],
+        ..scene()
+    };
+    let step = |view: &mut View, data: &SceneData| {
+        let before = view.renderer.counters();
+        let drawn = view.render(data);
+        let after = view.renderer.counters();
+        let did = [after.uploads - before.uploads, after.uniforms - before.uniforms, after.renders - before.renders];
+        assert_eq!(drawn, did[2] == 1);
+        did
+    };
+    assert_eq!(step(&mut view, &data), [3, 4, 1], "the first picture sends everything");
+    assert_eq!(step(&mut view, &data), [0, 0, 0]);
+    assert_eq!(step(&mut view, &data.clone()), [0, 0, 0], "an equal scene made anew is the same scene");
+    view.camera.orbit(DVec2::new(5.0, 0.0));
+    assert_eq!(step(&mut view, &data), [0, 1, 1], "the camera alone");
+    data.meshes[0].style.world_from_mesh = DAffine3::from_rotation_x(0.1);
+    assert_eq!(step(&mut view, &data), [0, 1, 1], "a pose moves a mesh without sending it again");
+    data.clouds[0].style.selected = Some(0);
+    assert_eq!(step(&mut view, &data), [0, 1, 1], "a selection");
+    data.clouds[0].revision = 1;
+    assert_eq!(step(&mut view, &data), [1, 0, 1], "new points");
+    data.moving = true;
+    assert_eq!(step(&mut view, &data), [0, 0, 0], "few enough points to draw them all while moving");
+    data.background = [0.0; 3];
+    assert_eq!(step(&mut view, &data), [0, 0, 1]);
+    assert!(!view.target.resize(&view.gpu, SIZE).unwrap());
+    assert_eq!(step(&mut view, &data), [0, 0, 0]);
+    assert!(view.target.resize(&view.gpu, [100, 80]).unwrap());
+    assert_eq!(step(&mut view, &data), [0, 1, 1], "another size");
+    data.meshes.clear();
+    assert_eq!(step(&mut view, &data), [0, 0, 1], "a mesh less");
+    assert_eq!(step(&mut view, &data), [0, 0, 0]);
+}
+
+#[test]
+fn moving_thins_the_points_and_standing_shows_all() {
+    let Some(mut view) = View::new() else { return };
+    view.camera.look_from(Preset::Front);
+    view.renderer.moving_points = 100;
+    let points: Vec<DVec3> =
+        (0..400).map(|i| DVec3::new(f64::from(i % 20 - 10), 0.0, f64::from(i / 20 - 10)) * 0.003).collect();
+    let item = cloud(&points, &vec![[255; 3]; 400], PointSize::Px(3.0));
+    let mut data = SceneData { clouds: vec![item], moving: true, ..scene() };
+    let shown = |view: &mut View, data: &SceneData| -> Vec<usize> {
+        let picture = view.picture(data);
+        let on = |p: DVec3| {
+            let [x, y] = view.pixel(p);
+            picture.rgb(x, y) == Some([255; 3])
+        };
+        (0..400).filter(|i| on(points[*i])).collect()
+    };
+    assert_eq!(shown(&mut view, &data), (0..400).step_by(4).collect::<Vec<_>>());
+    data.moving = false;
+    assert_eq!(shown(&mut view, &data).len(), 400);
+    assert_eq!(view.renderer.counters().uploads, 1);
+}
+
+#[test]
+fn the_selected_point_is_marked_even_when_thinned_away() {
+    let Some(mut view) = View::new() else { return };
+    view.camera.look_from(Preset::Front);
+    view.renderer.moving_points = 1;
+    let points = [DVec3::new(0.0, 0.0, -0.01), DVec3::new(0.0, 0.0, 0.01)];
+    let mut item = cloud(&points, &[[255, 0, 0]; 2], PointSize::Px(5.0));
+    item.style.selected = Some(1);
+    item.style.highlight = [0.0, 1.0, 0.0];
+    let mut data = SceneData { clouds: vec![item], moving: true, ..scene() };
+    let picture = view.picture(&data);
+    let [x, y] = view.pixel(points[1]);
+    assert_eq!(picture.rgb(x, y), Some([0, 255, 0]));
+    let (px, _) = view.camera.project(points[1], SIZE).unwrap();
+    let hit = pick::nearest_point(&points, &DAffine3::IDENTITY, &view.camera, SIZE, px + 1.0, 5.0).unwrap();
+    assert_eq!(hit.index, 1);
+    data.clouds[0].style.selected = Some(99);
+    let picture = view.picture(&data);
+    assert_eq!(picture.rgb(x, y), Some(BACKGROUND), "an index that does not exist marks nothing");
+}
+
+#[test]
+fn empty_and_impossible_input_is_a_picture_or_an_error_not_a_panic() {
+    let Some(mut view) = View::new() else { return };
+    let nothing = cloud(&[], &[], PointSize::Px(f32::NAN));
+    let mut bad = cloud(&[DVec3::splat(f64::INFINITY), DVec3::ZERO], &[], PointSize::Px(5.0));
+    bad.name = "bad".into();
+    let empty_mesh = mesh_item(TriMesh::default(), MeshStyle::default());
+    let picture = view.picture(&SceneData { clouds: vec![nothing, bad], meshes: vec![empty_mesh], ..scene() });
+    let [x, y] = view.pixel(DVec3::ZERO);
+    assert_eq!(picture.rgb(x, y), Some([107; 3]), "a point without a colour is drawn as NaN");
+    view.target.resize(&view.gpu, [0, 0]).unwrap();
+    assert_eq!(view.target.size(), [1, 1]);
+    assert_eq!(view.picture(&scene()).rgba.len(), 4);
+}
+
+#[test]
+fn a_refused_call_is_a_value() {
+    let Some(gpu) = gpu_or_skip() else { return };
+    let result = gpu.guarded("making a buffer that cannot be", || {
+        Ok(gpu.device.create_buffer(&touch2touch::gpu::wgpu::BufferDescriptor {
+            label: Some("test"),
+            size: 3,
+            usage: touch2touch::gpu::wgpu::BufferUsages::empty(),
+            mapped_at_creation: true,
+        }))
+    });
+    let error = result.unwrap_err();
+    assert!(matches!(&error, GpuError::Device { what, .. } if what.contains("cannot be")), "{error}");
+    let error = shaders::compile(&gpu, "nowhere.wgsl").unwrap_err();
+    assert_eq!(error.to_string(), "shader nowhere.wgsl is not there");
+}

@@ -83,7 +83,7 @@ impl Default for CloudStyle {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub(super) struct PointVertex {
     pub(super) position: [f32; 3],
-    pub(super) attribute: u32,
+    pub(super) payload: u32,
 }
 
 /// Twin of the struct in `shaders/points.wgsl`.
@@ -171,7 +171,7 @@ fn color_mode(colors: &PointColors) -> u32 {
 /// The points as the shader reads them.
 fn vertices(item: &CloudItem) -> Vec<PointVertex> {
     let nan = NAN_COLOR.map(|c| (c * 255.0 + 0.5) as u8);
-    let attribute = |i: usize| match &item.colors {
+    let payload = |i: usize| match &item.colors {
         PointColors::One => 0,
         PointColors::PerPoint(colors) => {
             let [r, g, b] = colors.get(i).copied().unwrap_or(nan);
@@ -179,7 +179,7 @@ fn vertices(item: &CloudItem) -> Vec<PointVertex> {
         }
         PointColors::Scalar(values) => values.get(i).copied().unwrap_or(f32::NAN).to_bits(),
     };
-    let vertex = |(i, p): (usize, &DVec3)| PointVertex { position: view::position(*p), attribute: attribute(i) };
+    let vertex = |(i, p): (usize, &DVec3)| PointVertex { position: view::position(*p), payload: payload(i) };
     item.points.iter().enumerate().map(vertex).collect()
 }
 

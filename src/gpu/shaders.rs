@@ -243,7 +243,7 @@ mod tests {
             "common/view.wgsl",
             view::ViewUniform { clip_from_world, eye_in_world, up_in_world, size_px, px_per_m, unused }
         );
-        check_layout!("points.wgsl", points::PointVertex { position, attribute });
+        check_layout!("points.wgsl", points::PointVertex { position, payload });
         check_layout!(
             "points.wgsl",
             points::PointsUniform {
