@@ -14,6 +14,7 @@ pub mod grid;
 pub mod label;
 pub mod mesh;
 pub mod metrics;
+pub mod pose;
 pub mod postprocess;
 pub mod resample;
 pub mod sample;

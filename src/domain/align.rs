@@ -1,1 +1,338 @@
-//! Registration: contact points to the in-hand pose.
+//! Registration: contact points to the planar in-hand pose of the tool.
+//!
+//! Two engines, one kind of result:
+//! * [`align`]: robust Levenberg-Marquardt on a [`DistanceField`] of the tool's silhouette, from a few starts. The
+//!   default. Points outside the outline pay their distance, points on the silhouette pay nothing.
+//! * [`lab_icp()`]: the lab's planar point-to-point loop, reproduced for comparison.
+//!
+//! A result is a value ([`AlignReport`]): the pose with everything that says whether to believe it. What is only
+//! needed to look inside a run (per-iteration states, per-point residuals) is recorded on request.
+//!
+//! Source of the method: Fitzgibbon, Robust registration of 2D and 3D point sets, 2003.
+
+pub mod field;
+pub mod lab_icp;
+mod observability;
+mod planar;
+#[cfg(test)]
+pub(crate) mod testing;
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use super::frames::PlanarPose;
+
+pub use field::{DistanceField, FieldError, FieldSample};
+pub use lab_icp::{LabIcpConfig, lab_icp};
+pub use observability::{DEGENERATE_BELOW, Observability, observability};
+pub use planar::align;
+
+/// Length that makes an angle comparable with a shift: one radian counts as this many metres.
+///
+/// It is the lever arm of typical contact points, so that both halves of a step move points about equally far.
+pub const ANGLE_SCALE_M: f64 = 0.02;
+/// Fewest points a pose is computed from.
+pub const MIN_POINTS: usize = 32;
+
+/// What [`align`] may vary. The default is what the product uses.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AlignConfig {
+    /// Poses to start from, `grasp_from_object`. Not empty.
+    pub starts: Vec<PlanarPose>,
+    /// Points used for the answer; more are thinned evenly.
+    pub points: usize,
+    /// Points used to rank the starts.
+    pub scout_points: usize,
+    /// Widths of the Geman-McClure kernel, metres, wide to narrow. The last one decides.
+    pub kernels_m: Vec<f64>,
+    /// Most steps per kernel width and start.
+    pub max_iterations: usize,
+    /// Best starts that are refined with all points.
+    pub keep: usize,
+    /// Where the pose is expected; only used to say whether it was found there.
+    pub prior: Prior,
+    /// Keep per-iteration states and per-point residuals.
+    pub record: bool,
+}
+
+impl Default for AlignConfig {
+    fn default() -> Self {
+        let start = |degrees: f64| PlanarPose {
+            theta_rad: degrees.to_radians(),
+            ..PlanarPose::default()
+        };
+        Self {
+            starts: vec![start(-15.0), start(0.0), start(15.0)],
+            points: 512,
+            scout_points: 128,
+            kernels_m: vec![4e-3, 2e-3, 1e-3],
+            max_iterations: 20,
+            keep: 2,
+            prior: Prior::default(),
+            record: false,
+        }
+    }
+}
+
+/// The box around zero in which the gripper can hold a tool.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Prior {
+    /// Largest size of the angle, radians.
+    pub theta_rad: f64,
+    /// Largest size of y and of z, metres.
+    pub shift_m: f64,
+}
+
+impl Default for Prior {
+    /// The grid of the lab's grasps: ±22.5°, ±5 mm.
+    fn default() -> Self {
+        Self {
+            theta_rad: 22.5f64.to_radians(),
+            shift_m: 0.005,
+        }
+    }
+}
+
+impl Prior {
+    /// Whether the pose is in the box, widened by half to allow for error.
+    pub fn allows(&self, pose: PlanarPose) -> bool {
+        super::units::wrap_angle(pose.theta_rad).abs() <= 1.5 * self.theta_rad
+            && pose.y_m.abs() <= 1.5 * self.shift_m
+            && pose.z_m.abs() <= 1.5 * self.shift_m
+    }
+}
+
+/// Why there is no pose.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum AlignError {
+    /// The mask is nearly empty, or most of it has no depth.
+    #[error(
+        "{got} usable contact points are too few for a pose (at least {needed}): enlarge the contact mask"
+    )]
+    TooFewPoints {
+        /// Finite points.
+        got: usize,
+        /// Points needed.
+        needed: usize,
+    },
+    /// All points lie in one spot.
+    #[error("all contact points lie within {:.2} mm: a pose needs a contact area", .extent_m * 1e3)]
+    Coincident {
+        /// Diagonal of the points' bounding box, metres.
+        extent_m: f64,
+    },
+    /// The points are nowhere near the tool.
+    #[error(
+        "only {:.0} % of the contact points come near the tool's outline: check units, tool and camera transform",
+        .share * 100.0
+    )]
+    NoOverlap {
+        /// Share of points near the silhouette, at the best start or at the end.
+        share: f64,
+    },
+    /// The model has no points to compare with.
+    #[error("the tool has {got} surface points, too few to compare with")]
+    EmptyModel {
+        /// Finite model points.
+        got: usize,
+    },
+    /// A start or a setting is not a finite, positive number, or a list is empty.
+    #[error("the registration setting `{what}` is not usable")]
+    Config {
+        /// Name of the setting.
+        what: &'static str,
+    },
+}
+
+/// Why a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
+#[serde(rename_all = "snake_case")]
+pub enum Stop {
+    /// The last step moved no point noticeably.
+    #[strum(to_string = "converged: the step became negligible")]
+    SmallStep,
+    /// No direction lowers the cost further.
+    #[strum(to_string = "converged: no step lowers the cost")]
+    NoDescent,
+    /// The nearest points did not change, so no later iteration can change the pose.
+    #[strum(to_string = "converged: the correspondences repeat")]
+    FixedPoint,
+    /// The number of iterations was used up while the pose still moved.
+    #[strum(to_string = "stopped: iteration limit")]
+    IterationLimit,
+}
+
+impl Stop {
+    /// Whether the pose is an end point rather than a way station.
+    pub fn converged(self) -> bool {
+        self != Self::IterationLimit
+    }
+}
+
+/// One start and where it led.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Run {
+    /// Where it started, `grasp_from_object`.
+    pub start: PlanarPose,
+    /// Where it ended, `grasp_from_object`.
+    pub end: PlanarPose,
+    /// Cost per point there, square metres; comparable between the runs of one report.
+    pub cost_m2: f64,
+    /// Steps taken.
+    pub iterations: usize,
+    /// Why it ended.
+    pub stop: Stop,
+}
+
+/// A registration's answer with its reasons.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AlignReport {
+    /// The tool's pose in the hand.
+    pub grasp_from_object: PlanarPose,
+    /// Whether the winning run reached an end point.
+    pub converged: bool,
+    /// Why the winning run ended.
+    pub stop: Stop,
+    /// Where the winning run started, `grasp_from_object`.
+    pub start: PlanarPose,
+    /// Every start with its end, in the order of the starts.
+    pub runs: Vec<Run>,
+    /// Position of the winner in `runs`.
+    pub winner: usize,
+    /// Steps of all runs together.
+    pub iterations: usize,
+    /// Nearest-surface questions asked: the work done.
+    pub lookups: usize,
+    /// Points offered.
+    pub offered: usize,
+    /// Points not used because a coordinate was not finite.
+    pub not_finite: usize,
+    /// Points the answer is computed from.
+    pub used: usize,
+    /// Share of the used points within the narrowest kernel of the silhouette (or of the model points).
+    pub inlier_share: f64,
+    /// Root mean square residual of those, metres.
+    pub inlier_rms_m: f64,
+    /// Whether the pose is where the gripper can hold a tool.
+    pub within_prior: bool,
+    /// How well the points determine the pose; `None` if the engine had no field to tell from.
+    pub observability: Option<Observability>,
+    /// Per-iteration states of all runs; empty unless recorded.
+    pub trace: Vec<TraceStep>,
+    /// Fate of every offered point, in order; empty unless recorded.
+    pub fits: Vec<PointFit>,
+}
+
+impl AlignReport {
+    /// The angle as the lab reports it: the rotation of `object_from_grasp`, radians.
+    pub fn lab_angle_rad(&self) -> f64 {
+        self.grasp_from_object.inverse().theta_rad
+    }
+
+    /// The best run that ended somewhere else (more than a degree or a millimetre away), if any.
+    pub fn runner_up(&self) -> Option<&Run> {
+        self.runs
+            .iter()
+            .filter(|r| {
+                super::units::angle_error(r.end.theta_rad, self.grasp_from_object.theta_rad)
+                    > 1f64.to_radians()
+                    || (r.end.y_m - self.grasp_from_object.y_m)
+                        .hypot(r.end.z_m - self.grasp_from_object.z_m)
+                        > 1e-3
+            })
+            .min_by(|a, b| a.cost_m2.total_cmp(&b.cost_m2))
+    }
+
+    /// Whether the points leave a direction of the pose open (a straight rod slides, a disc turns).
+    pub fn is_degenerate(&self) -> bool {
+        self.observability.is_some_and(|o| o.degenerate)
+    }
+}
+
+/// One state on the way.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TraceStep {
+    /// Which start (position in [`AlignReport::runs`]).
+    pub run: usize,
+    /// Number of the step within the run; 0 is the start as applied.
+    pub iteration: usize,
+    /// The pose, `grasp_from_object`.
+    pub grasp_from_object: PlanarPose,
+    /// Cost per point, square metres; comparable only at the same kernel width and number of points.
+    pub cost_m2: f64,
+    /// Share of the points within the kernel's width.
+    pub inlier_share: f64,
+    /// Width of the kernel, metres; infinite without one.
+    pub kernel_m: f64,
+    /// Points in use.
+    pub points: usize,
+}
+
+/// What became of a point at the final pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fate {
+    /// Near the surface; it pulls.
+    Inlier,
+    /// On the silhouette; it fits and pays nothing.
+    Inside,
+    /// Beyond three kernel widths; its pull is negligible.
+    BeyondGate,
+    /// Outside the stored field.
+    OutOfField,
+    /// A coordinate is NaN or infinite.
+    NotFinite,
+}
+
+/// Residual, weight and fate of a point at the final pose.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PointFit {
+    /// Distance it pays for, metres; NaN if the point is not finite.
+    pub residual_m: f32,
+    /// Weight in [0, 1].
+    pub weight: f32,
+    /// What it counts as.
+    pub fate: Fate,
+}
+
+/// Centroid and size of the finite points, computed about a local origin in f64.
+struct Cleaned {
+    /// Finite points.
+    points: Vec<DVec2>,
+    centroid: DVec2,
+    not_finite: usize,
+}
+
+/// Drops points that are not finite and refuses sets without a size.
+fn clean(points: &[DVec2], needed: usize) -> Result<Cleaned, AlignError> {
+    /// Four cells of the field: below this no outline can be told from a dot.
+    const MIN_EXTENT_M: f64 = 4.0 * field::CELL_M;
+    // Larger coordinates would lose the millimetres that matter; no gripper is a kilometre long.
+    const MAX_COORDINATE_M: f64 = 1e6;
+    let finite: Vec<DVec2> = points
+        .iter()
+        .copied()
+        .filter(|p| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE_M)
+        .collect();
+    let got = finite.len();
+    if got < needed {
+        return Err(AlignError::TooFewPoints { got, needed });
+    }
+    let origin = finite[0];
+    let (mut sum, mut low, mut high) = (DVec2::ZERO, DVec2::ZERO, DVec2::ZERO);
+    for p in &finite {
+        let p = *p - origin;
+        sum += p;
+        low = low.min(p);
+        high = high.max(p);
+    }
+    let extent_m = (high - low).length();
+    if extent_m < MIN_EXTENT_M {
+        return Err(AlignError::Coincident { extent_m });
+    }
+    Ok(Cleaned {
+        centroid: origin + sum / got as f64,
+        not_finite: points.len() - got,
+        points: finite,
+    })
+}

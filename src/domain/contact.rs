@@ -1,1 +1,210 @@
-//! Contact masks from depth: threshold, top percent, CAD signed distance.
+//! Contact masks from depth (threshold, top percent) and from the CAD model at a known pose, and the mask
+//! network's input image. Masks drawn by hand and by the network come from elsewhere.
+
+use super::cloud::{self, CloudError};
+use super::frames::PlanarPose;
+use super::grid::{DepthMap, Grid, Mask};
+use super::mesh::MeshDistance;
+use super::sample::BubbleCamera;
+
+/// Depth of the lab's older contact rule: pushed in by at least this, metres (`ICP_dataset_cal.py` line 214).
+pub const LAB_THRESHOLD_M: f32 = 0.007;
+/// Share of the pixels above the threshold that the lab's older rule keeps, percent.
+pub const LAB_TOP_PERCENT: f64 = 40.0;
+/// Distance to the CAD model that the lab still calls contact, metres (`ICP_dataset_cal.py` lines 337-391).
+pub const LAB_CAD_DISTANCE_M: f64 = 0.001;
+/// Imprint that the lab's networks map to 0, metres.
+pub const LAB_IMPRINT_MIN_M: f32 = -0.0116;
+/// Imprint that the lab's networks map to 1, metres.
+pub const LAB_IMPRINT_MAX_M: f32 = 0.0225;
+
+/// Pixels pushed in by at least `min_m` metres. Values that are not finite are no contact.
+pub fn threshold(imprint: &DepthMap, min_m: f32) -> Mask {
+    imprint.map(|&d| d.is_finite() && d >= min_m)
+}
+
+/// The deepest `percent` (0 to 100) of the pixels that are pushed in by at least `min_m` metres.
+///
+/// Ties at the limit are all kept, so the share can be larger on an image of few values. Values that are not finite
+/// are no contact; a `percent` that is not positive (or NaN) gives an empty mask.
+pub fn top_percent(imprint: &DepthMap, percent: f64, min_m: f32) -> Mask {
+    let mut deep: Vec<f32> = imprint
+        .as_slice()
+        .iter()
+        .copied()
+        .filter(|d| d.is_finite() && *d >= min_m)
+        .collect();
+    let keep = ((deep.len() as f64 * percent / 100.0).round() as usize).min(deep.len());
+    if keep == 0 {
+        return Mask::filled(imprint.width(), imprint.height(), false);
+    }
+    let (_, limit, _) = deep.select_nth_unstable_by(keep - 1, |a, b| b.total_cmp(a));
+    let limit = *limit;
+    threshold(imprint, limit)
+}
+
+/// Pixels whose point is at most `max_m` metres from the CAD model at the given pose, or inside it: the lab's way to
+/// label contact, with [`LAB_CAD_DISTANCE_M`].
+///
+/// Pixels without a usable depth are no contact.
+///
+/// # Errors
+/// [`CloudError`] if the sizes differ or the camera's numbers cannot be right.
+pub fn cad_signed_distance(
+    imprint: &DepthMap,
+    camera: &BubbleCamera,
+    tool: &MeshDistance,
+    object_from_grasp: PlanarPose,
+    max_m: f64,
+) -> Result<Mask, CloudError> {
+    cloud::check(imprint, camera)?;
+    let object_from_grasp = object_from_grasp.to_affine();
+    Ok(Mask::from_fn(imprint.width(), imprint.height(), |x, y| {
+        cloud::lift_pixel(imprint, camera, x, y)
+            .is_some_and(|p| tool.within(object_from_grasp.transform_point3(p), max_m))
+    }))
+}
+
+/// How a value outside 0..255 becomes a byte.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ByteCast {
+    /// As numpy does it for the lab: modulo 256, so that a very deep pixel turns dark again.
+    Wrap,
+    /// Held at 0 and 255.
+    #[default]
+    Saturate,
+}
+
+/// The mask network's input with what was lost on the way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UnetInput {
+    /// Values in [0, 1], multiples of 1/255.
+    pub image: Grid<f32>,
+    /// Pixels that were NaN or infinite and count as an imprint of zero.
+    pub not_finite: usize,
+    /// Pixels outside the range that a byte holds.
+    pub out_of_range: usize,
+}
+
+/// The imprint as the lab's mask network sees it: scaled from [-11.6, 22.5] mm to [0, 1] and cut to 256 levels by
+/// truncation.
+///
+/// # Invalid values
+/// NaN and infinities are taken as an imprint of zero and counted; the lab does not expect them.
+///
+/// # Source
+/// `ICP_dataset_cal.py` lines 641-676; an image whose bytes are all 0 or 1 is, as there, not divided by 255.
+pub fn lab_unet_input(imprint: &DepthMap, cast: ByteCast) -> UnetInput {
+    let (mut not_finite, mut out_of_range) = (0, 0);
+    let bytes = imprint.map(|&d| {
+        let d = if d.is_finite() {
+            d
+        } else {
+            not_finite += 1;
+            0.0
+        };
+        let level = (d - LAB_IMPRINT_MIN_M) / (LAB_IMPRINT_MAX_M - LAB_IMPRINT_MIN_M) * 255.0;
+        if !(0.0..256.0).contains(&level) {
+            out_of_range += 1;
+        }
+        match cast {
+            ByteCast::Wrap => (level as i64) as u8,
+            ByteCast::Saturate => level as u8,
+        }
+    });
+    let scale = if bytes.as_slice().iter().any(|&b| b > 1) {
+        255.0
+    } else {
+        1.0
+    };
+    UnetInput {
+        image: bytes.map(|&b| f32::from(b) / scale),
+        not_finite,
+        out_of_range,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::align::testing::cuboid;
+    use glam::DVec3;
+
+    fn count(mask: &Mask) -> usize {
+        mask.as_slice().iter().filter(|&&m| m).count()
+    }
+
+    #[test]
+    fn threshold_and_top_percent_ignore_what_is_not_finite() {
+        let mut imprint = DepthMap::from_fn(10, 10, |x, y| (y * 10 + x) as f32 * 1e-4);
+        imprint[(0, 9)] = f32::NAN;
+        imprint[(1, 9)] = f32::INFINITY;
+        assert_eq!(count(&threshold(&imprint, 0.005)), 48);
+        let top = top_percent(&imprint, 25.0, 0.005);
+        assert_eq!(count(&top), 12);
+        assert!(top[(9, 9)] && !top[(0, 9)] && !top[(0, 5)]);
+        assert_eq!(count(&top_percent(&imprint, 100.0, 0.005)), 48);
+        assert_eq!(count(&top_percent(&imprint, 1e9, 0.005)), 48);
+        assert_eq!(count(&top_percent(&imprint, 0.0, 0.0)), 0);
+        assert_eq!(count(&top_percent(&imprint, f64::NAN, 0.0)), 0);
+        assert_eq!(count(&top_percent(&imprint, -5.0, 0.0)), 0);
+        assert_eq!(
+            count(&top_percent(&DepthMap::filled(0, 0, 0.0), 40.0, 0.0)),
+            0
+        );
+    }
+
+    #[test]
+    fn cad_contact_follows_the_pose() {
+        // A 6 mm bar along z, 1 mm in front of a flat membrane that is everywhere 90 mm from the camera.
+        let camera = super::super::cloud::testing::camera(175, 140);
+        let imprint = DepthMap::filled(175, 140, 0.0);
+        let centre = cloud::lift_pixel(&imprint, &camera, 87, 66).unwrap();
+        let bar = MeshDistance::new(&cuboid(
+            DVec3::new(centre.x, 0.0, centre.z),
+            DVec3::new(0.003, 0.003, 0.003),
+        ))
+        .unwrap();
+        let still = PlanarPose::default();
+        let mask = cad_signed_distance(&imprint, &camera, &bar, still, LAB_CAD_DISTANCE_M).unwrap();
+        assert!(mask[(87, 66)] && !mask[(0, 0)]);
+        // Moving the part by +10 mm along y moves the contact by 10 mm = 23 px along the rows of the image.
+        let moved = PlanarPose { y_m: 0.01, ..still }.inverse();
+        let shifted =
+            cad_signed_distance(&imprint, &camera, &bar, moved, LAB_CAD_DISTANCE_M).unwrap();
+        let row = |m: &Mask| {
+            let rows: Vec<usize> = (0..140).filter(|&y| m.row(y).contains(&true)).collect();
+            rows.iter().sum::<usize>() as f64 / rows.len() as f64
+        };
+        assert!((row(&shifted) - row(&mask) - 0.01 / 0.09 * 211.0).abs() < 1.0);
+        let dropped = DepthMap::filled(175, 140, f32::NAN);
+        assert_eq!(
+            count(&cad_signed_distance(&dropped, &camera, &bar, still, 0.001).unwrap()),
+            0
+        );
+    }
+
+    #[test]
+    fn bytes_wrap_or_saturate_and_truncate() {
+        let imprint = DepthMap::from_vec(5, 1, vec![-0.013, 0.030, 0.0, f32::NAN, 0.0224]).unwrap();
+        let levels = |cast| {
+            let input = lab_unet_input(&imprint, cast);
+            assert_eq!((input.not_finite, input.out_of_range), (1, 2));
+            input.image.map(|v| (v * 255.0).round() as i32).into_vec()
+        };
+        // -13 mm reads 246 and 30 mm reads 55 in numpy; 0 is 86.7, truncated.
+        assert_eq!(levels(ByteCast::Wrap), [246, 55, 86, 86, 254]);
+        assert_eq!(levels(ByteCast::Saturate), [0, 255, 86, 86, 254]);
+        let dark = DepthMap::filled(2, 1, -0.01155);
+        assert_eq!(
+            lab_unet_input(&dark, ByteCast::Wrap).image.into_vec(),
+            [0.0, 0.0]
+        );
+        let one = DepthMap::filled(2, 1, -0.0114);
+        assert_eq!(
+            lab_unet_input(&one, ByteCast::Wrap).image.into_vec(),
+            [1.0, 1.0],
+            "the lab's quirk"
+        );
+    }
+}

@@ -1,6 +1,11 @@
 //! Triangle meshes: the CAD models of the tools, in metres and the object frame.
 
+pub mod distance;
+pub mod sampling;
+
 use glam::DVec3;
+
+pub use distance::MeshDistance;
 
 /// An indexed triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,0 +1,98 @@
+//! Points drawn uniformly from a mesh's surface, and thinning of point lists.
+
+use glam::DVec3;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::{TriMesh, triangle_area};
+
+impl TriMesh {
+    /// `count` points on the surface, metres, object frame; each triangle gets a share by its area.
+    ///
+    /// The same seed gives the same points on every machine. Triangles without an area or with corners that are
+    /// not finite get none; a mesh without any area gives an empty list.
+    pub fn sample_surface(&self, count: usize, seed: u64) -> Vec<DVec3> {
+        let mut upto = Vec::with_capacity(self.triangles.len());
+        let mut total = 0.0;
+        for i in 0..self.triangles.len() {
+            let area = triangle_area(self.corners(i));
+            if area.is_finite() {
+                total += area;
+            }
+            upto.push(total);
+        }
+        if total <= 0.0 || !total.is_finite() {
+            return Vec::new();
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..count)
+            .map(|_| {
+                let at = rng.random::<f64>() * total;
+                let triangle = upto.partition_point(|&t| t <= at).min(upto.len() - 1);
+                let [a, b, c] = self.corners(triangle);
+                // The square root makes the density uniform over the triangle instead of denser at one corner.
+                let (r, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
+                a * (1.0 - r) + b * (r * (1.0 - v)) + c * (r * v)
+            })
+            .collect()
+    }
+}
+
+/// Indices of at most `count` of `len` items, spread evenly and in order: one from each of `count` equal blocks.
+///
+/// Which item of a block is taken is hashed from the block's number, so that the choice neither locks onto the rows
+/// of an image (as a fixed stride does) nor changes between runs.
+pub fn spread(len: usize, count: usize) -> Vec<usize> {
+    if len <= count {
+        return (0..len).collect();
+    }
+    (0..count)
+        .map(|i| {
+            let (from, to) = (i * len / count, (i + 1) * len / count);
+            let hash = (i as u64)
+                .wrapping_add(0x9e37_79b9_7f4a_7c15)
+                .wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            from + ((hash ^ (hash >> 31)) % (to - from) as u64) as usize
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_follow_the_area_and_the_seed() {
+        // Two triangles in the planes x = 0 (area 0.5) and x = 1 (area 1.5), a needle without area and a broken one.
+        let mesh = TriMesh {
+            vertices: vec![
+                DVec3::ZERO,
+                DVec3::Y,
+                DVec3::Z,
+                DVec3::X,
+                DVec3::new(1.0, 3.0, 0.0),
+                DVec3::new(1.0, 0.0, 1.0),
+                DVec3::NAN,
+            ],
+            triangles: vec![[0, 1, 2], [3, 4, 5], [0, 0, 1], [0, 1, 6]],
+        };
+        let points = mesh.sample_surface(4000, 7);
+        let far = points.iter().filter(|p| p.x > 0.5).count();
+        assert!(
+            (2880..3120).contains(&far),
+            "3 of 4 expected, got {far} of 4000"
+        );
+        assert!(points.iter().all(|p| p.is_finite()));
+        assert_eq!(points, mesh.sample_surface(4000, 7));
+        assert_ne!(points, mesh.sample_surface(4000, 8));
+        assert!(TriMesh::default().sample_surface(10, 0).is_empty());
+    }
+
+    #[test]
+    fn spreading_is_increasing_and_complete() {
+        assert_eq!(spread(5, 8), [0, 1, 2, 3, 4]);
+        let chosen = spread(24_500, 512);
+        assert_eq!(chosen.len(), 512);
+        assert!(chosen.windows(2).all(|w| w[0] < w[1]) && chosen[511] < 24_500);
+    }
+}

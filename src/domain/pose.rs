@@ -1,0 +1,324 @@
+//! Depth to pose in one call: what the command line and the studio both use.
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use super::align::{
+    AlignConfig, AlignError, AlignReport, DistanceField, FieldError, LabIcpConfig, align, lab_icp,
+    observability,
+};
+use super::cloud::{CloudError, ContactCloud, FingerCloud, lift};
+use super::frames::PlanarPose;
+use super::grid::{DepthMap, Mask};
+use super::mesh::distance::MeshError;
+use super::mesh::{MeshDistance, TriMesh};
+use super::sample::{BubbleCamera, Sample};
+use super::sensor::Finger;
+
+/// Seed of the model points, so that every run compares with the same ones.
+const MODEL_SEED: u64 = 0;
+
+/// Which registration answers.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    Serialize,
+    Deserialize,
+    strum::EnumIter,
+    strum::Display,
+    strum::EnumString,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum Engine {
+    /// Robust registration on the distance field of the tool's silhouette.
+    #[default]
+    DistanceField,
+    /// The lab's planar point-to-point loop.
+    LabIcp,
+}
+
+impl Engine {
+    /// Name for people.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::DistanceField => "ICP (distance field)",
+            Self::LabIcp => "ICP (paper)",
+        }
+    }
+}
+
+/// Why a CAD model cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ToolError {
+    /// No silhouette.
+    #[error(transparent)]
+    Field(#[from] FieldError),
+    /// No surface.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+/// A tool's CAD model with everything that registration and labelling derive from it, built once.
+#[derive(Clone, Debug)]
+pub struct ToolModel {
+    /// The model, metres, object frame.
+    pub mesh: TriMesh,
+    /// Distance to its silhouette along the closing axis.
+    pub field: DistanceField,
+    /// Distance to its surface.
+    pub distance: MeshDistance,
+    /// 5000 points of its surface, `(y, z)`, metres: what the lab's loop compares with.
+    pub model_points: Vec<DVec2>,
+}
+
+impl ToolModel {
+    /// Builds everything: some 10 to 30 ms.
+    ///
+    /// # Errors
+    /// [`ToolError`] if the mesh is empty or damaged, or its size cannot be metres (with the scale that would be).
+    pub fn new(mesh: TriMesh) -> Result<Self, ToolError> {
+        let field = DistanceField::from_mesh(&mesh)?;
+        let distance = MeshDistance::new(&mesh)?;
+        let model_points = mesh
+            .sample_surface(super::align::lab_icp::LAB_MODEL_POINTS, MODEL_SEED)
+            .iter()
+            .map(|p| DVec2::new(p.y, p.z))
+            .collect();
+        Ok(Self {
+            mesh,
+            field,
+            distance,
+            model_points,
+        })
+    }
+}
+
+/// One finger's part of the question.
+#[derive(Clone, Copy, Debug)]
+pub struct FingerInput<'a> {
+    /// Measured or predicted imprint, metres, raw orientation.
+    pub imprint: &'a DepthMap,
+    /// The camera that saw it, or that would have.
+    pub camera: &'a BubbleCamera,
+    /// Contact pixels; all without one.
+    pub mask: Option<&'a Mask>,
+}
+
+/// Which fingers take part, indexed by [`Finger::index`].
+pub type Fingers<'a> = [Option<FingerInput<'a>>; 2];
+
+/// The measured imprints of a sample with the given masks; fingers without a bubble camera are left out.
+pub fn fingers_of<'a>(sample: &'a Sample, masks: [Option<&'a Mask>; 2]) -> Fingers<'a> {
+    Finger::BOTH.map(|finger| {
+        let bubble = sample.finger(finger)?.bubble.as_ref()?;
+        let camera = bubble.camera.as_ref()?;
+        Some(FingerInput {
+            imprint: &bubble.imprint,
+            camera,
+            mask: masks[finger.index()],
+        })
+    })
+}
+
+/// Why there is no pose.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PoseError {
+    /// Neither finger has an imprint with a camera.
+    #[error("neither finger has an imprint with camera data, so there are no points to align")]
+    NoFinger,
+    /// An imprint cannot be lifted.
+    #[error("{} finger: {source}", .finger.name())]
+    Cloud {
+        /// The finger.
+        finger: Finger,
+        /// The reason.
+        source: CloudError,
+    },
+    /// The points cannot be aligned.
+    #[error(transparent)]
+    Align(#[from] AlignError),
+}
+
+/// A pose with the cloud it was computed from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseReport {
+    /// The registration that answered.
+    pub engine: Engine,
+    /// The tool's pose in the hand.
+    pub grasp_from_object: PlanarPose,
+    /// The same the other way round; its angle is the number the lab reports.
+    pub object_from_grasp: PlanarPose,
+    /// How the answer came about.
+    pub report: AlignReport,
+    /// Contact points of both fingers, grasp frame.
+    pub cloud: ContactCloud,
+}
+
+/// Joins the contact points of the fingers in the grasp frame.
+///
+/// # Errors
+/// [`PoseError::NoFinger`] or [`PoseError::Cloud`].
+pub fn contact_cloud(fingers: &Fingers<'_>) -> Result<ContactCloud, PoseError> {
+    let mut cloud = ContactCloud::default();
+    for finger in Finger::BOTH {
+        if let Some(input) = &fingers[finger.index()] {
+            let lifted = lift(input.imprint, input.camera, input.mask)
+                .map_err(|source| PoseError::Cloud { finger, source })?;
+            cloud.push(FingerCloud { finger, lifted });
+        }
+    }
+    if cloud.counts == [None, None] {
+        Err(PoseError::NoFinger)
+    } else {
+        Ok(cloud)
+    }
+}
+
+/// Imprints, cameras and masks to the tool's pose in the hand. `record` keeps per-iteration states and per-point
+/// residuals (see [`AlignReport`]).
+///
+/// Cost: well under a millisecond with the distance field, up to some hundred with the lab's loop.
+///
+/// # Errors
+/// [`PoseError`]; nothing is guessed from too few or misplaced points.
+pub fn estimate(
+    fingers: &Fingers<'_>,
+    tool: &ToolModel,
+    engine: Engine,
+    record: bool,
+) -> Result<PoseReport, PoseError> {
+    let cloud = contact_cloud(fingers)?;
+    let points = cloud.yz();
+    let report = match engine {
+        Engine::DistanceField => align(
+            &points,
+            &tool.field,
+            &AlignConfig {
+                record,
+                ..AlignConfig::default()
+            },
+        )?,
+        Engine::LabIcp => {
+            let config = LabIcpConfig {
+                record,
+                ..LabIcpConfig::default()
+            };
+            let mut report = lab_icp(&points, &tool.model_points, &config)?;
+            report.observability = Some(observability(
+                &points,
+                &tool.field,
+                report.grasp_from_object,
+            ));
+            report
+        }
+    };
+    Ok(PoseReport {
+        engine,
+        grasp_from_object: report.grasp_from_object,
+        object_from_grasp: report.grasp_from_object.inverse(),
+        report,
+        cloud,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::align::testing::cross;
+    use crate::domain::cloud::testing::camera;
+    use crate::domain::contact::{LAB_CAD_DISTANCE_M, cad_signed_distance};
+
+    /// A flat pad through the grasp origin that carries the cross: the label at the true pose gives the pose back.
+    #[test]
+    fn the_true_mask_gives_the_true_pose_with_both_engines() {
+        let tool = ToolModel::new(cross()).unwrap();
+        let truth = PlanarPose {
+            theta_rad: 0.12,
+            y_m: 0.002,
+            z_m: -0.001,
+        };
+        let camera = camera(175, 140);
+        let imprint = DepthMap::filled(175, 140, -0.003);
+        let mask = cad_signed_distance(
+            &imprint,
+            &camera,
+            &tool.distance,
+            truth.inverse(),
+            LAB_CAD_DISTANCE_M,
+        )
+        .unwrap();
+        assert!(mask.as_slice().iter().filter(|&&m| m).count() > 200);
+        let fingers = [
+            Some(FingerInput {
+                imprint: &imprint,
+                camera: &camera,
+                mask: Some(&mask),
+            }),
+            None,
+        ];
+        for (engine, limit_deg) in [(Engine::DistanceField, 2.0), (Engine::LabIcp, 12.0)] {
+            let report = estimate(&fingers, &tool, engine, false).unwrap();
+            let error = (report.grasp_from_object.theta_rad - truth.theta_rad).to_degrees();
+            assert!(error.abs() < limit_deg, "{engine}: {error} deg");
+            assert_eq!(
+                report.object_from_grasp.theta_rad,
+                report.report.lab_angle_rad()
+            );
+            assert_eq!(report.cloud.points.len(), report.report.offered);
+        }
+    }
+
+    #[test]
+    fn missing_and_empty_inputs_are_errors() {
+        let tool = ToolModel::new(cross()).unwrap();
+        assert_eq!(
+            estimate(&[None, None], &tool, Engine::default(), false),
+            Err(PoseError::NoFinger)
+        );
+        let camera = camera(175, 140);
+        let imprint = DepthMap::filled(175, 140, f32::NAN);
+        let fingers = [
+            None,
+            Some(FingerInput {
+                imprint: &imprint,
+                camera: &camera,
+                mask: None,
+            }),
+        ];
+        for engine in [Engine::DistanceField, Engine::LabIcp] {
+            let error = estimate(&fingers, &tool, engine, false).unwrap_err();
+            assert!(
+                matches!(
+                    error,
+                    PoseError::Align(AlignError::TooFewPoints { got: 0, .. })
+                ),
+                "{error}"
+            );
+        }
+        let small = DepthMap::filled(4, 4, 0.0);
+        let fingers = [
+            None,
+            Some(FingerInput {
+                imprint: &small,
+                camera: &camera,
+                mask: None,
+            }),
+        ];
+        let error = estimate(&fingers, &tool, Engine::default(), false).unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .starts_with("left finger: the reference depth is"),
+            "{error}"
+        );
+        assert!(ToolModel::new(TriMesh::default()).is_err());
+        assert_eq!("lab-icp".parse(), Ok(Engine::LabIcp));
+        assert_eq!(Engine::DistanceField.to_string(), "distance-field");
+    }
+}
