@@ -16,22 +16,22 @@ pub fn shared() -> Option<PathBuf> {
 
 /// Whether a missing GPU, model runtime or window is a failure instead of a reason to leave a test out.
 /// The check script sets it, so that nothing is skipped unnoticed.
-pub fn require(variable: &str) -> bool {
+pub(crate) fn require(variable: &str) -> bool {
     std::env::var_os(variable).is_some_and(|v| v != "0" && !v.is_empty())
 }
 
 /// A numpy archive: arrays by name, flattened in C order, as f64.
-pub struct Npz(zip::ZipArchive<std::fs::File>);
+pub(crate) struct Npz(zip::ZipArchive<std::fs::File>);
 
 impl Npz {
     /// Opens `path`; panics with the path if that fails.
-    pub fn open(path: &std::path::Path) -> Self {
+    pub(crate) fn open(path: &std::path::Path) -> Self {
         let file = std::fs::File::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         Self(zip::ZipArchive::new(file).unwrap_or_else(|e| panic!("{}: {e}", path.display())))
     }
 
     /// Reads the array `name` of any number type that the reference data uses.
-    pub fn read(&mut self, name: &str) -> Vec<f64> {
+    pub(crate) fn read(&mut self, name: &str) -> Vec<f64> {
         use npyz::{DType, NpyFile};
         let entry = self
             .0
