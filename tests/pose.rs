@@ -41,12 +41,7 @@ fn read_case(path: &Path) -> Case {
         let column = |c: usize| DVec3::new(t[c], t[4 + c], t[8 + c]);
         BubbleCamera {
             depth_reference: map(&reference, finger),
-            intrinsics: Intrinsics {
-                fx: k[0],
-                fy: k[4],
-                cx: k[2],
-                cy: k[5],
-            },
+            intrinsics: Intrinsics { fx: k[0], fy: k[4], cx: k[2], cy: k[5] },
             grasp_from_camera: DAffine3::from_mat3_translation(
                 DMat3::from_cols(column(0), column(1), column(2)),
                 column(3),
@@ -132,16 +127,11 @@ fn forty_known_grasps_with_spoilt_masks() {
         build_ms.iter().copied().fold(0.0, f64::max)
     );
     for engine in [Engine::DistanceField, Engine::LabIcp] {
-        let (mut errors, mut shifts, mut ms, mut flags, mut lookups) =
-            (vec![], vec![], vec![], vec![], vec![]);
+        let (mut errors, mut shifts, mut ms, mut flags, mut lookups) = (vec![], vec![], vec![], vec![], vec![]);
         for (name, case) in names.iter().zip(&cases) {
             let tool = tools[case.tool].as_ref().unwrap();
             let fingers = [0, 1].map(|f| {
-                Some(FingerInput {
-                    imprint: &case.imprints[f],
-                    camera: &case.cameras[f],
-                    mask: Some(&case.masks[f]),
-                })
+                Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&case.masks[f]) })
             });
             let begin = Instant::now();
             let pose = estimate(&fingers, tool, engine, false).unwrap();
@@ -184,10 +174,7 @@ fn forty_known_grasps_with_spoilt_masks() {
         );
         if engine == Engine::DistanceField {
             // A prototype of the same method reached mean 0.93, median 0.58, 100 % on these cases.
-            assert!(
-                mean <= 1.1 && s5 >= 95.0,
-                "mean {mean} deg, within 5 deg {s5} %"
-            );
+            assert!(mean <= 1.1 && s5 >= 95.0, "mean {mean} deg, within 5 deg {s5} %");
             assert!(median(&shifts) <= 0.6, "position {} mm", median(&shifts));
         } else {
             // One start at the identity and a squared cost: worse, as it should be, but no nonsense.

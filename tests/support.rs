@@ -33,34 +33,14 @@ impl Npz {
     /// Reads the array `name` of any number type that the reference data uses.
     pub(crate) fn read(&mut self, name: &str) -> Vec<f64> {
         use npyz::{DType, NpyFile};
-        let entry = self
-            .0
-            .by_name(&format!("{name}.npy"))
-            .unwrap_or_else(|e| panic!("{name}: {e}"));
+        let entry = self.0.by_name(&format!("{name}.npy")).unwrap_or_else(|e| panic!("{name}: {e}"));
         let npy = NpyFile::new(entry).unwrap();
-        let DType::Plain(kind) = npy.dtype() else {
-            panic!("{name}: not a plain array")
-        };
+        let DType::Plain(kind) = npy.dtype() else { panic!("{name}: not a plain array") };
         match kind.to_string().as_str() {
-            "<f4" => npy
-                .into_vec::<f32>()
-                .unwrap()
-                .into_iter()
-                .map(f64::from)
-                .collect(),
+            "<f4" => npy.into_vec::<f32>().unwrap().into_iter().map(f64::from).collect(),
             "<f8" => npy.into_vec::<f64>().unwrap(),
-            "|u1" => npy
-                .into_vec::<u8>()
-                .unwrap()
-                .into_iter()
-                .map(f64::from)
-                .collect(),
-            "<i8" => npy
-                .into_vec::<i64>()
-                .unwrap()
-                .into_iter()
-                .map(|v| v as f64)
-                .collect(),
+            "|u1" => npy.into_vec::<u8>().unwrap().into_iter().map(f64::from).collect(),
+            "<i8" => npy.into_vec::<i64>().unwrap().into_iter().map(|v| v as f64).collect(),
             other => panic!("{name}: type {other}"),
         }
     }

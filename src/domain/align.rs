@@ -57,10 +57,7 @@ pub struct AlignConfig {
 
 impl Default for AlignConfig {
     fn default() -> Self {
-        let start = |degrees: f64| PlanarPose {
-            theta_rad: degrees.to_radians(),
-            ..PlanarPose::default()
-        };
+        let start = |degrees: f64| PlanarPose { theta_rad: degrees.to_radians(), ..PlanarPose::default() };
         Self {
             starts: vec![start(-15.0), start(0.0), start(15.0)],
             points: 512,
@@ -86,10 +83,7 @@ pub struct Prior {
 impl Default for Prior {
     /// The grid of the lab's grasps: ±22.5°, ±5 mm.
     fn default() -> Self {
-        Self {
-            theta_rad: 22.5f64.to_radians(),
-            shift_m: 0.005,
-        }
+        Self { theta_rad: 22.5f64.to_radians(), shift_m: 0.005 }
     }
 }
 
@@ -106,9 +100,7 @@ impl Prior {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AlignError {
     /// The mask is nearly empty, or most of it has no depth.
-    #[error(
-        "{got} usable contact points are too few for a pose (at least {needed}): enlarge the contact mask"
-    )]
+    #[error("{got} usable contact points are too few for a pose (at least {needed}): enlarge the contact mask")]
     TooFewPoints {
         /// Finite points.
         got: usize,
@@ -234,11 +226,8 @@ impl AlignReport {
         self.runs
             .iter()
             .filter(|r| {
-                super::units::angle_error(r.end.theta_rad, self.grasp_from_object.theta_rad)
-                    > 1f64.to_radians()
-                    || (r.end.y_m - self.grasp_from_object.y_m)
-                        .hypot(r.end.z_m - self.grasp_from_object.z_m)
-                        > 1e-3
+                super::units::angle_error(r.end.theta_rad, self.grasp_from_object.theta_rad) > 1f64.to_radians()
+                    || (r.end.y_m - self.grasp_from_object.y_m).hypot(r.end.z_m - self.grasp_from_object.z_m) > 1e-3
             })
             .min_by(|a, b| a.cost_m2.total_cmp(&b.cost_m2))
     }
@@ -309,11 +298,8 @@ fn clean(points: &[DVec2], needed: usize) -> Result<Cleaned, AlignError> {
     const MIN_EXTENT_M: f64 = 4.0 * field::CELL_M;
     // Larger coordinates would lose the millimetres that matter; no gripper is a kilometre long.
     const MAX_COORDINATE_M: f64 = 1e6;
-    let finite: Vec<DVec2> = points
-        .iter()
-        .copied()
-        .filter(|p| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE_M)
-        .collect();
+    let finite: Vec<DVec2> =
+        points.iter().copied().filter(|p| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE_M).collect();
     let got = finite.len();
     if got < needed {
         return Err(AlignError::TooFewPoints { got, needed });
@@ -330,9 +316,5 @@ fn clean(points: &[DVec2], needed: usize) -> Result<Cleaned, AlignError> {
     if extent_m < MIN_EXTENT_M {
         return Err(AlignError::Coincident { extent_m });
     }
-    Ok(Cleaned {
-        centroid: origin + sum / got as f64,
-        not_finite: points.len() - got,
-        points: finite,
-    })
+    Ok(Cleaned { centroid: origin + sum / got as f64, not_finite: points.len() - got, points: finite })
 }

@@ -105,19 +105,13 @@ pub struct ContactCloud {
 /// # Source
 /// The lab's `ICP_dataset_cal.py` lines 426-463 (pinhole with crop offset, camera to grasp); the lab does not drop
 /// invalid pixels.
-pub fn lift(
-    imprint: &DepthMap,
-    camera: &BubbleCamera,
-    mask: Option<&Mask>,
-) -> Result<Lifted, CloudError> {
+pub fn lift(imprint: &DepthMap, camera: &BubbleCamera, mask: Option<&Mask>) -> Result<Lifted, CloudError> {
     check(imprint, camera)?;
     if let Some(mask) = mask {
         same_size("mask", mask.size(), imprint)?;
     }
     let mut lifted = Lifted::default();
-    let taken = mask.map_or(imprint.len(), |m| {
-        m.as_slice().iter().filter(|&&m| m).count()
-    });
+    let taken = mask.map_or(imprint.len(), |m| m.as_slice().iter().filter(|&&m| m).count());
     lifted.points.reserve_exact(taken);
     lifted.pixels.reserve_exact(taken);
     lifted.outside_mask = imprint.len() - taken;
@@ -152,10 +146,7 @@ pub fn lift_pixel(imprint: &DepthMap, camera: &BubbleCamera, x: usize, y: usize)
 ///
 /// `None` behind the camera, for a point that is not finite, and for a camera whose transform has no inverse.
 pub fn project(camera: &BubbleCamera, in_grasp: DVec3) -> Option<DVec2> {
-    let p = camera
-        .grasp_from_camera
-        .inverse()
-        .transform_point3(in_grasp);
+    let p = camera.grasp_from_camera.inverse().transform_point3(in_grasp);
     let (u, v) = camera.intrinsics.project(p)?;
     (u.is_finite() && v.is_finite()).then(|| DVec2::new(u, v))
 }
@@ -164,19 +155,9 @@ pub fn project(camera: &BubbleCamera, in_grasp: DVec3) -> Option<DVec2> {
 ///
 /// # Errors
 /// [`CloudError::NoCamera`] for a touch of an image folder; otherwise as [`lift`].
-pub fn lift_finger(
-    touch: &BubbleTouch,
-    finger: Finger,
-    mask: Option<&Mask>,
-) -> Result<FingerCloud, CloudError> {
-    let camera = touch
-        .camera
-        .as_ref()
-        .ok_or(CloudError::NoCamera { finger })?;
-    Ok(FingerCloud {
-        finger,
-        lifted: lift(&touch.imprint, camera, mask)?,
-    })
+pub fn lift_finger(touch: &BubbleTouch, finger: Finger, mask: Option<&Mask>) -> Result<FingerCloud, CloudError> {
+    let camera = touch.camera.as_ref().ok_or(CloudError::NoCamera { finger })?;
+    Ok(FingerCloud { finger, lifted: lift(&touch.imprint, camera, mask)? })
 }
 
 impl ContactCloud {
@@ -205,12 +186,7 @@ impl ContactCloud {
             outside_mask: lifted.outside_mask,
         });
         self.points.extend(lifted.points);
-        self.sources.extend(
-            lifted
-                .pixels
-                .into_iter()
-                .map(|pixel| PointSource { finger, pixel }),
-        );
+        self.sources.extend(lifted.pixels.into_iter().map(|pixel| PointSource { finger, pixel }));
     }
 
     /// The points in the plane of the tool: `(y, z)`, metres.
@@ -235,23 +211,13 @@ pub(super) fn check(imprint: &DepthMap, camera: &BubbleCamera) -> Result<(), Clo
         return Err(CloudError::Camera { what: "intrinsics" });
     }
     if !camera.grasp_from_camera.is_finite() {
-        return Err(CloudError::Camera {
-            what: "position in the grasp frame",
-        });
+        return Err(CloudError::Camera { what: "position in the grasp frame" });
     }
     Ok(())
 }
 
 fn same_size(what: &'static str, size: [usize; 2], imprint: &DepthMap) -> Result<(), CloudError> {
-    if size == imprint.size() {
-        Ok(())
-    } else {
-        Err(CloudError::Size {
-            what,
-            size,
-            imprint: imprint.size(),
-        })
-    }
+    if size == imprint.size() { Ok(()) } else { Err(CloudError::Size { what, size, imprint: imprint.size() }) }
 }
 
 #[cfg(test)]
@@ -266,12 +232,7 @@ pub(super) mod testing {
         let z = DVec3::new(0.8196, 0.0, 0.5729).normalize();
         BubbleCamera {
             depth_reference: DepthMap::filled(width, height, 0.09),
-            intrinsics: Intrinsics {
-                fx: 212.0,
-                fy: 211.0,
-                cx: 112.3,
-                cy: 86.1,
-            },
+            intrinsics: Intrinsics { fx: 212.0, fy: 211.0, cx: 112.3, cy: 86.1 },
             grasp_from_camera: DAffine3::from_mat3_translation(
                 DMat3::from_cols(x, DVec3::Y, z),
                 DVec3::new(-0.0764, 0.0, -0.0541),
@@ -322,77 +283,36 @@ mod tests {
 
     #[test]
     fn fingers_are_joined_and_a_missing_one_is_fine() {
-        let bubble = BubbleTouch {
-            imprint: imprint(),
-            camera: Some(testing::camera(WIDTH, HEIGHT)),
-            truth: None,
-        };
-        let touch = |bubble| {
-            Some(FingerTouch {
-                gelslim: None,
-                bubble,
-            })
-        };
-        let mut sample = Sample {
-            fingers: [None, touch(Some(bubble.clone()))],
-            ..Sample::default()
-        };
+        let bubble = BubbleTouch { imprint: imprint(), camera: Some(testing::camera(WIDTH, HEIGHT)), truth: None };
+        let touch = |bubble| Some(FingerTouch { gelslim: None, bubble });
+        let mut sample = Sample { fingers: [None, touch(Some(bubble.clone()))], ..Sample::default() };
         let mask = Mask::from_fn(WIDTH, HEIGHT, |x, _| x < 10);
         let cloud = ContactCloud::from_sample(&sample, [None, Some(&mask)]).unwrap();
         assert_eq!(cloud.points.len(), 10 * HEIGHT);
-        assert_eq!(
-            cloud.sources[0],
-            PointSource {
-                finger: Finger::Left,
-                pixel: [0, 0]
-            }
-        );
+        assert_eq!(cloud.sources[0], PointSource { finger: Finger::Left, pixel: [0, 0] });
         assert_eq!(cloud.counts[0], None);
         sample.fingers[0] = touch(Some(bubble.clone()));
         let both = ContactCloud::from_sample(&sample, [Some(&mask), Some(&mask)]).unwrap();
-        assert_eq!(
-            (both.points.len(), both.yz().len(), both.invalid()),
-            (20 * HEIGHT, 20 * HEIGHT, 0)
-        );
-        sample.fingers[0] = touch(Some(BubbleTouch {
-            camera: None,
-            ..bubble
-        }));
+        assert_eq!((both.points.len(), both.yz().len(), both.invalid()), (20 * HEIGHT, 20 * HEIGHT, 0));
+        sample.fingers[0] = touch(Some(BubbleTouch { camera: None, ..bubble }));
         assert_eq!(
             ContactCloud::from_sample(&sample, [None, None]),
-            Err(CloudError::NoCamera {
-                finger: Finger::Right
-            })
+            Err(CloudError::NoCamera { finger: Finger::Right })
         );
     }
 
     #[test]
     fn cameras_that_do_not_fit_are_refused() {
         let camera = testing::camera(4, 2);
-        assert!(matches!(
-            lift(&imprint(), &camera, None),
-            Err(CloudError::Size {
-                what: "reference depth",
-                ..
-            })
-        ));
+        assert!(matches!(lift(&imprint(), &camera, None), Err(CloudError::Size { what: "reference depth", .. })));
         let small = DepthMap::filled(4, 2, 0.0);
         let mask = Mask::filled(2, 4, true);
-        assert!(matches!(
-            lift(&small, &camera, Some(&mask)),
-            Err(CloudError::Size { what: "mask", .. })
-        ));
+        assert!(matches!(lift(&small, &camera, Some(&mask)), Err(CloudError::Size { what: "mask", .. })));
         let mut broken = camera.clone();
         broken.intrinsics.fx = f64::NAN;
-        assert_eq!(
-            lift(&small, &broken, None),
-            Err(CloudError::Camera { what: "intrinsics" })
-        );
+        assert_eq!(lift(&small, &broken, None), Err(CloudError::Camera { what: "intrinsics" }));
         let mut lost = camera;
         lost.grasp_from_camera.translation.x = f64::INFINITY;
-        assert!(matches!(
-            lift(&small, &lost, None),
-            Err(CloudError::Camera { .. })
-        ));
+        assert!(matches!(lift(&small, &lost, None), Err(CloudError::Camera { .. })));
     }
 }

@@ -28,12 +28,7 @@ pub fn threshold(imprint: &DepthMap, min_m: f32) -> Mask {
 /// Ties at the limit are all kept, so the share can be larger on an image of few values. Values that are not finite
 /// are no contact; a `percent` that is not positive (or NaN) gives an empty mask.
 pub fn top_percent(imprint: &DepthMap, percent: f64, min_m: f32) -> Mask {
-    let mut deep: Vec<f32> = imprint
-        .as_slice()
-        .iter()
-        .copied()
-        .filter(|d| d.is_finite() && *d >= min_m)
-        .collect();
+    let mut deep: Vec<f32> = imprint.as_slice().iter().copied().filter(|d| d.is_finite() && *d >= min_m).collect();
     let keep = ((deep.len() as f64 * percent / 100.0).round() as usize).min(deep.len());
     if keep == 0 {
         return Mask::filled(imprint.width(), imprint.height(), false);
@@ -112,16 +107,8 @@ pub fn lab_unet_input(imprint: &DepthMap, cast: ByteCast) -> UnetInput {
             ByteCast::Saturate => level as u8,
         }
     });
-    let scale = if bytes.as_slice().iter().any(|&b| b > 1) {
-        255.0
-    } else {
-        1.0
-    };
-    UnetInput {
-        image: bytes.map(|&b| f32::from(b) / scale),
-        not_finite,
-        out_of_range,
-    }
+    let scale = if bytes.as_slice().iter().any(|&b| b > 1) { 255.0 } else { 1.0 };
+    UnetInput { image: bytes.map(|&b| f32::from(b) / scale), not_finite, out_of_range }
 }
 
 #[cfg(test)]
@@ -148,10 +135,7 @@ mod tests {
         assert_eq!(count(&top_percent(&imprint, 0.0, 0.0)), 0);
         assert_eq!(count(&top_percent(&imprint, f64::NAN, 0.0)), 0);
         assert_eq!(count(&top_percent(&imprint, -5.0, 0.0)), 0);
-        assert_eq!(
-            count(&top_percent(&DepthMap::filled(0, 0, 0.0), 40.0, 0.0)),
-            0
-        );
+        assert_eq!(count(&top_percent(&DepthMap::filled(0, 0, 0.0), 40.0, 0.0)), 0);
     }
 
     #[test]
@@ -160,28 +144,21 @@ mod tests {
         let camera = super::super::cloud::testing::camera(175, 140);
         let imprint = DepthMap::filled(175, 140, 0.0);
         let centre = cloud::lift_pixel(&imprint, &camera, 87, 66).unwrap();
-        let bar = MeshDistance::new(&cuboid(
-            DVec3::new(centre.x, 0.0, centre.z),
-            DVec3::new(0.003, 0.003, 0.003),
-        ))
-        .unwrap();
+        let bar =
+            MeshDistance::new(&cuboid(DVec3::new(centre.x, 0.0, centre.z), DVec3::new(0.003, 0.003, 0.003))).unwrap();
         let still = PlanarPose::default();
         let mask = cad_signed_distance(&imprint, &camera, &bar, still, LAB_CAD_DISTANCE_M).unwrap();
         assert!(mask[(87, 66)] && !mask[(0, 0)]);
         // Moving the part by +10 mm along y moves the contact by 10 mm = 23 px along the rows of the image.
         let moved = PlanarPose { y_m: 0.01, ..still }.inverse();
-        let shifted =
-            cad_signed_distance(&imprint, &camera, &bar, moved, LAB_CAD_DISTANCE_M).unwrap();
+        let shifted = cad_signed_distance(&imprint, &camera, &bar, moved, LAB_CAD_DISTANCE_M).unwrap();
         let row = |m: &Mask| {
             let rows: Vec<usize> = (0..140).filter(|&y| m.row(y).contains(&true)).collect();
             rows.iter().sum::<usize>() as f64 / rows.len() as f64
         };
         assert!((row(&shifted) - row(&mask) - 0.01 / 0.09 * 211.0).abs() < 1.0);
         let dropped = DepthMap::filled(175, 140, f32::NAN);
-        assert_eq!(
-            count(&cad_signed_distance(&dropped, &camera, &bar, still, 0.001).unwrap()),
-            0
-        );
+        assert_eq!(count(&cad_signed_distance(&dropped, &camera, &bar, still, 0.001).unwrap()), 0);
     }
 
     #[test]
@@ -196,15 +173,8 @@ mod tests {
         assert_eq!(levels(ByteCast::Wrap), [246, 55, 86, 86, 254]);
         assert_eq!(levels(ByteCast::Saturate), [0, 255, 86, 86, 254]);
         let dark = DepthMap::filled(2, 1, -0.01155);
-        assert_eq!(
-            lab_unet_input(&dark, ByteCast::Wrap).image.into_vec(),
-            [0.0, 0.0]
-        );
+        assert_eq!(lab_unet_input(&dark, ByteCast::Wrap).image.into_vec(), [0.0, 0.0]);
         let one = DepthMap::filled(2, 1, -0.0114);
-        assert_eq!(
-            lab_unet_input(&one, ByteCast::Wrap).image.into_vec(),
-            [1.0, 1.0],
-            "the lab's quirk"
-        );
+        assert_eq!(lab_unet_input(&one, ByteCast::Wrap).image.into_vec(), [1.0, 1.0], "the lab's quirk");
     }
 }

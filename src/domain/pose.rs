@@ -4,8 +4,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::align::{
-    AlignConfig, AlignError, AlignReport, DistanceField, FieldError, LabIcpConfig, align, lab_icp,
-    observability,
+    AlignConfig, AlignError, AlignReport, DistanceField, FieldError, LabIcpConfig, align, lab_icp, observability,
 };
 use super::cloud::{CloudError, ContactCloud, FingerCloud, lift};
 use super::frames::PlanarPose;
@@ -90,12 +89,7 @@ impl ToolModel {
             .iter()
             .map(|p| DVec2::new(p.y, p.z))
             .collect();
-        Ok(Self {
-            mesh,
-            field,
-            distance,
-            model_points,
-        })
+        Ok(Self { mesh, field, distance, model_points })
     }
 }
 
@@ -118,11 +112,7 @@ pub fn fingers_of<'a>(sample: &'a Sample, masks: [Option<&'a Mask>; 2]) -> Finge
     Finger::BOTH.map(|finger| {
         let bubble = sample.finger(finger)?.bubble.as_ref()?;
         let camera = bubble.camera.as_ref()?;
-        Some(FingerInput {
-            imprint: &bubble.imprint,
-            camera,
-            mask: masks[finger.index()],
-        })
+        Some(FingerInput { imprint: &bubble.imprint, camera, mask: masks[finger.index()] })
     })
 }
 
@@ -168,16 +158,12 @@ pub fn contact_cloud(fingers: &Fingers<'_>) -> Result<ContactCloud, PoseError> {
     let mut cloud = ContactCloud::default();
     for finger in Finger::BOTH {
         if let Some(input) = &fingers[finger.index()] {
-            let lifted = lift(input.imprint, input.camera, input.mask)
-                .map_err(|source| PoseError::Cloud { finger, source })?;
+            let lifted =
+                lift(input.imprint, input.camera, input.mask).map_err(|source| PoseError::Cloud { finger, source })?;
             cloud.push(FingerCloud { finger, lifted });
         }
     }
-    if cloud.counts == [None, None] {
-        Err(PoseError::NoFinger)
-    } else {
-        Ok(cloud)
-    }
+    if cloud.counts == [None, None] { Err(PoseError::NoFinger) } else { Ok(cloud) }
 }
 
 /// Imprints, cameras and masks to the tool's pose in the hand. `record` keeps per-iteration states and per-point
@@ -196,25 +182,11 @@ pub fn estimate(
     let cloud = contact_cloud(fingers)?;
     let points = cloud.yz();
     let report = match engine {
-        Engine::DistanceField => align(
-            &points,
-            &tool.field,
-            &AlignConfig {
-                record,
-                ..AlignConfig::default()
-            },
-        )?,
+        Engine::DistanceField => align(&points, &tool.field, &AlignConfig { record, ..AlignConfig::default() })?,
         Engine::LabIcp => {
-            let config = LabIcpConfig {
-                record,
-                ..LabIcpConfig::default()
-            };
+            let config = LabIcpConfig { record, ..LabIcpConfig::default() };
             let mut report = lab_icp(&points, &tool.model_points, &config)?;
-            report.observability = Some(observability(
-                &points,
-                &tool.field,
-                report.grasp_from_object,
-            ));
+            report.observability = Some(observability(&points, &tool.field, report.grasp_from_object));
             report
         }
     };
@@ -233,43 +205,28 @@ mod tests {
     use crate::domain::align::testing::cross;
     use crate::domain::cloud::testing::camera;
     use crate::domain::contact::{LAB_CAD_DISTANCE_M, cad_signed_distance};
+    use glam::{DAffine3, DQuat, DVec3};
 
     /// A flat pad through the grasp origin that carries the cross: the label at the true pose gives the pose back.
     #[test]
     fn the_true_mask_gives_the_true_pose_with_both_engines() {
         let tool = ToolModel::new(cross()).unwrap();
-        let truth = PlanarPose {
-            theta_rad: 0.12,
-            y_m: 0.002,
-            z_m: -0.001,
-        };
-        let camera = camera(175, 140);
-        let imprint = DepthMap::filled(175, 140, -0.003);
-        let mask = cad_signed_distance(
-            &imprint,
-            &camera,
-            &tool.distance,
-            truth.inverse(),
-            LAB_CAD_DISTANCE_M,
-        )
-        .unwrap();
+        let truth = PlanarPose { theta_rad: 0.12, y_m: 0.002, z_m: -0.001 };
+        let mut camera = camera(175, 140);
+        // Looking straight along the closing axis, so that the pad lies in the plane of the tool.
+        camera.grasp_from_camera = DAffine3::from_rotation_translation(
+            DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2),
+            DVec3::new(-0.09, 0.0, 0.0),
+        );
+        let imprint = DepthMap::filled(175, 140, 0.0);
+        let mask = cad_signed_distance(&imprint, &camera, &tool.distance, truth.inverse(), LAB_CAD_DISTANCE_M).unwrap();
         assert!(mask.as_slice().iter().filter(|&&m| m).count() > 200);
-        let fingers = [
-            Some(FingerInput {
-                imprint: &imprint,
-                camera: &camera,
-                mask: Some(&mask),
-            }),
-            None,
-        ];
+        let fingers = [Some(FingerInput { imprint: &imprint, camera: &camera, mask: Some(&mask) }), None];
         for (engine, limit_deg) in [(Engine::DistanceField, 2.0), (Engine::LabIcp, 12.0)] {
             let report = estimate(&fingers, &tool, engine, false).unwrap();
             let error = (report.grasp_from_object.theta_rad - truth.theta_rad).to_degrees();
             assert!(error.abs() < limit_deg, "{engine}: {error} deg");
-            assert_eq!(
-                report.object_from_grasp.theta_rad,
-                report.report.lab_angle_rad()
-            );
+            assert_eq!(report.object_from_grasp.theta_rad, report.report.lab_angle_rad());
             assert_eq!(report.cloud.points.len(), report.report.offered);
         }
     }
@@ -277,46 +234,18 @@ mod tests {
     #[test]
     fn missing_and_empty_inputs_are_errors() {
         let tool = ToolModel::new(cross()).unwrap();
-        assert_eq!(
-            estimate(&[None, None], &tool, Engine::default(), false),
-            Err(PoseError::NoFinger)
-        );
+        assert_eq!(estimate(&[None, None], &tool, Engine::default(), false), Err(PoseError::NoFinger));
         let camera = camera(175, 140);
         let imprint = DepthMap::filled(175, 140, f32::NAN);
-        let fingers = [
-            None,
-            Some(FingerInput {
-                imprint: &imprint,
-                camera: &camera,
-                mask: None,
-            }),
-        ];
+        let fingers = [None, Some(FingerInput { imprint: &imprint, camera: &camera, mask: None })];
         for engine in [Engine::DistanceField, Engine::LabIcp] {
             let error = estimate(&fingers, &tool, engine, false).unwrap_err();
-            assert!(
-                matches!(
-                    error,
-                    PoseError::Align(AlignError::TooFewPoints { got: 0, .. })
-                ),
-                "{error}"
-            );
+            assert!(matches!(error, PoseError::Align(AlignError::TooFewPoints { got: 0, .. })), "{error}");
         }
         let small = DepthMap::filled(4, 4, 0.0);
-        let fingers = [
-            None,
-            Some(FingerInput {
-                imprint: &small,
-                camera: &camera,
-                mask: None,
-            }),
-        ];
+        let fingers = [None, Some(FingerInput { imprint: &small, camera: &camera, mask: None })];
         let error = estimate(&fingers, &tool, Engine::default(), false).unwrap_err();
-        assert!(
-            error
-                .to_string()
-                .starts_with("left finger: the reference depth is"),
-            "{error}"
-        );
+        assert!(error.to_string().starts_with("left finger: the reference depth is"), "{error}");
         assert!(ToolModel::new(TriMesh::default()).is_err());
         assert_eq!("lab-icp".parse(), Ok(Engine::LabIcp));
         assert_eq!(Engine::DistanceField.to_string(), "distance-field");

@@ -33,11 +33,7 @@ pub struct LabIcpConfig {
 
 impl Default for LabIcpConfig {
     fn default() -> Self {
-        Self {
-            iterations: 200,
-            start: PlanarPose::default(),
-            record: false,
-        }
+        Self { iterations: 200, start: PlanarPose::default(), record: false }
     }
 }
 
@@ -47,11 +43,7 @@ impl Default for LabIcpConfig {
 ///
 /// # Errors
 /// [`AlignError`] for fewer than four contact or model points, coincident contacts, or a start that is not finite.
-pub fn lab_icp(
-    points_yz: &[DVec2],
-    model_points: &[DVec2],
-    config: &LabIcpConfig,
-) -> Result<AlignReport, AlignError> {
+pub fn lab_icp(points_yz: &[DVec2], model_points: &[DVec2], config: &LabIcpConfig) -> Result<AlignReport, AlignError> {
     if !config.start.is_finite() {
         return Err(AlignError::Config { what: "start" });
     }
@@ -59,16 +51,12 @@ pub fn lab_icp(
         return Err(AlignError::Config { what: "iterations" });
     }
     let scene = super::clean(points_yz, LAB_MIN_POINTS)?;
-    let model: Vec<[f64; 2]> = model_points
-        .iter()
-        .filter(|p| p.is_finite())
-        .map(|p| p.to_array())
-        .collect();
+    let model: Vec<[f64; 2]> = model_points.iter().filter(|p| p.is_finite()).map(|p| p.to_array()).collect();
     if model.len() < LAB_MIN_POINTS {
         return Err(AlignError::EmptyModel { got: model.len() });
     }
-    let tree = ImmutableKdTree::<f64, 2>::new_from_slice(&model)
-        .map_err(|_| AlignError::EmptyModel { got: model.len() })?;
+    let tree =
+        ImmutableKdTree::<f64, 2>::new_from_slice(&model).map_err(|_| AlignError::EmptyModel { got: model.len() })?;
     let count = scene.points.len();
     let mut pose = config.start;
     let mut nearest = vec![u32::MAX; count];
@@ -92,18 +80,8 @@ pub fn lab_icp(
     if stop == Stop::IterationLimit {
         note(config, &mut trace, iterations, pose, &matched, count);
     }
-    let fits = if config.record {
-        fits(&tree, points_yz, pose)
-    } else {
-        Vec::new()
-    };
-    let run = Run {
-        start: config.start,
-        end: pose,
-        cost_m2: matched.squares / count as f64,
-        iterations,
-        stop,
-    };
+    let fits = if config.record { fits(&tree, points_yz, pose) } else { Vec::new() };
+    let run = Run { start: config.start, end: pose, cost_m2: matched.squares / count as f64, iterations, stop };
     Ok(AlignReport {
         grasp_from_object: pose,
         converged: stop.converged(),
@@ -134,12 +112,7 @@ struct Matched {
 }
 
 /// The nearest model point of every contact under `pose`.
-fn match_all(
-    tree: &ImmutableKdTree<f64, 2>,
-    scene: &[DVec2],
-    pose: PlanarPose,
-    nearest: &mut [u32],
-) -> Matched {
+fn match_all(tree: &ImmutableKdTree<f64, 2>, scene: &[DVec2], pose: PlanarPose, nearest: &mut [u32]) -> Matched {
     let object_from_grasp = pose.inverse();
     let mut matched = Matched::default();
     for (p, slot) in scene.iter().zip(nearest) {
@@ -156,25 +129,16 @@ fn match_all(
 }
 
 fn nearest_model_point(tree: &ImmutableKdTree<f64, 2>, in_object: DVec2) -> (u32, f64) {
-    let found = tree
-        .query(&in_object.to_array())
-        .nearest_one::<SquaredEuclidean<f64>>()
-        .execute();
+    let found = tree.query(&in_object.to_array()).nearest_one::<SquaredEuclidean<f64>>().execute();
     (found.item, found.distance)
 }
 
 /// The rigid motion of the model that brings the pairs closest: `grasp_from_object`.
 ///
 /// The rotation is read from the 2 x 2 correlation directly, which unlike an SVD cannot return a reflection.
-fn closed_form(
-    scene: &[DVec2],
-    scene_centroid: DVec2,
-    model: &[[f64; 2]],
-    nearest: &[u32],
-) -> PlanarPose {
+fn closed_form(scene: &[DVec2], scene_centroid: DVec2, model: &[[f64; 2]], nearest: &[u32]) -> PlanarPose {
     let model_point = |item: u32| DVec2::from_array(model[item as usize]);
-    let model_centroid =
-        nearest.iter().map(|&i| model_point(i)).sum::<DVec2>() / nearest.len() as f64;
+    let model_centroid = nearest.iter().map(|&i| model_point(i)).sum::<DVec2>() / nearest.len() as f64;
     let (mut dot, mut cross) = (0.0, 0.0);
     for (p, item) in scene.iter().zip(nearest) {
         let (s, m) = (*p - scene_centroid, model_point(*item) - model_centroid);
@@ -183,11 +147,7 @@ fn closed_form(
     }
     let theta_rad = cross.atan2(dot);
     let shift = scene_centroid - DVec2::from_angle(theta_rad).rotate(model_centroid);
-    PlanarPose {
-        theta_rad,
-        y_m: shift.x,
-        z_m: shift.y,
-    }
+    PlanarPose { theta_rad, y_m: shift.x, z_m: shift.y }
 }
 
 fn note(
@@ -218,17 +178,9 @@ fn fits(tree: &ImmutableKdTree<f64, 2>, points: &[DVec2], pose: PlanarPose) -> V
         .map(|p| {
             if p.is_finite() {
                 let (_, squared) = nearest_model_point(tree, object_from_grasp.transform_yz(*p));
-                PointFit {
-                    residual_m: squared.sqrt() as f32,
-                    weight: 1.0,
-                    fate: Fate::Inlier,
-                }
+                PointFit { residual_m: squared.sqrt() as f32, weight: 1.0, fate: Fate::Inlier }
             } else {
-                PointFit {
-                    residual_m: f32::NAN,
-                    weight: 0.0,
-                    fate: Fate::NotFinite,
-                }
+                PointFit { residual_m: f32::NAN, weight: 0.0, fate: Fate::NotFinite }
             }
         })
         .collect()
@@ -250,9 +202,7 @@ mod tests {
                 .iter()
                 .map(|s| {
                     let near = |i: &usize, j: &usize| {
-                        moved[*i]
-                            .distance_squared(*s)
-                            .total_cmp(&moved[*j].distance_squared(*s))
+                        moved[*i].distance_squared(*s).total_cmp(&moved[*j].distance_squared(*s))
                     };
                     model[(0..model.len()).min_by(near).unwrap()]
                 })
@@ -270,72 +220,41 @@ mod tests {
             }
             let phi = (w[1][0] - w[0][1]).atan2(w[0][0] + w[1][1]);
             let t = mu_s - DVec2::from_angle(-phi).rotate(mu_m);
-            pose = PlanarPose {
-                theta_rad: -phi,
-                y_m: t.x,
-                z_m: t.y,
-            };
+            pose = PlanarPose { theta_rad: -phi, y_m: t.x, z_m: t.y };
         }
         pose
     }
 
     fn model(count: usize) -> Vec<DVec2> {
-        cross()
-            .sample_surface(count, 1)
-            .iter()
-            .map(|p| DVec2::new(p.y, p.z))
-            .collect()
+        cross().sample_surface(count, 1).iter().map(|p| DVec2::new(p.y, p.z)).collect()
     }
 
     #[test]
     fn equals_the_literal_loop_in_every_iteration() {
-        let truth = PlanarPose {
-            theta_rad: 0.15,
-            y_m: 0.002,
-            z_m: -0.003,
-        };
+        let truth = PlanarPose { theta_rad: 0.15, y_m: 0.002, z_m: -0.003 };
         let scene = cross_contacts(300, truth, 2e-4, 5);
         let model = model(400);
         for iterations in [1, 2, 7, 60] {
-            let config = LabIcpConfig {
-                iterations,
-                ..LabIcpConfig::default()
-            };
+            let config = LabIcpConfig { iterations, ..LabIcpConfig::default() };
             let ours = lab_icp(&scene, &model, &config).unwrap().grasp_from_object;
             let theirs = literal(&scene, &model, iterations);
-            assert!(
-                (ours.theta_rad - theirs.theta_rad).abs().to_degrees() < 1e-6,
-                "{ours:?} {theirs:?}"
-            );
+            assert!((ours.theta_rad - theirs.theta_rad).abs().to_degrees() < 1e-6, "{ours:?} {theirs:?}");
             assert!((ours.y_m - theirs.y_m).hypot(ours.z_m - theirs.z_m) < 1e-12);
         }
     }
 
     #[test]
     fn stops_early_at_a_fixed_point_and_reports_it() {
-        let truth = PlanarPose {
-            theta_rad: -0.05,
-            y_m: 0.001,
-            z_m: 0.001,
-        };
+        let truth = PlanarPose { theta_rad: -0.05, y_m: 0.001, z_m: 0.001 };
         let scene = cross_contacts(600, truth, 1e-4, 2);
-        let config = LabIcpConfig {
-            record: true,
-            ..LabIcpConfig::default()
-        };
+        let config = LabIcpConfig { record: true, ..LabIcpConfig::default() };
         let report = lab_icp(&scene, &model(2000), &config).unwrap();
         assert_eq!(report.stop, Stop::FixedPoint);
         assert!(report.converged && report.iterations < 200);
         assert_eq!(report.trace.len(), report.iterations + 1);
         assert_eq!(report.trace[0].grasp_from_object, PlanarPose::default());
-        assert_eq!(
-            report.trace.last().unwrap().grasp_from_object,
-            report.grasp_from_object
-        );
-        assert!(
-            (report.lab_angle_rad() - 0.05).abs() < 0.02,
-            "the lab's sign"
-        );
+        assert_eq!(report.trace.last().unwrap().grasp_from_object, report.grasp_from_object);
+        assert!((report.lab_angle_rad() - 0.05).abs() < 0.02, "the lab's sign");
         assert_eq!(report.fits.len(), 600);
     }
 
@@ -344,26 +263,12 @@ mod tests {
         let config = LabIcpConfig::default();
         let model = model(100);
         let few = cross_contacts(3, PlanarPose::default(), 0.0, 1);
-        assert_eq!(
-            lab_icp(&few, &model, &config),
-            Err(AlignError::TooFewPoints { got: 3, needed: 4 })
-        );
+        assert_eq!(lab_icp(&few, &model, &config), Err(AlignError::TooFewPoints { got: 3, needed: 4 }));
         let same = vec![DVec2::new(0.01, 0.02); 50];
-        assert!(matches!(
-            lab_icp(&same, &model, &config),
-            Err(AlignError::Coincident { .. })
-        ));
+        assert!(matches!(lab_icp(&same, &model, &config), Err(AlignError::Coincident { .. })));
         let scene = cross_contacts(50, PlanarPose::default(), 0.0, 1);
-        assert_eq!(
-            lab_icp(&scene, &[DVec2::NAN; 9], &config),
-            Err(AlignError::EmptyModel { got: 0 })
-        );
+        assert_eq!(lab_icp(&scene, &[DVec2::NAN; 9], &config), Err(AlignError::EmptyModel { got: 0 }));
         let same_model = vec![DVec2::new(0.001, 0.002); 5000];
-        assert!(
-            lab_icp(&scene, &same_model, &config)
-                .unwrap()
-                .grasp_from_object
-                .is_finite()
-        );
+        assert!(lab_icp(&scene, &same_model, &config).unwrap().grasp_from_object.is_finite());
     }
 }

@@ -38,21 +38,14 @@ impl Observability {
         if turn.abs() > y.hypot(z) {
             "turns about its centre".to_owned()
         } else {
-            format!(
-                "slides along {:.0}° in y-z",
-                z.atan2(y).to_degrees().rem_euclid(180.0)
-            )
+            format!("slides along {:.0}° in y-z", z.atan2(y).to_degrees().rem_euclid(180.0))
         }
     }
 }
 
 /// Looks at the slopes of all points near the outline, at the given pose. Points are `(y, z)`, metres, grasp frame;
 /// those that are not finite are ignored. Too few telling points count as degenerate with zero eigenvalues.
-pub fn observability(
-    points_yz: &[DVec2],
-    field: &DistanceField,
-    grasp_from_object: PlanarPose,
-) -> Observability {
+pub fn observability(points_yz: &[DVec2], field: &DistanceField, grasp_from_object: PlanarPose) -> Observability {
     let object_from_grasp = grasp_from_object.inverse();
     let turn = DVec2::from_angle(grasp_from_object.theta_rad);
     let mut centre = DVec2::ZERO;
@@ -69,11 +62,7 @@ pub fn observability(
         return Observability {
             eigenvalues: [0.0; 3],
             weakest: [0.0, 1.0, 0.0],
-            centre: if telling.is_empty() {
-                DVec2::ZERO
-            } else {
-                centre / telling.len() as f64
-            },
+            centre: if telling.is_empty() { DVec2::ZERO } else { centre / telling.len() as f64 },
             telling: telling.len(),
             degenerate: true,
         };
@@ -81,11 +70,7 @@ pub fn observability(
     centre /= telling.len() as f64;
     let mut h = [[0.0; 3]; 3];
     for (p, gradient) in &telling {
-        let j = [
-            gradient.dot((*p - centre).perp()) / ANGLE_SCALE_M,
-            gradient.x,
-            gradient.y,
-        ];
+        let j = [gradient.dot((*p - centre).perp()) / ANGLE_SCALE_M, gradient.x, gradient.y];
         for (row, a) in h.iter_mut().zip(j) {
             for (cell, b) in row.iter_mut().zip(j) {
                 *cell += a * b / telling.len() as f64;
@@ -93,6 +78,8 @@ pub fn observability(
         }
     }
     let (eigenvalues, vectors) = eigen_symmetric(h);
+    // A mean of squares: below zero is rounding.
+    let eigenvalues = eigenvalues.map(|e| e.max(0.0));
     Observability {
         eigenvalues,
         weakest: vectors[0],
@@ -130,10 +117,7 @@ fn eigen_symmetric(mut a: [[f64; 3]; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
     }
     let mut order = [0, 1, 2];
     order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
-    (
-        order.map(|i| a[i][i]),
-        order.map(|i| [v[0][i], v[1][i], v[2][i]]),
-    )
+    (order.map(|i| a[i][i]), order.map(|i| [v[0][i], v[1][i], v[2][i]]))
 }
 
 #[cfg(test)]

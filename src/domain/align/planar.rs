@@ -7,8 +7,8 @@
 use glam::DVec2;
 
 use super::{
-    ANGLE_SCALE_M, AlignConfig, AlignError, AlignReport, DistanceField, Fate, MIN_POINTS, PointFit,
-    Run, Stop, TraceStep, clean, observability,
+    ANGLE_SCALE_M, AlignConfig, AlignError, AlignReport, DistanceField, Fate, MIN_POINTS, PointFit, Run, Stop,
+    TraceStep, clean, observability,
 };
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::sampling::spread;
@@ -34,54 +34,27 @@ const REACH_M: f64 = 0.012;
 /// # Errors
 /// [`AlignError`] for fewer than [`MIN_POINTS`] points, points in one spot, points away from the tool, or settings
 /// that make no sense.
-pub fn align(
-    points_yz: &[DVec2],
-    field: &DistanceField,
-    config: &AlignConfig,
-) -> Result<AlignReport, AlignError> {
+pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -> Result<AlignReport, AlignError> {
     check(config)?;
     let cleaned = clean(points_yz, MIN_POINTS)?;
     let c = cleaned.centroid;
-    let chosen: Vec<DVec2> = spread(cleaned.points.len(), config.points)
-        .into_iter()
-        .map(|i| cleaned.points[i] - c)
-        .collect();
-    let scouts: Vec<DVec2> = spread(chosen.len(), config.scout_points)
-        .into_iter()
-        .map(|i| chosen[i])
-        .collect();
+    let chosen: Vec<DVec2> =
+        spread(cleaned.points.len(), config.points).into_iter().map(|i| cleaned.points[i] - c).collect();
+    let scouts: Vec<DVec2> = spread(chosen.len(), config.scout_points).into_iter().map(|i| chosen[i]).collect();
 
-    let mut search = Search {
-        field,
-        centroid: c,
-        lookups: 0,
-        trace: Vec::new(),
-        record: config.record,
-        max: config.max_iterations,
-    };
+    let mut search =
+        Search { field, centroid: c, lookups: 0, trace: Vec::new(), record: config.record, max: config.max_iterations };
     let final_kernel = config.kernels_m[config.kernels_m.len() - 1];
 
-    let states: Vec<State> = config
-        .starts
-        .iter()
-        .map(|s| State::from_pose(*s, c))
-        .collect();
-    let reach = states
-        .iter()
-        .map(|s| search.share_within(&scouts, *s, REACH_M))
-        .fold(0.0, f64::max);
+    let states: Vec<State> = config.starts.iter().map(|s| State::from_pose(*s, c)).collect();
+    let reach = states.iter().map(|s| search.share_within(&scouts, *s, REACH_M)).fold(0.0, f64::max);
     if reach < MIN_SHARE {
         return Err(AlignError::NoOverlap { share: reach });
     }
 
     let mut ends: Vec<End> = Vec::with_capacity(states.len());
     for (run, state) in states.into_iter().enumerate() {
-        let mut end = End {
-            state,
-            cost: f64::INFINITY,
-            iterations: 0,
-            stop: Stop::IterationLimit,
-        };
+        let mut end = End { state, cost: f64::INFINITY, iterations: 0, stop: Stop::IterationLimit };
         for kernel in &config.kernels_m {
             end = search.descend(run, &scouts, end, *kernel, STEP_COARSE_M);
         }
@@ -95,26 +68,17 @@ pub fn align(
         if refined.len() >= config.keep {
             break;
         }
-        if refined
-            .iter()
-            .any(|&r| ends[r].state.is_near(&ends[run].state))
-        {
+        if refined.iter().any(|&r| ends[r].state.is_near(&ends[run].state)) {
             continue;
         }
         ends[run] = search.descend(run, &chosen, ends[run], final_kernel, STEP_FINE_M);
         refined.push(run);
     }
-    let winner = refined
-        .into_iter()
-        .min_by(|&a, &b| ends[a].cost.total_cmp(&ends[b].cost))
-        .unwrap_or(0);
+    let winner = refined.into_iter().min_by(|&a, &b| ends[a].cost.total_cmp(&ends[b].cost)).unwrap_or(0);
     // Costs of the runs that were not refined come from fewer points; bring all to the same points.
     for (run, end) in ends.iter_mut().enumerate() {
         if run != winner {
-            end.cost = search
-                .normal_equations(&chosen, end.state, final_kernel)
-                .cost
-                / chosen.len() as f64;
+            end.cost = search.normal_equations(&chosen, end.state, final_kernel).cost / chosen.len() as f64;
         }
     }
 
@@ -122,16 +86,10 @@ pub fn align(
     let last = search.normal_equations(&chosen, best.state, final_kernel);
     let inlier_share = last.inliers as f64 / chosen.len() as f64;
     if inlier_share < MIN_SHARE {
-        return Err(AlignError::NoOverlap {
-            share: inlier_share,
-        });
+        return Err(AlignError::NoOverlap { share: inlier_share });
     }
     let pose = best.state.to_pose(c);
-    let fits = if config.record {
-        fits(points_yz, field, pose, final_kernel)
-    } else {
-        Vec::new()
-    };
+    let fits = if config.record { fits(points_yz, field, pose, final_kernel) } else { Vec::new() };
     let absolute: Vec<DVec2> = chosen.iter().map(|p| *p + c).collect();
     Ok(AlignReport {
         grasp_from_object: pose,
@@ -169,12 +127,7 @@ fn check(config: &AlignConfig) -> Result<(), AlignError> {
     if config.starts.is_empty() || config.starts.iter().any(|s| !s.is_finite()) {
         return bad("starts");
     }
-    if config.kernels_m.is_empty()
-        || config
-            .kernels_m
-            .iter()
-            .any(|k| !(k.is_finite() && *k > 1e-6))
-    {
+    if config.kernels_m.is_empty() || config.kernels_m.iter().any(|k| !(k.is_finite() && *k > 1e-6)) {
         return bad("kernels_m");
     }
     if config.points < MIN_POINTS {
@@ -202,34 +155,22 @@ struct State {
 impl State {
     fn from_pose(grasp_from_object: PlanarPose, centroid: DVec2) -> Self {
         let inverse = grasp_from_object.inverse();
-        Self {
-            phi: inverse.theta_rad,
-            place: inverse.transform_yz(centroid),
-        }
+        Self { phi: inverse.theta_rad, place: inverse.transform_yz(centroid) }
     }
 
     fn to_pose(self, centroid: DVec2) -> PlanarPose {
         let shift = self.place - DVec2::from_angle(self.phi).rotate(centroid);
-        PlanarPose {
-            theta_rad: self.phi,
-            y_m: shift.x,
-            z_m: shift.y,
-        }
-        .inverse()
+        PlanarPose { theta_rad: self.phi, y_m: shift.x, z_m: shift.y }.inverse()
     }
 
     /// The state after a step of (angle times [`ANGLE_SCALE_M`], y, z).
     fn moved(self, step: [f64; 3]) -> Self {
-        Self {
-            phi: self.phi + step[0] / ANGLE_SCALE_M,
-            place: self.place + DVec2::new(step[1], step[2]),
-        }
+        Self { phi: self.phi + step[0] / ANGLE_SCALE_M, place: self.place + DVec2::new(step[1], step[2]) }
     }
 
     /// Whether both will end in the same place.
     fn is_near(&self, other: &Self) -> bool {
-        (self.phi - other.phi).abs() * ANGLE_SCALE_M < 3e-4
-            && self.place.distance(other.place) < 3e-4
+        (self.phi - other.phi).abs() * ANGLE_SCALE_M < 3e-4 && self.place.distance(other.place) < 3e-4
     }
 }
 
@@ -268,9 +209,7 @@ impl Search<'_> {
     fn share_within(&mut self, points: &[DVec2], state: State, reach_m: f64) -> f64 {
         self.lookups += points.len();
         let turn = DVec2::from_angle(state.phi);
-        let near = points
-            .iter()
-            .filter(|p| self.field.sample(turn.rotate(**p) + state.place).distance <= reach_m);
+        let near = points.iter().filter(|p| self.field.sample(turn.rotate(**p) + state.place).distance <= reach_m);
         near.count() as f64 / points.len() as f64
     }
 
@@ -403,11 +342,7 @@ fn fits(points: &[DVec2], field: &DistanceField, pose: PlanarPose, kernel: f64) 
         .iter()
         .map(|p| {
             if !p.is_finite() {
-                return PointFit {
-                    residual_m: f32::NAN,
-                    weight: 0.0,
-                    fate: Fate::NotFinite,
-                };
+                return PointFit { residual_m: f32::NAN, weight: 0.0, fate: Fate::NotFinite };
             }
             let sample = field.sample(object_from_grasp.transform_yz(*p));
             let r = sample.distance.max(0.0);
@@ -421,11 +356,7 @@ fn fits(points: &[DVec2], field: &DistanceField, pose: PlanarPose, kernel: f64) 
             } else {
                 Fate::Inlier
             };
-            PointFit {
-                residual_m: r as f32,
-                weight: (ratio * ratio) as f32,
-                fate,
-            }
+            PointFit { residual_m: r as f32, weight: (ratio * ratio) as f32, fate }
         })
         .collect()
 }

@@ -15,22 +15,9 @@ pub(crate) fn cuboid(centre: DVec3, half: DVec3) -> TriMesh {
             centre + half * DVec3::new(sign(0), sign(1), sign(2))
         })
         .collect();
-    let quads = [
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-    ];
-    let triangles = quads
-        .iter()
-        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-        .collect();
-    TriMesh {
-        vertices,
-        triangles,
-    }
+    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    TriMesh { vertices, triangles }
 }
 
 /// Half sizes in y-z of the two bars of [`cross`].
@@ -44,20 +31,14 @@ pub(crate) fn cross() -> TriMesh {
         let bar = cuboid(DVec3::ZERO, DVec3::new(0.003, half.x, half.y));
         let shift = mesh.vertices.len() as u32;
         mesh.vertices.extend(bar.vertices.iter().map(|v| turn * *v));
-        mesh.triangles
-            .extend(bar.triangles.iter().map(|t| t.map(|v| v + shift)));
+        mesh.triangles.extend(bar.triangles.iter().map(|t| t.map(|v| v + shift)));
     }
     mesh
 }
 
 /// Points spread over the silhouette of [`cross`] at the given pose, with noise of standard deviation about
 /// `noise_m`, `(y, z)` in the grasp frame.
-pub(crate) fn cross_contacts(
-    count: usize,
-    grasp_from_object: PlanarPose,
-    noise_m: f64,
-    seed: u64,
-) -> Vec<DVec2> {
+pub(crate) fn cross_contacts(count: usize, grasp_from_object: PlanarPose, noise_m: f64, seed: u64) -> Vec<DVec2> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let turn = DVec2::from_angle(std::f64::consts::FRAC_PI_6);
     (0..count)

@@ -22,9 +22,7 @@ pub enum MeshError {
     #[error("the mesh has no triangle with an area: check that the CAD file is not empty")]
     Empty,
     /// A triangle names a corner that does not exist.
-    #[error(
-        "triangle {triangle} of the mesh names a corner that does not exist: the CAD file is damaged"
-    )]
+    #[error("triangle {triangle} of the mesh names a corner that does not exist: the CAD file is damaged")]
     Index {
         /// Position in the list of triangles.
         triangle: usize,
@@ -68,11 +66,7 @@ impl MeshDistance {
     /// [`MeshError`] if a triangle names a missing corner, or if none has a finite, positive area.
     pub fn new(mesh: &TriMesh) -> Result<Self, MeshError> {
         let corners = mesh.vertices.len();
-        if let Some(triangle) = mesh
-            .triangles
-            .iter()
-            .position(|t| t.iter().any(|&v| v as usize >= corners))
-        {
+        if let Some(triangle) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= corners)) {
             return Err(MeshError::Index { triangle });
         }
         let mut triangles: Vec<[DVec3; 3]> = (0..mesh.triangles.len())
@@ -90,21 +84,13 @@ impl MeshDistance {
 
     /// Distance to the nearest triangle, metres, without a sign. NaN for a point that is not finite.
     pub fn unsigned(&self, p: DVec3) -> f64 {
-        if p.is_finite() {
-            self.nearest_below(p, f64::INFINITY).sqrt()
-        } else {
-            f64::NAN
-        }
+        if p.is_finite() { self.nearest_below(p, f64::INFINITY).sqrt() } else { f64::NAN }
     }
 
     /// Signed distance, metres, negative inside. NaN for a point that is not finite.
     pub fn signed(&self, p: DVec3) -> f64 {
         let distance = self.unsigned(p);
-        if distance.is_finite() && self.contains(p) {
-            -distance
-        } else {
-            distance
-        }
+        if distance.is_finite() && self.contains(p) { -distance } else { distance }
     }
 
     /// Whether `p` is inside the mesh: the size of its winding number is above one half.
@@ -125,11 +111,7 @@ impl MeshDistance {
                 stack.push(index + 1);
                 stack.push(node.right);
             } else {
-                solid_angle += self
-                    .leaf(node)
-                    .iter()
-                    .map(|t| triangle_solid_angle(t, p))
-                    .sum::<f64>();
+                solid_angle += self.leaf(node).iter().map(|t| triangle_solid_angle(t, p)).sum::<f64>();
             }
         }
         // The size, not the value: a mesh whose triangles all face inwards is still a body.
@@ -160,10 +142,7 @@ impl MeshDistance {
             let node = &self.nodes[index as usize];
             if node.count == 0 {
                 let (a, b) = (index + 1, node.right);
-                let (da, db) = (
-                    self.nodes[a as usize].distance_squared(p),
-                    self.nodes[b as usize].distance_squared(p),
-                );
+                let (da, db) = (self.nodes[a as usize].distance_squared(p), self.nodes[b as usize].distance_squared(p));
                 // The nearer child last, so that it is looked into first.
                 if da < db {
                     stack.push((b, db));
@@ -199,23 +178,10 @@ fn build(nodes: &mut Vec<Node>, triangles: &mut [[DVec3; 3]], start: usize, end:
     let radius = corners().map(|p| p.distance(centre)).fold(0.0, f64::max);
     let index = nodes.len();
     let count = if part.len() <= LEAF { part.len() } else { 0 };
-    nodes.push(Node {
-        low,
-        high,
-        start: start as u32,
-        count: count as u32,
-        right: 0,
-        centre,
-        moment,
-        radius,
-    });
+    nodes.push(Node { low, high, start: start as u32, count: count as u32, right: 0, centre, moment, radius });
     if count == 0 {
         let size = high - low;
-        let axis = if size.x >= size.y && size.x >= size.z {
-            0
-        } else {
-            usize::from(size.z > size.y) + 1
-        };
+        let axis = if size.x >= size.y && size.x >= size.z { 0 } else { usize::from(size.z > size.y) + 1 };
         let middle = part.len() / 2;
         let key = |t: &[DVec3; 3]| t[0][axis] + t[1][axis] + t[2][axis];
         part.select_nth_unstable_by(middle, |s, t| key(s).total_cmp(&key(t)));
@@ -304,25 +270,17 @@ mod tests {
         let other = cuboid(DVec3::ZERO, DVec3::new(0.003, 0.02, 0.01));
         let shift = mesh.vertices.len() as u32;
         mesh.vertices.extend(other.vertices);
-        mesh.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|v| v + shift)));
+        mesh.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + shift)));
         mesh.vertices.push(DVec3::NAN);
         mesh.triangles.extend([[0, 0, 1], [0, 1, 16]]);
         let distance = MeshDistance::new(&mesh).unwrap();
-        assert!(
-            distance.contains(DVec3::new(0.0001, 0.0002, 0.0003)),
-            "inside both bodies is inside"
-        );
+        assert!(distance.contains(DVec3::new(0.0001, 0.0002, 0.0003)), "inside both bodies is inside");
         assert!(distance.contains(DVec3::new(0.0001, 0.015, 0.0003)));
         assert!(!distance.contains(DVec3::new(0.0001, 0.015, 0.015)));
         for t in &mut mesh.triangles {
             t.swap(0, 1);
         }
-        assert!(
-            MeshDistance::new(&mesh)
-                .unwrap()
-                .contains(DVec3::new(0.0001, 0.015, 0.0003))
-        );
+        assert!(MeshDistance::new(&mesh).unwrap().contains(DVec3::new(0.0001, 0.015, 0.0003)));
         let mut open = cuboid(DVec3::ZERO, half);
         open.triangles.pop();
         let open = MeshDistance::new(&open).unwrap();
@@ -332,22 +290,10 @@ mod tests {
 
     #[test]
     fn bad_meshes_and_bad_points_are_refused() {
-        assert_eq!(
-            MeshDistance::new(&TriMesh::default()).unwrap_err(),
-            MeshError::Empty
-        );
-        let broken = TriMesh {
-            vertices: vec![DVec3::ZERO],
-            triangles: vec![[0, 1, 2]],
-        };
-        assert_eq!(
-            MeshDistance::new(&broken).unwrap_err(),
-            MeshError::Index { triangle: 0 }
-        );
-        let flat = TriMesh {
-            vertices: vec![DVec3::ZERO; 3],
-            triangles: vec![[0, 1, 2]],
-        };
+        assert_eq!(MeshDistance::new(&TriMesh::default()).unwrap_err(), MeshError::Empty);
+        let broken = TriMesh { vertices: vec![DVec3::ZERO], triangles: vec![[0, 1, 2]] };
+        assert_eq!(MeshDistance::new(&broken).unwrap_err(), MeshError::Index { triangle: 0 });
+        let flat = TriMesh { vertices: vec![DVec3::ZERO; 3], triangles: vec![[0, 1, 2]] };
         assert_eq!(MeshDistance::new(&flat).unwrap_err(), MeshError::Empty);
         let distance = MeshDistance::new(&cuboid(DVec3::ZERO, DVec3::splat(0.01))).unwrap();
         assert!(distance.signed(DVec3::NAN).is_nan());

@@ -49,9 +49,7 @@ pub fn spread(len: usize, count: usize) -> Vec<usize> {
     (0..count)
         .map(|i| {
             let (from, to) = (i * len / count, (i + 1) * len / count);
-            let hash = (i as u64)
-                .wrapping_add(0x9e37_79b9_7f4a_7c15)
-                .wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            let hash = (i as u64).wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_mul(0xbf58_476d_1ce4_e5b9);
             from + ((hash ^ (hash >> 31)) % (to - from) as u64) as usize
         })
         .collect()
@@ -78,10 +76,7 @@ mod tests {
         };
         let points = mesh.sample_surface(4000, 7);
         let far = points.iter().filter(|p| p.x > 0.5).count();
-        assert!(
-            (2880..3120).contains(&far),
-            "3 of 4 expected, got {far} of 4000"
-        );
+        assert!((2880..3120).contains(&far), "3 of 4 expected, got {far} of 4000");
         assert!(points.iter().all(|p| p.is_finite()));
         assert_eq!(points, mesh.sample_surface(4000, 7));
         assert_ne!(points, mesh.sample_surface(4000, 8));
