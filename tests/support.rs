@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 /// The folder with real and reference data that only some machines have: `TOUCH2TOUCH_SHARED`, else `../shared`
 /// beside the checkout. `None` (with a note) where it is absent: the product's tests pass without it.
-pub fn shared() -> Option<PathBuf> {
+pub(crate) fn shared() -> Option<PathBuf> {
     let path = std::env::var_os("TOUCH2TOUCH_SHARED")
         .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
     if path.is_dir() {
