@@ -1,0 +1,469 @@
+//! [`Action`]: the table of what a person can trigger. Menus, toolbar, palette and shortcut sheet are made from it.
+
+use strum::{EnumIter, IntoEnumIterator};
+
+use super::command::{CameraPreset, Command, Pane, UiRequest};
+use super::document::Review;
+use super::keys::{ImprintSource, PoseEngine, ShiftMode};
+use super::library::Place;
+use super::settings::{ColourRange, MaskTool, Theme, Workspace};
+use super::state::State;
+use crate::domain::sensor::Finger;
+
+/// A key, by what is printed on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "the names are the keys")]
+pub enum Key {
+    A,
+    B,
+    C,
+    D,
+    E,
+    F,
+    G,
+    H,
+    I,
+    J,
+    K,
+    L,
+    M,
+    N,
+    O,
+    P,
+    Q,
+    R,
+    S,
+    T,
+    U,
+    V,
+    W,
+    X,
+    Y,
+    Z,
+    Num0,
+    Num1,
+    Num2,
+    Num3,
+    Num4,
+    Num5,
+    Num6,
+    Num7,
+    Num8,
+    Num9,
+    F1,
+    F5,
+    F11,
+    F12,
+    Escape,
+    Enter,
+    Backspace,
+    Space,
+    Home,
+    End,
+    PageUp,
+    PageDown,
+    OpenBracket,
+    CloseBracket,
+    Minus,
+    Equals,
+    Backtick,
+    Questionmark,
+    Exclamationmark,
+}
+
+impl Key {
+    /// What is printed on it.
+    pub fn text(self) -> String {
+        let name = format!("{self:?}");
+        match self {
+            Self::Escape => "Esc".into(),
+            Self::PageUp => "PgUp".into(),
+            Self::PageDown => "PgDn".into(),
+            Self::OpenBracket => "[".into(),
+            Self::CloseBracket => "]".into(),
+            Self::Minus => "-".into(),
+            Self::Equals => "=".into(),
+            Self::Backtick => "`".into(),
+            Self::Questionmark => "?".into(),
+            Self::Exclamationmark => "!".into(),
+            _ => name.strip_prefix("Num").map_or(name.clone(), ToOwned::to_owned),
+        }
+    }
+}
+
+/// A key with its modifiers. Ctrl stands for Cmd on a Mac.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Shortcut {
+    /// Whether Ctrl (Cmd) is down.
+    pub ctrl: bool,
+    /// Whether Shift is down.
+    pub shift: bool,
+    /// Whether Alt is down.
+    pub alt: bool,
+    /// The key.
+    pub key: Key,
+}
+
+impl std::fmt::Display for Shortcut {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        for (down, name) in [(self.ctrl, "Ctrl+"), (self.alt, "Alt+"), (self.shift, "Shift+")] {
+            if down {
+                f.write_str(name)?;
+            }
+        }
+        f.write_str(&self.key.text())
+    }
+}
+
+const fn plain(key: Key) -> Shortcut {
+    Shortcut { ctrl: false, shift: false, alt: false, key }
+}
+const fn shift(key: Key) -> Shortcut {
+    Shortcut { shift: true, ..plain(key) }
+}
+const fn ctrl(key: Key) -> Shortcut {
+    Shortcut { ctrl: true, ..plain(key) }
+}
+const fn ctrl_shift(key: Key) -> Shortcut {
+    Shortcut { ctrl: true, ..shift(key) }
+}
+const fn ctrl_alt(key: Key) -> Shortcut {
+    Shortcut { alt: true, ..ctrl(key) }
+}
+
+/// The part of the shortcut sheet an action stands in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter)]
+pub enum Group {
+    /// Opening and saving.
+    File,
+    /// From pair to pair.
+    Navigate,
+    /// Predictions.
+    Generate,
+    /// Contact masks.
+    Mask,
+    /// Registration.
+    Pose,
+    /// What is shown and how.
+    View,
+    /// Help.
+    Help,
+}
+
+impl Group {
+    /// The heading.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::File => "File",
+            Self::Navigate => "Navigate",
+            Self::Generate => "Generate",
+            Self::Mask => "Mask",
+            Self::Pose => "Pose",
+            Self::View => "View",
+            Self::Help => "Help",
+        }
+    }
+
+    /// Its actions, in the order of the table.
+    pub fn actions(self) -> impl Iterator<Item = Action> {
+        Action::iter().filter(move |action| action.group() == self)
+    }
+}
+
+macro_rules! actions {
+    ($( $name:ident, $group:ident, $label:literal, $tooltip:literal, [$($shortcut:expr),*]; )*) => {
+        /// Something a person can trigger.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter)]
+        pub enum Action {
+            $( #[doc = $tooltip] $name, )*
+        }
+
+        impl Action {
+            /// The name on screen, in sentence case; `…` if a question follows.
+            pub fn name(self) -> &'static str {
+                match self { $( Self::$name => $label, )* }
+            }
+
+            /// What it does.
+            pub fn tooltip(self) -> &'static str {
+                match self { $( Self::$name => $tooltip, )* }
+            }
+
+            /// The part of the shortcut sheet it stands in.
+            pub fn group(self) -> Group {
+                match self { $( Self::$name => Group::$group, )* }
+            }
+
+            /// Its shortcuts, the main one first.
+            pub fn shortcuts(self) -> &'static [Shortcut] {
+                match self { $( Self::$name => const { &[$($shortcut),*] }, )* }
+            }
+        }
+    };
+}
+
+use Key as K;
+actions! {
+    OpenFolder, File, "Open folder…", "Opens a folder with the lab's files or with images", [ctrl(K::O), ctrl_shift(K::O)];
+    OpenDemo, File, "Open the demo", "Opens the built-in simulated data", [];
+    Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)];
+    Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)];
+    ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
+
+    PreviousSample, Navigate, "Previous sample", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)];
+    NextSample, Navigate, "Next sample", "Shows the next pair of the list", [plain(K::D), plain(K::PageDown)];
+    TenBack, Navigate, "10 back", "Moves 10 pairs back in the list", [shift(K::A)];
+    TenForward, Navigate, "10 forward", "Moves 10 pairs forward in the list", [shift(K::D)];
+    FirstSample, Navigate, "First sample", "Shows the first pair of the list", [plain(K::Home)];
+    LastSample, Navigate, "Last sample", "Shows the last pair of the list", [plain(K::End)];
+    NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift(K::N)];
+    OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)];
+    BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)];
+    FindSample, Navigate, "Filter samples", "Moves the keyboard to the filter of the list", [ctrl(K::F)];
+
+    Generate, Generate, "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", [ctrl(K::G)];
+    GenerateNewSeed, Generate, "Generate with a new seed", "Draws another seed, then generates", [ctrl_shift(K::G)];
+    LockSeed, Generate, "Lock the seed", "Keeps the seed when generating again, or draws a new one each time", [ctrl(K::L)];
+    CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
+    NextShift, Generate, "Next range mapping", "Goes through raw, paper shift and exact inverse", [shift(K::P)];
+
+    Brush, Mask, "Brush", "Adds to the mask while the button is down", [plain(K::Num1), plain(K::B)];
+    Eraser, Mask, "Eraser", "Removes from the mask while the button is down", [plain(K::Num2), plain(K::E)];
+    PanTool, Mask, "Move the image", "The pointer moves the image instead of drawing", [plain(K::Num8)];
+    LastTool, Mask, "Last tool", "Goes back to the tool before", [plain(K::Q)];
+    BrushSmaller, Mask, "Smaller brush", "Makes the brush smaller", [plain(K::OpenBracket)];
+    BrushLarger, Mask, "Larger brush", "Makes the brush larger", [plain(K::CloseBracket)];
+    FillHoles, Mask, "Fill holes", "Fills the holes of the mask", [plain(K::H)];
+    LargestIsland, Mask, "Largest island", "Keeps only the largest connected part of the mask", [plain(K::K)];
+    AdoptAutomatic, Mask, "Threshold to mask", "Makes the mask of the chosen automatic source the corrected one", [plain(K::T)];
+    ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)];
+    Undo, Mask, "Undo", "Takes back the last change of what is on screen", [ctrl(K::Z)];
+    Redo, Mask, "Redo", "Does it again", [ctrl_shift(K::Z), ctrl(K::Y)];
+    MaskVisible, Mask, "Show the mask", "Draws the mask over the images, or not", [plain(K::S)];
+    MaskOutline, Mask, "Mask as outline", "Draws only the outline of the mask", [shift(K::S)];
+    MaskFainter, Mask, "Mask fainter", "Makes the mask more transparent", [plain(K::Minus)];
+    MaskStronger, Mask, "Mask stronger", "Makes the mask less transparent", [plain(K::Equals)];
+    DoneAndNext, Mask, "Done and next", "Marks the pair as done and shows the next unfinished one", [ctrl(K::Enter)];
+    Flag, Mask, "Flag", "Marks the pair as questionable", [plain(K::Exclamationmark)];
+    Skip, Mask, "Skip", "Leaves the pair out", [ctrl(K::Backspace)];
+    MarkTodo, Mask, "Back to todo", "Takes the review state back", [];
+
+    RunPose, Pose, "Compute again", "Tries again what could not be computed", [ctrl(K::R)];
+    AcceptMeasuredPose, Pose, "Accept the measured pose", "Stores the pose of the measured imprint with the pair", [];
+    AcceptPredictedPose, Pose, "Accept the predicted pose", "Stores the pose of the predicted imprint with the pair", [];
+    NextPoseEngine, Pose, "Other registration", "Goes through the registrations", [];
+
+    LockRange, View, "Lock the colour range", "Keeps the colours from pair to pair, or fits them to each", [plain(K::O)];
+    RangeOnce, View, "Fit the colour range once", "Sets the colour range from what is shown", [plain(K::C)];
+    ResetRange, View, "Reset the colour range", "Sets the colour range to 0 to 18 mm", [shift(K::C)];
+    Fit, View, "Fit", "Fits images and 3D views to their panes", [plain(K::Num0)];
+    CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl_alt(K::Num1)];
+    CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl_alt(K::Num2)];
+    CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl_alt(K::Num3)];
+    CameraTop, View, "View from the top", "Looks along the tool", [ctrl_alt(K::Num4)];
+    LinkCameras, View, "Link cameras", "Moves both 3D views together", [];
+    Footprint, View, "GelSlim window", "Draws the GelSlim's window on bubble images", [];
+    SwitchTheme, View, "Dark or light", "Switches between the dark and the light theme", [];
+    InspectWorkspace, View, "Inspect", "Truth and prediction side by side", [];
+    AlignWorkspace, View, "Align", "The cloud on the CAD model", [];
+    LabelWorkspace, View, "Label", "Correcting masks", [];
+    EvaluateWorkspace, View, "Evaluate", "The figures", [];
+    ResetWorkspace, View, "Reset workspace", "Puts the panes back where they were", [];
+    MaximisePane, View, "Maximise pane", "Lets one pane fill the window", [plain(K::Backtick)];
+    Fullscreen, View, "Full screen", "Fills the screen", [plain(K::F11)];
+    Screenshot, View, "Screenshot", "Saves a picture of the window", [plain(K::F12)];
+    CopyHovered, View, "Copy the hovered value", "Copies the number under the pointer", [ctrl(K::C)];
+
+    Palette, Help, "Command palette", "Finds anything that can be done", [ctrl(K::P), ctrl(K::K)];
+    ShortcutSheet, Help, "Shortcuts", "Shows all shortcuts", [plain(K::Questionmark), plain(K::F1)];
+    ResetSettings, Help, "Reset preferences", "Sets all preferences to their defaults", [];
+}
+
+/// The next or previous of a fixed set, going round.
+fn next_of<T: IntoEnumIterator + PartialEq>(current: &T) -> Option<T> {
+    let position = T::iter().position(|t| t == *current)?;
+    T::iter().cycle().nth(position + 1)
+}
+
+/// Factor by which a key press changes the brush.
+const BRUSH_STEP: f32 = 1.25;
+/// By how much a key press changes the opacity.
+const OPACITY_STEP: f32 = 0.1;
+
+impl Action {
+    /// Its main shortcut.
+    pub fn shortcut(self) -> Option<Shortcut> {
+        self.shortcuts().first().copied()
+    }
+
+    /// The action of a shortcut.
+    pub fn of_shortcut(shortcut: Shortcut) -> Option<Self> {
+        Self::iter().find(|action| action.shortcuts().contains(&shortcut))
+    }
+
+    /// Tooltip with the shortcut behind it.
+    pub fn help(self) -> String {
+        match self.shortcut() {
+            Some(shortcut) => format!("{} ({shortcut})", self.tooltip()),
+            None => self.tooltip().to_owned(),
+        }
+    }
+
+    /// What it does now; `None` = it cannot do anything now (greyed out).
+    pub fn command(self, state: &State) -> Option<Command> {
+        let open = state.library.open.is_some();
+        let selected = state.entry().is_some();
+        let listed = !state.library.order.is_empty();
+        let editable = state.document.is_editable(state.pair_name());
+        let settings = &state.settings;
+        let fingers = state.selection.fingers();
+        let when = |condition: bool, command: Command| condition.then_some(command);
+        let ui = |request: UiRequest| Some(Command::Ui(request));
+        match self {
+            Self::OpenFolder => ui(UiRequest::PickFolder),
+            Self::OpenDemo => Some(Command::Open(Place::Demo)),
+            Self::Reload => when(open, Command::Reload),
+            Self::Save => Some(Command::Save),
+            Self::ExportMasks => when(open, Command::Ui(UiRequest::PickExportFolder)),
+
+            Self::PreviousSample => when(listed, Command::Step(-1)),
+            Self::NextSample => when(listed, Command::Step(1)),
+            Self::TenBack => when(listed, Command::Step(-10)),
+            Self::TenForward => when(listed, Command::Step(10)),
+            Self::FirstSample => when(listed, Command::First),
+            Self::LastSample => when(listed, Command::Last),
+            Self::NextUnfinished => when(listed, Command::NextUnfinished),
+            Self::OtherFinger => {
+                let other = if state.selection.finger == Finger::Right { Finger::Left } else { Finger::Right };
+                Some(Command::SelectFinger(other))
+            }
+            Self::BothFingers => Some(Command::ShowBothFingers(!state.selection.both_fingers)),
+            Self::FindSample => {
+                when(state.selection.panes.contains(&Pane::Browser), Command::Ui(UiRequest::FocusFilter))
+            }
+
+            Self::Generate => when(state.can_generate().is_ok(), Command::Generate),
+            Self::GenerateNewSeed => when(state.can_generate().is_ok(), Command::GenerateNewSeed),
+            Self::LockSeed => {
+                let mut generate = settings.generate.clone();
+                generate.seed_locked = !generate.seed_locked;
+                Some(Command::SetGenerate(generate))
+            }
+            Self::CancelJobs => {
+                if state.document.stroke.is_some() {
+                    Some(Command::CancelStroke)
+                } else {
+                    when(!state.tasks.running.is_empty(), Command::CancelAll)
+                }
+            }
+            Self::NextShift => next_of::<ShiftMode>(&settings.shift).map(Command::SetShift),
+
+            Self::Brush => Some(Command::SetMaskTool(MaskTool::Brush)),
+            Self::Eraser => Some(Command::SetMaskTool(MaskTool::Eraser)),
+            Self::PanTool => Some(Command::SetMaskTool(MaskTool::Pan)),
+            Self::LastTool => Some(Command::LastMaskTool),
+            Self::BrushSmaller => Some(Command::SetBrushRadius(settings.mask.radius_px / BRUSH_STEP)),
+            Self::BrushLarger => Some(Command::SetBrushRadius(settings.mask.radius_px * BRUSH_STEP)),
+            Self::FillHoles => when(editable, Command::FillHoles),
+            Self::LargestIsland => when(editable, Command::LargestIsland),
+            Self::AdoptAutomatic => when(editable, Command::AdoptAutomatic),
+            Self::ResetMask => {
+                let corrected = state.document.hand_mask(state.pair_name(), state.selection.finger).is_some();
+                when(editable && corrected, Command::ResetMask)
+            }
+            Self::Undo => when(state.history.next_undo(state.pair_name(), &fingers).is_some(), Command::Undo),
+            Self::Redo => when(state.history.next_redo(state.pair_name(), &fingers).is_some(), Command::Redo),
+            Self::MaskVisible => Some(Command::SetMaskVisible(!settings.mask_visible)),
+            Self::MaskOutline => Some(Command::SetMaskOutline(!settings.mask_outline)),
+            Self::MaskFainter => Some(Command::SetMaskOpacity(settings.mask_opacity - OPACITY_STEP)),
+            Self::MaskStronger => Some(Command::SetMaskOpacity(settings.mask_opacity + OPACITY_STEP)),
+            Self::DoneAndNext => when(editable, Command::DoneAndNext),
+            Self::Flag => when(editable, Command::SetReview(Review::Flagged)),
+            Self::Skip => when(editable, Command::SetReview(Review::Skip)),
+            Self::MarkTodo => when(editable, Command::SetReview(Review::Todo)),
+
+            Self::RunPose => when(selected, Command::Retry),
+            Self::AcceptMeasuredPose => accept(state, ImprintSource::Measured),
+            Self::AcceptPredictedPose => accept(state, ImprintSource::Predicted),
+            Self::NextPoseEngine => next_of::<PoseEngine>(&settings.pose_engine).map(Command::SetPoseEngine),
+
+            Self::LockRange => {
+                Some(Command::SetRange(ColourRange { locked: !settings.range.locked, ..settings.range }))
+            }
+            Self::RangeOnce => when(selected, Command::RangeFromShown),
+            Self::ResetRange => Some(Command::SetRange(ColourRange::default())),
+            Self::Fit => ui(UiRequest::Fit),
+            Self::CameraLeft => ui(UiRequest::Camera(CameraPreset::Left)),
+            Self::CameraRight => ui(UiRequest::Camera(CameraPreset::Right)),
+            Self::CameraFront => ui(UiRequest::Camera(CameraPreset::Front)),
+            Self::CameraTop => ui(UiRequest::Camera(CameraPreset::Top)),
+            Self::LinkCameras => Some(Command::SetCamerasLinked(!settings.cameras_linked)),
+            Self::Footprint => Some(Command::SetFootprintVisible(!settings.footprint_visible)),
+            Self::SwitchTheme => next_of::<Theme>(&settings.theme).map(Command::SetTheme),
+            Self::InspectWorkspace => Some(Command::SetWorkspace(Workspace::Inspect)),
+            Self::AlignWorkspace => Some(Command::SetWorkspace(Workspace::Align)),
+            Self::LabelWorkspace => Some(Command::SetWorkspace(Workspace::Label)),
+            Self::EvaluateWorkspace => Some(Command::SetWorkspace(Workspace::Evaluate)),
+            Self::ResetWorkspace => ui(UiRequest::ResetWorkspace),
+            Self::MaximisePane => ui(UiRequest::ToggleMaximised),
+            Self::Fullscreen => ui(UiRequest::ToggleFullscreen),
+            Self::Screenshot => ui(UiRequest::Screenshot),
+            Self::CopyHovered => when(state.selection.hover.is_some(), Command::Ui(UiRequest::CopyHovered)),
+
+            Self::Palette => Some(Command::SetPalette(!state.selection.palette)),
+            Self::ShortcutSheet => Some(Command::SetShortcutSheet(!state.selection.shortcut_sheet)),
+            Self::ResetSettings => Some(Command::ResetSettings),
+        }
+    }
+}
+
+/// Accepts the pose shown, or withdraws it if it is the accepted one.
+fn accept(state: &State, source: ImprintSource) -> Option<Command> {
+    let shown = state.pose(source).ready()?.grasp_from_object;
+    let accepted = state.document.pair(state.pair_name()).and_then(|labels| labels.accepted(source));
+    let editable = state.document.is_editable(state.pair_name());
+    editable.then_some(Command::AcceptPose(source, accepted != Some(shown)))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    #[test]
+    fn no_two_actions_share_a_shortcut_or_a_name() {
+        let mut shortcuts: BTreeMap<Shortcut, Action> = BTreeMap::new();
+        let mut names: BTreeMap<&str, Action> = BTreeMap::new();
+        for action in Action::iter() {
+            for shortcut in action.shortcuts() {
+                assert_eq!(shortcuts.insert(*shortcut, action), None, "{shortcut} is taken, {action:?} wants it too");
+                assert_eq!(Action::of_shortcut(*shortcut), Some(action));
+            }
+            assert_eq!(names.insert(action.name(), action), None);
+        }
+    }
+
+    #[test]
+    fn each_action_says_what_it_does() {
+        for action in Action::iter() {
+            assert!(action.tooltip().len() >= 8 && !action.tooltip().ends_with('.'), "{action:?}");
+            assert!(action.name().chars().next().is_some_and(|c| c.is_uppercase() || c.is_numeric()), "{action:?}");
+            assert!(action.help().starts_with(action.tooltip()));
+        }
+        assert_eq!(Action::Redo.help(), "Does it again (Ctrl+Shift+Z)");
+        assert_eq!(Action::CameraTop.shortcut().unwrap().to_string(), "Ctrl+Alt+4");
+        assert_eq!(Group::iter().flat_map(Group::actions).count(), Action::iter().count());
+    }
+
+    #[test]
+    fn nothing_open_greys_out_what_needs_data() {
+        let state = State::default();
+        for action in [Action::Generate, Action::NextSample, Action::Undo, Action::FillHoles, Action::Reload] {
+            assert!(action.command(&state).is_none(), "{action:?}");
+        }
+        for action in [Action::OpenFolder, Action::OpenDemo, Action::Palette, Action::SwitchTheme, Action::Brush] {
+            assert!(action.command(&state).is_some(), "{action:?}");
+        }
+    }
+}

@@ -1,0 +1,337 @@
+//! [`Command`]: everything that can happen to the state, as data.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::document::{PairLabels, Review};
+use super::error::TaskError;
+use super::keys::{DatasetSeq, ImprintSource, PairKey, PoseEngine, Recipe, Request, ShiftMode};
+use super::library::{BundleInfo, Place, Sort};
+use super::results::{Clouds, Comparison, PoseResult, Prediction};
+use super::services::{DataSource, ToolModel};
+use super::settings::{
+    ColourMap, ColourRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, RuntimeChoice, Settings, Theme,
+    Workspace,
+};
+use super::tasks::{Progress, Ticket};
+use crate::domain::dataset::PairId;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::sample::Sample;
+use crate::domain::sensor::Finger;
+
+/// A pane of the window. What is visible decides what is computed.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter, serde::Serialize, serde::Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Pane {
+    /// The list of pairs.
+    Browser,
+    /// The GelSlim image during the touch.
+    GelRaw,
+    /// The GelSlim image without contact.
+    GelReference,
+    /// Touched minus untouched.
+    GelDifference,
+    /// The measured imprint.
+    Measured,
+    /// The predicted imprint.
+    Predicted,
+    /// Predicted minus measured.
+    Error,
+    /// The measured cloud on the CAD model.
+    SceneMeasured,
+    /// The predicted cloud on the CAD model.
+    ScenePredicted,
+    /// The generator.
+    Generate,
+    /// The mask tools.
+    Masks,
+    /// The figures of the selected pair.
+    Metrics,
+    /// What happened.
+    Log,
+    /// Preferences.
+    Settings,
+}
+
+/// A pixel under the pointer, in raw bubble pixels of one finger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hover {
+    /// The finger.
+    pub finger: Finger,
+    /// Column and row; (0, 0) is the centre of the top-left pixel.
+    pub at_px: [f32; 2],
+}
+
+/// A view direction of the 3D panes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CameraPreset {
+    /// From the left finger.
+    Left,
+    /// From the right finger.
+    Right,
+    /// Along y.
+    Front,
+    /// Along z.
+    Top,
+}
+
+/// What only the window can do, once. Handed out by [`super::runtime::Runtime::tick`].
+#[derive(Clone, Debug, PartialEq)]
+pub enum UiRequest {
+    /// Show the native dialog for a folder, or a path box; answer with [`Command::Open`].
+    PickFolder,
+    /// Show the native dialog for a file, or a path box; answer with [`Command::Open`].
+    PickFile,
+    /// Ask for the folder to export masks to; answer with [`Command::ExportMasks`].
+    PickExportFolder,
+    /// Turn the 3D cameras.
+    Camera(CameraPreset),
+    /// Fit images and 3D views to their panes.
+    Fit,
+    /// Save a picture of the window.
+    Screenshot,
+    /// Fill the screen, or stop it.
+    ToggleFullscreen,
+    /// Let one pane fill the window, or stop it.
+    ToggleMaximised,
+    /// Put the panes of the workspace back where they were.
+    ResetWorkspace,
+    /// Write the number under the pointer to the clipboard.
+    CopyHovered,
+    /// Move the keyboard focus to the filter box.
+    FocusFilter,
+}
+
+/// Everything that can happen to the state.
+///
+/// Views and actions send the first groups; jobs answer with the last.
+#[derive(Clone, Debug)]
+pub enum Command {
+    // The data set
+    /// Opens a place; what is open stays until the new one is read.
+    Open(Place),
+    /// Opens the same place again.
+    Reload,
+    /// Removes a place from the recent ones.
+    ForgetRecent(Place),
+    /// Narrows the list.
+    SetFilter(String),
+    /// Narrows the list to one tool.
+    SetToolFilter(Option<String>),
+    /// Sorts the list.
+    SetSort(Sort),
+    /// The rows of the list that are on screen.
+    ShowRows(Range<usize>),
+
+    // What is looked at
+    /// Shows a pair.
+    Select(PairId),
+    /// Moves in the list; stops at its ends.
+    Step(i64),
+    /// Shows the first of the list.
+    First,
+    /// Shows the last of the list.
+    Last,
+    /// Shows the next of the list whose review is not finished, going round.
+    NextUnfinished,
+    /// Makes a finger the active one.
+    SelectFinger(Finger),
+    /// Shows both fingers, or only the active one.
+    ShowBothFingers(bool),
+    /// The pixel under the pointer, shared by all images.
+    HoverPixel(Option<Hover>),
+    /// The point under the pointer in 3D, metres, grasp frame.
+    HoverPoint(Option<DVec3>),
+    /// The panes on screen.
+    ShowPanes(BTreeSet<Pane>),
+    /// Opens or closes the command palette.
+    SetPalette(bool),
+    /// Opens or closes the shortcut sheet.
+    SetShortcutSheet(bool),
+    /// Something only the window can do.
+    Ui(UiRequest),
+
+    // Generation
+    /// Generates for the selected pair with the settings.
+    Generate,
+    /// Draws a new seed, then generates.
+    GenerateNewSeed,
+    /// Shows another prediction of the same touch.
+    Choose(Recipe),
+    /// Tells a job to stop.
+    Cancel(Ticket),
+    /// Tells every job to stop.
+    CancelAll,
+    /// Tries again what could not be computed.
+    Retry,
+
+    // Masks
+    /// Pointer down on an image, raw bubble pixels. `erase` swaps brush and eraser for this stroke.
+    BeginStroke {
+        /// The finger drawn on.
+        finger: Finger,
+        /// The imprint it is drawn on: its mask in force is where the correction starts.
+        source: ImprintSource,
+        /// Position.
+        at_px: [f32; 2],
+        /// Whether to remove instead of the tool's own effect.
+        erase: bool,
+    },
+    /// Pointer moved, raw bubble pixels.
+    StrokeTo([f32; 2]),
+    /// Pointer up.
+    EndStroke,
+    /// Gives the stroke up.
+    CancelStroke,
+    /// Fills the holes of the mask in force.
+    FillHoles,
+    /// Keeps the largest island of the mask in force.
+    LargestIsland,
+    /// Makes the automatic mask the corrected one.
+    AdoptAutomatic,
+    /// Removes the corrected mask: the automatic source is in force again.
+    ResetMask,
+    /// Takes back the last change of what is on screen.
+    Undo,
+    /// Does it again.
+    Redo,
+    /// Sets the review state of the selected pair.
+    SetReview(Review),
+    /// Marks the selected pair as done and shows the next unfinished one.
+    DoneAndNext,
+    /// Accepts the pose shown for an imprint, or withdraws it.
+    AcceptPose(ImprintSource, bool),
+    /// Writes all labels and settings now.
+    Save,
+    /// Writes the masks to a folder for UNet training.
+    ExportMasks(PathBuf),
+
+    // Preferences
+    /// Light or dark.
+    SetTheme(Theme),
+    /// Scale of the window.
+    SetUiZoom(f32),
+    /// The colour range.
+    SetRange(ColourRange),
+    /// Sets the colour range once from what is shown.
+    RangeFromShown,
+    /// The colour map.
+    SetColourMap(ColourMap),
+    /// How predictions become metres.
+    SetShift(ShiftMode),
+    /// The generator.
+    SetGenerate(GenerateSettings),
+    /// The mask tools.
+    SetMask(MaskSettings),
+    /// The tool in hand.
+    SetMaskTool(MaskTool),
+    /// The tool before.
+    LastMaskTool,
+    /// The automatic source.
+    SetMaskSource(MaskSource),
+    /// Brush radius, pixels.
+    SetBrushRadius(f32),
+    /// Whether the mask is drawn.
+    SetMaskVisible(bool),
+    /// Whether only its outline is.
+    SetMaskOutline(bool),
+    /// How strongly it covers, 0..1.
+    SetMaskOpacity(f32),
+    /// Whether the GelSlim's window is drawn.
+    SetFootprintVisible(bool),
+    /// The registration.
+    SetPoseEngine(PoseEngine),
+    /// The model runtime.
+    SetRuntime(RuntimeChoice),
+    /// Whether the 3D views move together.
+    SetCamerasLinked(bool),
+    /// The workspace in front.
+    SetWorkspace(Workspace),
+    /// The arrangement of the panes of a workspace, in the window's format.
+    SetLayout(Workspace, String),
+    /// The hint of the first start is not shown again.
+    DismissHint,
+    /// Log entries up to a number were seen.
+    LogSeen(u64),
+    /// Adds a notice or an error of the window's own.
+    Report(TaskError),
+    /// All preferences back to their defaults; recent places stay.
+    ResetSettings,
+
+    // Answers of the runtime
+    /// A data set was opened.
+    Opened(Ticket, DatasetSeq, Place, Opened),
+    /// Bundles were looked for.
+    Bundles(Vec<BundleInfo>, Vec<TaskError>),
+    /// The settings file was read.
+    SettingsLoaded(Box<Settings>, Option<TaskError>),
+    /// What the runtime was asked for because it is shown.
+    Demanded(Vec<Request>),
+    /// A result that a pane asked for.
+    Computed(Request, Computed),
+    /// A prediction is there.
+    Generated(Ticket, Arc<Prediction>),
+    /// A job is under way.
+    Progressed(Ticket, Progress),
+    /// A job without a result is done, with a line for the log.
+    Finished(Ticket, Option<String>),
+    /// A job ended without a result.
+    TaskFailed(Ticket, TaskError),
+    /// A result that a pane asked for could not be made.
+    RequestFailed(Request, TaskError),
+    /// A file could not be saved.
+    SaveFailed(TaskError),
+}
+
+/// What opening a data set yields.
+#[derive(Clone)]
+pub struct Opened {
+    /// The data.
+    pub source: Arc<dyn DataSource>,
+    /// Review states stored with it that are not "todo", by pair name.
+    pub reviews: BTreeMap<String, Review>,
+}
+
+impl std::fmt::Debug for Opened {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Opened({}, {} reviews)", self.source.title(), self.reviews.len())
+    }
+}
+
+/// A computed result; its kind is that of its [`Request`].
+#[derive(Clone, Debug)]
+pub enum Computed {
+    /// Of [`Request::Sample`].
+    Sample(Arc<Sample>),
+    /// Of [`Request::Labels`].
+    Labels(Box<PairLabels>),
+    /// Of [`Request::Tool`].
+    Tool(Arc<ToolModel>),
+    /// Of [`Request::Imprint`] and [`Request::Thumbnail`].
+    Depth(Arc<DepthMap>),
+    /// Of [`Request::Comparison`].
+    Comparison(Arc<Comparison>),
+    /// Of [`Request::Mask`].
+    Mask(Arc<Mask>),
+    /// Of [`Request::Cloud`].
+    Cloud(Arc<Clouds>),
+    /// Of [`Request::Pose`].
+    Pose(Arc<PoseResult>),
+}
+
+/// A pair whose labels are to be written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelsToSave {
+    /// The pair.
+    pub key: PairKey,
+    /// Its name.
+    pub name: String,
+    /// What to write.
+    pub labels: PairLabels,
+}

@@ -1,0 +1,79 @@
+//! [`Effect`]: what `apply` wants done outside the state.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::command::{LabelsToSave, UiRequest};
+use super::document::PairLabels;
+use super::keys::{DatasetSeq, Recipe};
+use super::library::{BundleInfo, Place};
+use super::services::DataSource;
+use super::settings::{RuntimeChoice, Settings};
+use super::tasks::Ticket;
+use crate::domain::sample::Sample;
+
+/// Work that leaves the state.
+#[derive(Clone)]
+pub enum Effect {
+    /// Read a data set's index.
+    Open {
+        /// The job.
+        ticket: Ticket,
+        /// The number of this opening.
+        seq: DatasetSeq,
+        /// What to open.
+        place: Place,
+    },
+    /// Look for bundles.
+    FindBundles(Vec<PathBuf>),
+    /// Make a prediction.
+    Generate {
+        /// The job.
+        ticket: Ticket,
+        /// What to make.
+        recipe: Recipe,
+        /// The bundle.
+        bundle: BundleInfo,
+        /// The runtime.
+        runtime: RuntimeChoice,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// The pair, if it is loaded.
+        sample: Option<Arc<Sample>>,
+    },
+    /// Tell a job to stop.
+    Cancel(Ticket),
+    /// Write the labels of a pair; a newer request for the same pair replaces a waiting one.
+    SaveLabels(Arc<dyn DataSource>, Box<LabelsToSave>),
+    /// Write the settings; a newer request replaces a waiting one.
+    SaveSettings(Box<Settings>),
+    /// Write masks for UNet training.
+    ExportMasks {
+        /// The job.
+        ticket: Ticket,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// Labels changed since they were read, by pair name: newer than the files.
+        labels: BTreeMap<String, PairLabels>,
+        /// Where to.
+        folder: PathBuf,
+    },
+    /// Something only the window can do.
+    Ui(UiRequest),
+}
+
+impl std::fmt::Debug for Effect {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Open { place, .. } => write!(f, "Open({place})"),
+            Self::FindBundles(folders) => write!(f, "FindBundles({folders:?})"),
+            Self::Generate { ticket, recipe, .. } => write!(f, "Generate({ticket:?}, {recipe:?})"),
+            Self::Cancel(ticket) => write!(f, "Cancel({ticket:?})"),
+            Self::SaveLabels(_, save) => write!(f, "SaveLabels({})", save.name),
+            Self::SaveSettings(_) => write!(f, "SaveSettings"),
+            Self::ExportMasks { folder, .. } => write!(f, "ExportMasks({})", folder.display()),
+            Self::Ui(request) => write!(f, "Ui({request:?})"),
+        }
+    }
+}

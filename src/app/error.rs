@@ -1,0 +1,93 @@
+//! [`TaskError`]: a failure in words a person can act on.
+
+use std::fmt;
+
+/// What failed, why, and what to do about it. Shown once, in the log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TaskError {
+    /// What was being done, e.g. `Load pattern_31_rod/data_4`.
+    pub what: String,
+    /// Why it did not work, with the file at the end where there is one.
+    pub why: String,
+    /// What to do about it, where that is known.
+    pub hint: Option<String>,
+    /// How it ended.
+    pub kind: TaskErrorKind,
+}
+
+/// How a task ended without a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TaskErrorKind {
+    /// It met something wrong in its input or surroundings.
+    Failed,
+    /// It was told to stop.
+    Cancelled,
+    /// A defect in this program; caught at the edge of the lane.
+    Panicked,
+}
+
+impl TaskError {
+    /// A failure of `what` because of `why`.
+    pub fn new(what: impl Into<String>, why: impl fmt::Display) -> Self {
+        Self { what: what.into(), why: why.to_string(), hint: None, kind: TaskErrorKind::Failed }
+    }
+
+    /// A failure with the whole chain of causes, each after a colon.
+    pub fn from_error(what: impl Into<String>, err: &dyn std::error::Error) -> Self {
+        let mut why = err.to_string();
+        let mut source = err.source();
+        while let Some(err) = source {
+            // Wrappers often print their cause themselves: do not say it twice.
+            let text = err.to_string();
+            if !why.contains(&text) {
+                why = format!("{why}: {text}");
+            }
+            source = err.source();
+        }
+        Self::new(what, why)
+    }
+
+    /// The end of a task that was told to stop.
+    pub fn cancelled(what: impl Into<String>) -> Self {
+        Self { what: what.into(), why: "cancelled".into(), hint: None, kind: TaskErrorKind::Cancelled }
+    }
+
+    /// A panic caught at the edge of a lane.
+    pub fn panicked(what: impl Into<String>, payload: &(dyn std::any::Any + Send)) -> Self {
+        let text = payload
+            .downcast_ref::<&str>()
+            .map(ToString::to_string)
+            .or_else(|| payload.downcast_ref::<String>().cloned())
+            .unwrap_or_else(|| "no message".into());
+        Self {
+            what: what.into(),
+            why: format!("an internal error: {text}"),
+            hint: Some("Nothing is lost. Please report this with the steps that led here.".into()),
+            kind: TaskErrorKind::Panicked,
+        }
+    }
+
+    /// Adds what to do about it.
+    #[must_use]
+    pub fn with_hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    /// Whether it was told to stop.
+    pub fn is_cancelled(&self) -> bool {
+        self.kind == TaskErrorKind::Cancelled
+    }
+}
+
+impl fmt::Display for TaskError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.what, self.why)?;
+        if let Some(hint) = &self.hint {
+            write!(f, ". {hint}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for TaskError {}

@@ -1,0 +1,310 @@
+//! Undo: reversible changes of the document, one entry per gesture, within a budget of bytes.
+
+use super::document::{Document, HandMask, Review};
+use super::keys::ImprintSource;
+use crate::domain::frames::PlanarPose;
+use crate::domain::sensor::Finger;
+
+/// A rectangle of mask pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskPatch {
+    /// Left column.
+    pub x: usize,
+    /// Top row.
+    pub y: usize,
+    /// Columns.
+    pub width: usize,
+    /// The pixels, row by row; their number is a multiple of `width`.
+    pub pixels: Vec<bool>,
+}
+
+/// One reversible change of the document.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Edit {
+    /// Replaces the pixels under a patch of a corrected mask.
+    Patch {
+        /// The pair's name.
+        pair: String,
+        /// The finger.
+        finger: Finger,
+        /// The pixels.
+        patch: MaskPatch,
+    },
+    /// Replaces a whole corrected mask; `None` = the automatic source is in force.
+    HandMask {
+        /// The pair's name.
+        pair: String,
+        /// The finger.
+        finger: Finger,
+        /// The mask.
+        mask: Option<HandMask>,
+    },
+    /// Replaces the review state.
+    Review {
+        /// The pair's name.
+        pair: String,
+        /// The state.
+        review: Review,
+    },
+    /// Replaces the accepted pose.
+    Pose {
+        /// The pair's name.
+        pair: String,
+        /// The imprint it was made from.
+        source: ImprintSource,
+        /// `grasp_from_object`.
+        pose: Option<PlanarPose>,
+    },
+}
+
+impl Edit {
+    /// Exchanges the value held here with the one in `doc`; afterwards `self` is the inverse edit.
+    pub fn swap(&mut self, doc: &mut Document) {
+        match self {
+            Self::Patch { pair, finger, patch } => {
+                let revision = doc.next_revision();
+                let hand = doc.labels.get_mut(pair).and_then(|l| l.masks[finger.index()].as_mut());
+                // The edits of a gesture are swapped in order, so the mask is there and as large as it was.
+                let Some(hand) = hand else { return };
+                let mask = std::sync::Arc::make_mut(&mut hand.mask);
+                if patch.x + patch.width > mask.width()
+                    || patch.y + patch.pixels.len() / patch.width.max(1) > mask.height()
+                {
+                    return;
+                }
+                for (i, pixel) in patch.pixels.iter_mut().enumerate() {
+                    let at = (patch.x + i % patch.width, patch.y + i / patch.width);
+                    std::mem::swap(&mut mask[at], pixel);
+                }
+                hand.revision = revision;
+            }
+            Self::HandMask { pair, finger, mask } => {
+                let labels = doc.labels.entry(pair.clone()).or_default();
+                std::mem::swap(&mut labels.masks[finger.index()], mask);
+            }
+            Self::Review { pair, review } => *review = doc.set_review(pair, *review),
+            Self::Pose { pair, source, pose } => {
+                let labels = doc.labels.entry(pair.clone()).or_default();
+                std::mem::swap(&mut labels.accepted[*source as usize], pose);
+            }
+        }
+    }
+
+    /// The pair's name.
+    pub fn pair(&self) -> &str {
+        match self {
+            Self::Patch { pair, .. }
+            | Self::HandMask { pair, .. }
+            | Self::Review { pair, .. }
+            | Self::Pose { pair, .. } => pair,
+        }
+    }
+
+    /// The finger, if it concerns one.
+    pub fn finger(&self) -> Option<Finger> {
+        match self {
+            Self::Patch { finger, .. } | Self::HandMask { finger, .. } => Some(*finger),
+            Self::Review { .. } | Self::Pose { .. } => None,
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        std::mem::size_of::<Self>()
+            + match self {
+                Self::Patch { patch, .. } => patch.pixels.len(),
+                Self::HandMask { mask, .. } => mask.as_ref().map_or(0, |m| m.mask.len()),
+                Self::Review { .. } | Self::Pose { .. } => 0,
+            }
+    }
+}
+
+/// What one gesture changed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gesture {
+    /// What it did, e.g. `brush stroke`: shown when it is undone.
+    pub name: &'static str,
+    /// Its changes in the order they were made. All concern the same pair.
+    pub edits: Vec<Edit>,
+}
+
+impl Gesture {
+    /// The pair's name.
+    pub fn pair(&self) -> &str {
+        self.edits.first().map_or("", Edit::pair)
+    }
+
+    /// Whether everything it changes is on screen.
+    fn is_on_screen(&self, pair: &str, fingers: &[Finger]) -> bool {
+        self.edits.iter().all(|e| e.pair() == pair && e.finger().is_none_or(|f| fingers.contains(&f)))
+    }
+
+    /// Whether undoing one before the other would matter.
+    fn overlaps(&self, other: &Gesture) -> bool {
+        self.edits.iter().any(|a| {
+            other.edits.iter().any(|b| {
+                a.pair() == b.pair()
+                    && a.finger() == b.finger()
+                    && (a.finger().is_some() || std::mem::discriminant(a) == std::mem::discriminant(b))
+            })
+        })
+    }
+
+    fn bytes(&self) -> usize {
+        self.edits.iter().map(Edit::bytes).sum()
+    }
+}
+
+/// Gestures done and undone.
+///
+/// Undo takes the last gesture whose every change is on screen, so it never touches a pair or a finger that is not;
+/// a gesture that others were made on top of waits for these to be undone first.
+#[derive(Clone, Debug)]
+pub struct History {
+    done: Vec<Gesture>,
+    undone: Vec<Gesture>,
+    budget: usize,
+}
+
+impl Default for History {
+    fn default() -> Self {
+        // A stroke over a whole 175 x 140 mask holds 25 kB: some 2500 of the largest, tens of thousands of usual ones.
+        Self::new(64 << 20)
+    }
+}
+
+impl History {
+    /// An empty history of at most `budget` bytes.
+    pub fn new(budget: usize) -> Self {
+        Self { done: Vec::new(), undone: Vec::new(), budget }
+    }
+
+    /// Records a gesture that was just made. What it makes impossible to redo is forgotten.
+    pub fn record(&mut self, gesture: Gesture) {
+        if gesture.edits.is_empty() {
+            return;
+        }
+        self.undone.retain(|other| !other.overlaps(&gesture));
+        self.done.push(gesture);
+        let mut bytes: usize = self.done.iter().chain(&self.undone).map(Gesture::bytes).sum();
+        while bytes > self.budget && self.done.len() > 1 {
+            bytes -= self.done.remove(0).bytes();
+        }
+    }
+
+    /// Takes back the last gesture on screen. Returns what it did.
+    pub fn undo(&mut self, doc: &mut Document, pair: &str, fingers: &[Finger]) -> Option<&Gesture> {
+        let at = Self::position(&self.done, pair, fingers)?;
+        let mut gesture = self.done.remove(at);
+        gesture.edits.iter_mut().rev().for_each(|edit| edit.swap(doc));
+        self.undone.push(gesture);
+        self.undone.last()
+    }
+
+    /// Does the last gesture taken back on screen again. Returns what it did.
+    pub fn redo(&mut self, doc: &mut Document, pair: &str, fingers: &[Finger]) -> Option<&Gesture> {
+        let at = Self::position(&self.undone, pair, fingers)?;
+        let mut gesture = self.undone.remove(at);
+        gesture.edits.iter_mut().for_each(|edit| edit.swap(doc));
+        self.done.push(gesture);
+        self.done.last()
+    }
+
+    /// What undo would take back.
+    pub fn next_undo(&self, pair: &str, fingers: &[Finger]) -> Option<&Gesture> {
+        Self::position(&self.done, pair, fingers).map(|at| &self.done[at])
+    }
+
+    /// What redo would do.
+    pub fn next_redo(&self, pair: &str, fingers: &[Finger]) -> Option<&Gesture> {
+        Self::position(&self.undone, pair, fingers).map(|at| &self.undone[at])
+    }
+
+    /// Forgets everything: another data set is open.
+    pub fn clear(&mut self) {
+        self.done.clear();
+        self.undone.clear();
+    }
+
+    fn position(stack: &[Gesture], pair: &str, fingers: &[Finger]) -> Option<usize> {
+        (0..stack.len()).rev().find(|&at| {
+            stack[at].is_on_screen(pair, fingers) && !stack[at + 1..].iter().any(|later| later.overlaps(&stack[at]))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::keys::Revision;
+    use super::*;
+    use crate::domain::grid::Mask;
+
+    fn hand(doc: &mut Document, pair: &str, finger: Finger) -> HandMask {
+        let hand = HandMask { mask: Arc::new(Mask::filled(8, 4, false)), revision: Revision(0), base: String::new() };
+        doc.labels.entry(pair.into()).or_default().masks[finger.index()] = Some(hand.clone());
+        hand
+    }
+
+    fn patch(doc: &mut Document, history: &mut History, pair: &str, finger: Finger, x: usize) {
+        let mut edit =
+            Edit::Patch { pair: pair.into(), finger, patch: MaskPatch { x, y: 1, width: 2, pixels: vec![true; 4] } };
+        edit.swap(doc);
+        history.record(Gesture { name: "stroke", edits: vec![edit] });
+    }
+
+    #[test]
+    fn swapping_twice_changes_nothing() {
+        let mut doc = Document::default();
+        let before = hand(&mut doc, "a", Finger::Right).mask;
+        let mut edit = Edit::Patch {
+            pair: "a".into(),
+            finger: Finger::Right,
+            patch: MaskPatch { x: 6, y: 2, width: 2, pixels: vec![true; 4] },
+        };
+        let copy = edit.clone();
+        edit.swap(&mut doc);
+        assert!(doc.hand_mask("a", Finger::Right).unwrap().mask[(7, 3)]);
+        assert!(!before[(7, 3)], "the mask that others hold is not changed under them");
+        edit.swap(&mut doc);
+        assert_eq!(doc.hand_mask("a", Finger::Right).unwrap().mask, before);
+        assert_eq!(edit, copy);
+        assert!(doc.hand_mask("a", Finger::Right).unwrap().revision > Revision(1), "revisions are never reused");
+    }
+
+    #[test]
+    fn undo_stays_on_screen() {
+        let mut doc = Document::default();
+        let mut history = History::default();
+        for (pair, finger) in [("a", Finger::Right), ("a", Finger::Left), ("b", Finger::Right)] {
+            hand(&mut doc, pair, finger);
+            patch(&mut doc, &mut history, pair, finger, 0);
+        }
+        assert!(history.undo(&mut doc, "c", &Finger::BOTH).is_none());
+        assert!(history.undo(&mut doc, "a", &[Finger::Right]).is_some());
+        assert!(history.undo(&mut doc, "a", &[Finger::Right]).is_none());
+        assert!(!doc.hand_mask("a", Finger::Right).unwrap().mask[(0, 1)]);
+        assert!(doc.hand_mask("a", Finger::Left).unwrap().mask[(0, 1)]);
+        assert!(doc.hand_mask("b", Finger::Right).unwrap().mask[(0, 1)]);
+        // A new stroke on the other finger does not take the redo of this one away; one on this finger does.
+        patch(&mut doc, &mut history, "a", Finger::Left, 4);
+        assert!(history.next_redo("a", &[Finger::Right]).is_some());
+        patch(&mut doc, &mut history, "a", Finger::Right, 4);
+        assert!(history.next_redo("a", &[Finger::Right]).is_none());
+    }
+
+    #[test]
+    fn the_budget_drops_the_oldest() {
+        let mut doc = Document::default();
+        hand(&mut doc, "a", Finger::Right);
+        let mut history = History::new(3 * (std::mem::size_of::<Edit>() + 4));
+        for x in 0..6 {
+            patch(&mut doc, &mut history, "a", Finger::Right, x);
+        }
+        let mut undone = 0;
+        while history.undo(&mut doc, "a", &Finger::BOTH).is_some() {
+            undone += 1;
+        }
+        assert_eq!(undone, 3);
+    }
+}

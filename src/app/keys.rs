@@ -1,0 +1,286 @@
+//! Recipes: what a result was made from. Equal recipes have equal results, so every cache is keyed by one.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
+
+use crate::domain::dataset::PairId;
+use crate::domain::sensor::Finger;
+
+/// Counts the data sets opened since the start: results of an earlier one never reach a later one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DatasetSeq(pub u32);
+
+/// A pair of one opening of a data set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PairKey {
+    /// The opening.
+    pub dataset: DatasetSeq,
+    /// The pair in its index.
+    pub pair: PairId,
+}
+
+impl PairKey {
+    /// One finger of this pair.
+    pub fn finger(self, finger: Finger) -> TouchKey {
+        TouchKey { pair: self, finger }
+    }
+}
+
+/// One finger of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TouchKey {
+    /// The pair.
+    pub pair: PairKey,
+    /// The finger.
+    pub finger: Finger,
+}
+
+/// A float that compares and hashes by its bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Bits(u32);
+
+impl From<f32> for Bits {
+    fn from(value: f32) -> Self {
+        Self(value.to_bits())
+    }
+}
+
+impl Bits {
+    /// The float.
+    pub fn get(self) -> f32 {
+        f32::from_bits(self.0)
+    }
+}
+
+/// How the generator's output becomes metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum ShiftMode {
+    /// The lab's stored prediction, with its doubled range mapping.
+    Raw,
+    /// Matched to the training statistics, as in the paper.
+    PaperShift,
+    /// The range mapping undone exactly.
+    #[default]
+    ExactInverse,
+}
+
+impl ShiftMode {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Raw => "Raw",
+            Self::PaperShift => "Paper shift",
+            Self::ExactInverse => "Exact inverse",
+        }
+    }
+
+    /// What it does, for the tooltip.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::Raw => {
+                "The prediction as the lab's generator stores it: its range is mapped twice, so depths are too large"
+            }
+            Self::PaperShift => "Mean and spread matched to the training statistics, as the paper's pixel shift does",
+            Self::ExactInverse => "The doubled range mapping undone exactly: metres",
+        }
+    }
+}
+
+/// The way from noise to an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampler {
+    /// Denoising diffusion implicit models; `eta` 0 is deterministic.
+    #[default]
+    Ddim,
+}
+
+impl Sampler {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ddim => "DDIM",
+        }
+    }
+}
+
+/// Everything that decides a prediction.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Recipe {
+    /// The touch whose GelSlim image is the condition.
+    pub touch: TouchKey,
+    /// The bundle's identity (its digest): a changed bundle is another recipe.
+    pub bundle: Arc<str>,
+    /// Denoising steps asked for.
+    pub steps: u32,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// The sampler.
+    pub sampler: Sampler,
+    /// DDIM's noise share, 0..1.
+    pub eta: Bits,
+}
+
+/// Which imprint of a touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum ImprintSource {
+    /// What the Soft Bubble measured.
+    Measured,
+    /// What the generator predicts from the GelSlim image.
+    Predicted,
+}
+
+impl ImprintSource {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "Measured",
+            Self::Predicted => "Predicted",
+        }
+    }
+}
+
+/// One imprint in metres.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum ImprintKey {
+    /// Measured: it is in the sample.
+    Measured(TouchKey),
+    /// Derived from a prediction.
+    Predicted(Recipe, ShiftMode),
+}
+
+impl ImprintKey {
+    /// The touch it belongs to.
+    pub fn touch(&self) -> TouchKey {
+        match self {
+            Self::Measured(touch) => *touch,
+            Self::Predicted(recipe, _) => recipe.touch,
+        }
+    }
+}
+
+/// An automatic mask's recipe.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum MaskRecipe {
+    /// Imprint above a depth in metres.
+    Threshold(Bits),
+    /// The deepest share of the pixels, in percent.
+    TopPercent(Bits),
+    /// Within a distance (metres) of the CAD model at the true pose.
+    Cad(Bits),
+    /// A mask model, by its bundle's identity.
+    Unet(Arc<str>),
+    /// The simulator's truth.
+    Truth,
+}
+
+/// An automatic mask of one imprint.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MaskKey {
+    /// The imprint.
+    pub imprint: ImprintKey,
+    /// The recipe.
+    pub recipe: MaskRecipe,
+}
+
+/// Counts changes: equal revisions of the same thing are equal. Never reused within a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Revision(pub u64);
+
+/// The mask in force, as part of a recipe.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum MaskVersion {
+    /// Automatic.
+    Auto(MaskRecipe),
+    /// Corrected by hand.
+    Hand(Revision),
+}
+
+/// A cloud of both fingers: imprint and (where one can be had) mask of each finger, by [`Finger::index`].
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct CloudKey {
+    /// Per finger.
+    pub parts: [Option<(ImprintKey, Option<MaskVersion>)>; 2],
+}
+
+/// The registration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum PoseEngine {
+    /// The studio's: least squares on a distance field, from several starts.
+    #[default]
+    DistanceField,
+    /// The lab's planar ICP, reproduced for comparison.
+    LabIcp,
+}
+
+impl PoseEngine {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::DistanceField => "Distance field",
+            Self::LabIcp => "Lab ICP",
+        }
+    }
+
+    /// What it does, for the tooltip.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::DistanceField => "Least squares on the tool's distance field, from several starts (default)",
+            Self::LabIcp => "The lab's planar point-to-point ICP with 200 iterations from one start, for comparison",
+        }
+    }
+}
+
+/// A pose of a cloud.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PoseKey {
+    /// The cloud whose contact points are registered.
+    pub cloud: CloudKey,
+    /// The tool.
+    pub tool: Arc<str>,
+    /// The registration.
+    pub engine: PoseEngine,
+}
+
+/// A result that is computed because a visible pane shows it. Ordered, hashable: it is its own key.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Request {
+    /// The tensors of a pair.
+    Sample(PairKey),
+    /// The labels stored for a pair.
+    Labels(PairKey),
+    /// The CAD model of a tool and what the registration derives from it.
+    Tool(DatasetSeq, Arc<str>),
+    /// A prediction in metres (of a raw prediction that exists).
+    Imprint(Recipe, ShiftMode),
+    /// A prediction against the measurement.
+    Comparison(Recipe, ShiftMode),
+    /// An automatic mask.
+    Mask(MaskKey),
+    /// A cloud.
+    Cloud(CloudKey),
+    /// A pose.
+    Pose(PoseKey),
+    /// A small picture of a pair's measured imprint.
+    Thumbnail(PairKey),
+}
+
+impl Request {
+    /// The opening of the data set that it is about.
+    pub fn dataset(&self) -> Option<DatasetSeq> {
+        match self {
+            Self::Sample(pair) | Self::Labels(pair) | Self::Thumbnail(pair) => Some(pair.dataset),
+            Self::Tool(dataset, _) => Some(*dataset),
+            Self::Imprint(recipe, _) | Self::Comparison(recipe, _) => Some(recipe.touch.pair.dataset),
+            Self::Mask(key) => Some(key.imprint.touch().pair.dataset),
+            Self::Cloud(key) | Self::Pose(PoseKey { cloud: key, .. }) => {
+                key.parts.iter().flatten().next().map(|(imprint, _)| imprint.touch().pair.dataset)
+            }
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! Results, each under the recipe that made it, within a budget of bytes.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::DVec3;
+
+use super::keys::{CloudKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, ShiftMode, TouchKey};
+use super::services::{RawPrediction, ToolModel};
+use crate::domain::frames::PlanarPose;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::sample::Sample;
+use crate::domain::sensor::Finger;
+
+/// Values by recipe; the least recently used go first when the budget is exceeded.
+///
+/// Reading marks a value as used through a shared reference, so views can do it.
+#[derive(Debug)]
+pub struct Cache<K, V> {
+    entries: BTreeMap<K, Entry<V>>,
+    bytes: usize,
+    budget: usize,
+    clock: AtomicU64,
+}
+
+#[derive(Debug)]
+struct Entry<V> {
+    value: Arc<V>,
+    bytes: usize,
+    used: AtomicU64,
+}
+
+impl<K: Ord + Clone, V> Cache<K, V> {
+    /// An empty cache that holds at most `budget` bytes (one value larger than that is kept until the next).
+    pub fn new(budget: usize) -> Self {
+        Self { entries: BTreeMap::new(), bytes: 0, budget, clock: AtomicU64::new(0) }
+    }
+
+    /// The value of `key`, now the most recently used.
+    pub fn get(&self, key: &K) -> Option<&Arc<V>> {
+        let entry = self.entries.get(key)?;
+        entry.used.store(self.tick(), Ordering::Relaxed);
+        Some(&entry.value)
+    }
+
+    /// Whether `key` has a value.
+    pub fn contains(&self, key: &K) -> bool {
+        self.entries.contains_key(key)
+    }
+
+    /// Stores a value that holds `bytes`, and drops old ones until the budget is kept.
+    pub fn insert(&mut self, key: K, value: Arc<V>, bytes: usize) {
+        let used = AtomicU64::new(self.tick());
+        if let Some(old) = self.entries.insert(key, Entry { value, bytes, used }) {
+            self.bytes -= old.bytes;
+        }
+        self.bytes += bytes;
+        while self.bytes > self.budget && self.entries.len() > 1 {
+            let oldest =
+                self.entries.iter().min_by_key(|(_, e)| e.used.load(Ordering::Relaxed)).map(|(k, _)| k.clone());
+            let Some(entry) = oldest.and_then(|key| self.entries.remove(&key)) else {
+                break;
+            };
+            self.bytes -= entry.bytes;
+        }
+    }
+
+    /// Drops what does not fulfil `keep`.
+    pub fn retain(&mut self, mut keep: impl FnMut(&K) -> bool) {
+        self.entries.retain(|key, entry| {
+            let kept = keep(key);
+            if !kept {
+                self.bytes -= entry.bytes;
+            }
+            kept
+        });
+    }
+
+    /// Drops everything.
+    pub fn clear(&mut self) {
+        self.entries.clear();
+        self.bytes = 0;
+    }
+
+    /// Values held.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether nothing is held.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    fn tick(&self) -> u64 {
+        self.clock.fetch_add(1, Ordering::Relaxed)
+    }
+}
+
+/// What the generator made, before any shift.
+#[derive(Clone, Debug)]
+pub struct Prediction {
+    /// How it was made: the seed is in here.
+    pub recipe: Recipe,
+    /// The generator's own output.
+    pub raw: RawPrediction,
+    /// Time it took, seconds.
+    pub seconds: f64,
+}
+
+/// A prediction against the measurement of the same touch.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// Predicted minus measured, metres; NaN where either is.
+    pub error: DepthMap,
+    /// Peak signal-to-noise ratio as the lab computes it, decibels; `None` if it is not defined.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity as the lab computes it; `None` if it is not defined.
+    pub ssim: Option<f64>,
+    /// Mean absolute error, metres.
+    pub mae_m: f64,
+}
+
+/// The surface points of both fingers in the grasp frame.
+#[derive(Clone, Debug, Default)]
+pub struct Clouds {
+    /// By [`Finger::index`].
+    pub fingers: [Option<FingerCloud>; 2],
+}
+
+/// The surface points of one finger, one per pixel with a measurement, row by row.
+#[derive(Clone, Debug, Default)]
+pub struct FingerCloud {
+    /// Positions, metres, grasp frame.
+    pub points: Vec<DVec3>,
+    /// The raw bubble pixel `(x, y)` of each point.
+    pub pixels: Vec<[u16; 2]>,
+    /// Whether each point is a contact point.
+    pub contact: Vec<bool>,
+}
+
+impl Clouds {
+    /// The cloud of one finger.
+    pub fn finger(&self, finger: Finger) -> Option<&FingerCloud> {
+        self.fingers[finger.index()].as_ref()
+    }
+
+    /// The contact points of both fingers, right first: what is registered.
+    pub fn contact_points(&self) -> Vec<DVec3> {
+        let fingers = self.fingers.iter().flatten();
+        fingers
+            .flat_map(|f| f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(p, _)| *p))
+            .collect()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.fingers.iter().flatten().map(|f| f.points.len() * 32).sum()
+    }
+}
+
+impl FingerCloud {
+    /// The index of the point at a raw bubble pixel. Points are in row order, so this is a binary search.
+    pub fn at_pixel(&self, x: usize, y: usize) -> Option<usize> {
+        self.pixels.binary_search_by_key(&(y, x), |p| (p[1].into(), p[0].into())).ok()
+    }
+}
+
+/// A registered pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseResult {
+    /// The tool in the hand.
+    pub grasp_from_object: PlanarPose,
+    /// The angle that the lab reports: of `object_from_grasp`, radians.
+    pub angle_rad: f64,
+    /// The true angle in the same sense, where known.
+    pub truth_rad: Option<f64>,
+    /// Size of the angle's error, where the truth is known.
+    pub error_rad: Option<f64>,
+    /// Root mean square of the residuals, metres.
+    pub rms_m: f64,
+    /// Contact points registered.
+    pub num_points: usize,
+    /// Why it stopped, in words.
+    pub stop: String,
+    /// Whether it stopped because nothing moved any more.
+    pub converged: bool,
+    /// `grasp_from_object` after each iteration of the winning start, the start first.
+    pub iterations: Vec<PlanarPose>,
+    /// Distance of each contact point to the model at the pose, metres, in the order of [`Clouds::contact_points`].
+    pub residuals_m: Vec<f64>,
+    /// Time it took, milliseconds.
+    pub ms: f64,
+}
+
+/// All caches.
+#[derive(Debug)]
+pub struct Results {
+    /// Loaded pairs.
+    pub samples: Cache<PairKey, Sample>,
+    /// Small pictures of the measured imprint (right finger, else left).
+    pub thumbnails: Cache<PairKey, DepthMap>,
+    /// Raw predictions.
+    pub predictions: Cache<Recipe, Prediction>,
+    /// Predictions in metres, as large as the bubble image.
+    pub imprints: Cache<(Recipe, ShiftMode), DepthMap>,
+    /// Predictions against measurements.
+    pub comparisons: Cache<(Recipe, ShiftMode), Comparison>,
+    /// Automatic masks.
+    pub masks: Cache<MaskKey, Mask>,
+    /// Clouds.
+    pub clouds: Cache<CloudKey, Clouds>,
+    /// Poses.
+    pub poses: Cache<PoseKey, PoseResult>,
+    /// Tools.
+    pub tools: Cache<String, ToolModel>,
+    /// The prediction shown for each touch: the last one generated, or the one chosen.
+    pub chosen: BTreeMap<TouchKey, Recipe>,
+    /// All predictions made for each touch, oldest first.
+    pub made: BTreeMap<TouchKey, Vec<Recipe>>,
+    /// The last cloud and pose of a pair and imprint: shown dimmed while the next is computed.
+    pub latest: BTreeMap<(PairKey, ImprintSource), (Option<CloudKey>, Option<PoseKey>)>,
+}
+
+const MIB: usize = 1 << 20;
+
+impl Default for Results {
+    fn default() -> Self {
+        Self {
+            // A lab pair holds about 10 MB (two GelSlim images and their difference, per finger): ~38 pairs.
+            samples: Cache::new(384 * MIB),
+            thumbnails: Cache::new(32 * MIB),
+            predictions: Cache::new(256 * MIB),
+            imprints: Cache::new(64 * MIB),
+            comparisons: Cache::new(32 * MIB),
+            masks: Cache::new(32 * MIB),
+            clouds: Cache::new(128 * MIB),
+            poses: Cache::new(32 * MIB),
+            tools: Cache::new(128 * MIB),
+            chosen: BTreeMap::new(),
+            made: BTreeMap::new(),
+            latest: BTreeMap::new(),
+        }
+    }
+}
+
+impl Results {
+    /// Drops everything: another data set is open.
+    pub(super) fn clear(&mut self) {
+        self.samples.clear();
+        self.thumbnails.clear();
+        self.predictions.clear();
+        self.imprints.clear();
+        self.comparisons.clear();
+        self.masks.clear();
+        self.clouds.clear();
+        self.poses.clear();
+        self.tools.clear();
+        self.chosen.clear();
+        self.made.clear();
+        self.latest.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_recently_used_go_first() {
+        let mut cache: Cache<u32, u32> = Cache::new(30);
+        for k in 0..3 {
+            cache.insert(k, Arc::new(k), 10);
+        }
+        assert!(cache.get(&0).is_some());
+        cache.insert(3, Arc::new(3), 10);
+        assert!(cache.contains(&0) && !cache.contains(&1) && cache.contains(&2) && cache.contains(&3));
+        assert_eq!(cache.bytes(), 30);
+        cache.insert(3, Arc::new(4), 5);
+        assert_eq!(cache.bytes(), 25);
+        cache.insert(9, Arc::new(9), 100);
+        assert_eq!((cache.len(), cache.bytes()), (1, 100));
+        cache.retain(|_| false);
+        assert_eq!((cache.len(), cache.bytes()), (0, 0));
+    }
+
+    #[test]
+    fn points_are_found_by_pixel() {
+        let cloud = FingerCloud {
+            points: vec![DVec3::ZERO; 3],
+            pixels: vec![[5, 0], [1, 2], [3, 2]],
+            contact: vec![false, true, true],
+        };
+        assert_eq!(cloud.at_pixel(3, 2), Some(2));
+        assert_eq!(cloud.at_pixel(2, 2), None);
+        let clouds = Clouds { fingers: [None, Some(cloud)] };
+        assert_eq!(clouds.contact_points().len(), 2);
+    }
+}

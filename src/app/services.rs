@@ -1,0 +1,127 @@
+//! What the model needs from files and models, as two small traits, so that tests can put their own behind it.
+//!
+//! The studio and the command line use [`DataSource`] and [`Services`] as implemented over `io` and `infer`.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::command::Opened;
+use super::document::PairLabels;
+use super::error::TaskError;
+use super::jobs::JobCx;
+use super::keys::Recipe;
+use super::library::{BundleInfo, Place};
+use super::settings::{RuntimeChoice, Settings};
+use crate::domain::dataset::{Index, PairId, Problem};
+use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use crate::domain::mesh::TriMesh;
+use crate::domain::sample::Sample;
+
+/// An open data set: its index is in memory, its samples are read on demand, from any thread.
+pub trait DataSource: Send + Sync {
+    /// The name on screen.
+    fn title(&self) -> &str;
+    /// Its folder; `None` for the demo.
+    fn root(&self) -> Option<&Path>;
+    /// All pairs.
+    fn index(&self) -> &Index;
+    /// What is wrong with it, apart from what opened.
+    fn problems(&self) -> &[Problem];
+    /// Reads one pair.
+    ///
+    /// # Errors
+    /// With the file and the reason if it cannot be read.
+    fn load(&self, pair: PairId) -> Result<Sample, TaskError>;
+    /// The CAD model of a tool, metres, object frame.
+    ///
+    /// # Errors
+    /// If there is none, or it cannot be read.
+    fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError>;
+}
+
+/// A generator's own output.
+#[derive(Clone, Debug)]
+pub struct RawPrediction {
+    /// The decoder's output, scaled to 0..1 and in raw bubble orientation.
+    pub raw: Grid<f32>,
+    /// The runtime that made it.
+    pub runtime: String,
+}
+
+/// A tool, and what the registration derives from its CAD model.
+#[derive(Clone, Debug)]
+pub struct ToolModel {
+    /// The tool's name.
+    pub name: String,
+    /// The CAD model, metres, object frame.
+    pub mesh: TriMesh,
+}
+
+/// Files and models, as the lanes use them.
+pub trait Services: Send + Sync {
+    /// Reads the index of a data set.
+    ///
+    /// # Errors
+    /// If nothing in it can be opened.
+    fn open(&self, place: &Place) -> Result<Opened, TaskError>;
+
+    /// The bundles that ship with the program and those in `folders`; what is wrong with those that were refused.
+    fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>);
+
+    /// Runs the generator. Called on one lane only; the model stays loaded between calls.
+    ///
+    /// # Errors
+    /// If the model cannot be loaded or run, or the job was told to stop.
+    fn generate(
+        &self,
+        recipe: &Recipe,
+        bundle: &BundleInfo,
+        runtime: RuntimeChoice,
+        difference: &RgbGrid,
+        cx: &JobCx,
+    ) -> Result<RawPrediction, TaskError>;
+
+    /// Runs the mask model on an imprint in metres. Called on the same lane as [`Self::generate`].
+    ///
+    /// # Errors
+    /// If the model cannot be loaded or run.
+    fn mask_by_model(&self, bundle: &BundleInfo, runtime: RuntimeChoice, imprint: &DepthMap)
+    -> Result<Mask, TaskError>;
+
+    /// Reads the labels stored for a pair; empty if there are none.
+    ///
+    /// # Errors
+    /// If there are some and they cannot be read: then they must not be written either.
+    fn load_labels(&self, source: &dyn DataSource, name: &str) -> Result<PairLabels, TaskError>;
+
+    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    fn save_labels(&self, source: &dyn DataSource, name: &str, labels: &PairLabels) -> Result<(), TaskError>;
+
+    /// Writes masks for UNet training; returns a line for the log. `changed` is newer than what is stored.
+    ///
+    /// # Errors
+    /// If not all could be written and read back.
+    fn export_masks(
+        &self,
+        source: &dyn DataSource,
+        changed: &BTreeMap<String, PairLabels>,
+        folder: &Path,
+        cx: &JobCx,
+    ) -> Result<String, TaskError>;
+
+    /// The stored settings, and what was wrong with them if they were set aside.
+    fn load_settings(&self) -> (Settings, Option<TaskError>);
+
+    /// Writes the settings.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    fn save_settings(&self, settings: &Settings) -> Result<(), TaskError>;
+}
+
+/// Shared services.
+pub type SharedServices = Arc<dyn Services>;

@@ -1,0 +1,389 @@
+//! What a person prefers. Kept between runs; never part of undo.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
+
+use super::keys::{PoseEngine, Sampler, ShiftMode};
+use super::library::Place;
+
+/// The version of the settings file: a file of another version is set aside and defaults are used.
+pub const SETTINGS_VERSION: u32 = 1;
+/// How many recent places are kept.
+pub const MAX_RECENT: usize = 12;
+/// Brush radii that can be chosen, pixels.
+pub const BRUSH_RADIUS_PX: std::ops::RangeInclusive<f32> = 0.5..=40.0;
+/// Denoising steps that can be chosen.
+pub const STEPS: std::ops::RangeInclusive<u32> = 1..=1000;
+
+/// All preferences.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    /// [`SETTINGS_VERSION`] of the program that wrote it.
+    pub version: u32,
+    /// Colours of the window.
+    pub theme: Theme,
+    /// Scale of the whole window, 1 = the system's.
+    pub ui_zoom: f32,
+    /// The colour range of imprints, shared by all panes.
+    pub range: ColourRange,
+    /// The colour map of imprints.
+    pub colour_map: ColourMap,
+    /// How predictions become metres.
+    pub shift: ShiftMode,
+    /// The generator.
+    pub generate: GenerateSettings,
+    /// The mask tools.
+    pub mask: MaskSettings,
+    /// The registration.
+    pub pose_engine: PoseEngine,
+    /// The runtime that runs models.
+    pub runtime: RuntimeChoice,
+    /// Whether the 3D views of prediction and measurement move together.
+    pub cameras_linked: bool,
+    /// Whether the mask is drawn over imprints.
+    pub mask_visible: bool,
+    /// Whether only the outline of the mask is drawn.
+    pub mask_outline: bool,
+    /// How strongly the mask covers, 0..1.
+    pub mask_opacity: f32,
+    /// Whether the GelSlim's window is drawn on bubble images.
+    pub footprint_visible: bool,
+    /// Whether the hint of the first start was dismissed.
+    pub hint_dismissed: bool,
+    /// What was opened before, newest first.
+    pub recent: Vec<Place>,
+    /// The arrangement of the panes per workspace, in the window's own format (validated by it).
+    pub layouts: std::collections::BTreeMap<String, String>,
+    /// The workspace in front.
+    pub workspace: Workspace,
+    /// Folders with further model bundles.
+    pub bundle_folders: Vec<PathBuf>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            version: SETTINGS_VERSION,
+            theme: Theme::Dark,
+            ui_zoom: 1.0,
+            range: ColourRange::default(),
+            colour_map: ColourMap::Viridis,
+            shift: ShiftMode::default(),
+            generate: GenerateSettings::default(),
+            mask: MaskSettings::default(),
+            pose_engine: PoseEngine::default(),
+            runtime: RuntimeChoice::default(),
+            cameras_linked: true,
+            mask_visible: true,
+            mask_outline: false,
+            mask_opacity: 0.35,
+            footprint_visible: true,
+            hint_dismissed: false,
+            recent: Vec::new(),
+            layouts: std::collections::BTreeMap::new(),
+            workspace: Workspace::Inspect,
+            bundle_folders: Vec::new(),
+        }
+    }
+}
+
+impl Settings {
+    /// Brings numbers from a file or a text box back into the ranges that can be drawn and computed with.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        let default = Self::default();
+        self.version = SETTINGS_VERSION;
+        self.ui_zoom = clamp_or(self.ui_zoom, 0.5, 4.0, default.ui_zoom);
+        self.mask_opacity = clamp_or(self.mask_opacity, 0.0, 1.0, default.mask_opacity);
+        if !self.range.is_valid() {
+            self.range = default.range;
+        }
+        self.generate = self.generate.validated();
+        self.mask = self.mask.validated();
+        self.recent.truncate(MAX_RECENT);
+        self
+    }
+}
+
+fn clamp_or(value: f32, lo: f32, hi: f32, default: f32) -> f32 {
+    if value.is_finite() { value.clamp(lo, hi) } else { default }
+}
+
+/// Colours of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Theme {
+    /// Light on dark.
+    #[default]
+    Dark,
+    /// Dark on light.
+    Light,
+}
+
+/// The four arrangements of the same panes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Workspace {
+    /// Truth and prediction side by side.
+    #[default]
+    Inspect,
+    /// The cloud on the CAD.
+    Align,
+    /// Correcting masks.
+    Label,
+    /// Numbers.
+    Evaluate,
+}
+
+impl Workspace {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Inspect => "Inspect",
+            Self::Align => "Align",
+            Self::Label => "Label",
+            Self::Evaluate => "Evaluate",
+        }
+    }
+}
+
+/// The range of imprint depths that the colour map spans, shared by all panes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ColourRange {
+    /// Depth of the first colour, metres.
+    pub min_m: f32,
+    /// Depth of the last colour, metres.
+    pub max_m: f32,
+    /// Whether the range stays when another sample is shown. Unlocked, each new selection sets it.
+    pub locked: bool,
+}
+
+impl Default for ColourRange {
+    /// 0..18 mm: a 10 mm press tents up to that depth.
+    fn default() -> Self {
+        Self { min_m: 0.0, max_m: 0.018, locked: true }
+    }
+}
+
+impl ColourRange {
+    /// Whether colours can be looked up with it.
+    pub fn is_valid(self) -> bool {
+        self.min_m.is_finite() && self.max_m.is_finite() && self.min_m < self.max_m
+    }
+}
+
+/// Colour maps for depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum ColourMap {
+    /// Perceptually uniform, dark blue to yellow.
+    #[default]
+    Viridis,
+    /// Perceptually uniform, for colour-blind eyes.
+    Cividis,
+    /// Perceptually uniform, black to white by way of red.
+    Magma,
+    /// Grey.
+    Grey,
+}
+
+impl ColourMap {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Viridis => "Viridis",
+            Self::Cividis => "Cividis",
+            Self::Magma => "Magma",
+            Self::Grey => "Grey",
+        }
+    }
+}
+
+/// The generator's settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct GenerateSettings {
+    /// The bundle's name; `None` takes the first generator found.
+    pub bundle: Option<String>,
+    /// Denoising steps.
+    pub steps: u32,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Whether generating again keeps the seed.
+    pub seed_locked: bool,
+    /// The sampler.
+    pub sampler: Sampler,
+    /// DDIM's noise share, 0..1.
+    pub eta: f32,
+    /// Whether both fingers are generated (the pose needs both), or only the one selected.
+    pub both_fingers: bool,
+}
+
+impl Default for GenerateSettings {
+    fn default() -> Self {
+        Self {
+            bundle: None,
+            steps: 20,
+            seed: 42,
+            seed_locked: true,
+            sampler: Sampler::Ddim,
+            eta: 0.0,
+            both_fingers: true,
+        }
+    }
+}
+
+impl GenerateSettings {
+    /// Numbers brought into range.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        self.steps = self.steps.clamp(*STEPS.start(), *STEPS.end());
+        self.eta = clamp_or(self.eta, 0.0, 1.0, 0.0);
+        self
+    }
+}
+
+/// The mask tools' settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct MaskSettings {
+    /// The tool in hand.
+    pub tool: MaskTool,
+    /// The tool before it.
+    pub last_tool: MaskTool,
+    /// Radius of brush and eraser, image pixels.
+    pub radius_px: f32,
+    /// The automatic source in use where no mask was drawn by hand.
+    pub source: MaskSource,
+    /// Depth of the threshold source, metres.
+    pub threshold_m: f32,
+    /// Share of the deepest pixels of the top-percent source, percent.
+    pub top_percent: f32,
+    /// Distance to the CAD surface of the CAD source, metres.
+    pub cad_distance_m: f32,
+    /// The mask bundle's name; `None` takes the first found.
+    pub bundle: Option<String>,
+}
+
+impl Default for MaskSettings {
+    fn default() -> Self {
+        Self {
+            tool: MaskTool::Brush,
+            last_tool: MaskTool::Eraser,
+            radius_px: 4.0,
+            source: MaskSource::Threshold,
+            // The middle of the thresholds that the lab used for its tools (0.0048 to 0.0053 m).
+            threshold_m: 0.005,
+            top_percent: 15.0,
+            // The lab's labels: signed distance at most 1 mm.
+            cad_distance_m: 0.001,
+            bundle: None,
+        }
+    }
+}
+
+impl MaskSettings {
+    /// Numbers brought into range.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        let default = Self::default();
+        self.radius_px = clamp_or(self.radius_px, *BRUSH_RADIUS_PX.start(), *BRUSH_RADIUS_PX.end(), default.radius_px);
+        self.threshold_m = clamp_or(self.threshold_m, -0.1, 0.1, default.threshold_m);
+        self.top_percent = clamp_or(self.top_percent, 0.0, 100.0, default.top_percent);
+        self.cad_distance_m = clamp_or(self.cad_distance_m, 0.0, 0.05, default.cad_distance_m);
+        self
+    }
+}
+
+/// What the pointer does on a mask.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum MaskTool {
+    /// Adds.
+    #[default]
+    Brush,
+    /// Removes.
+    Eraser,
+    /// Moves the image.
+    Pan,
+}
+
+impl MaskTool {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Brush => "Brush",
+            Self::Eraser => "Eraser",
+            Self::Pan => "Pan",
+        }
+    }
+}
+
+/// Where a mask comes from when nobody drew one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum MaskSource {
+    /// Imprint above a depth.
+    #[default]
+    Threshold,
+    /// The deepest share of the pixels.
+    TopPercent,
+    /// Near the CAD model at the true pose: the lab's labels.
+    Cad,
+    /// The mask model.
+    Unet,
+    /// The simulator's truth.
+    Truth,
+}
+
+impl MaskSource {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Threshold => "Threshold",
+            Self::TopPercent => "Top percent",
+            Self::Cad => "CAD distance",
+            Self::Unet => "UNet",
+            Self::Truth => "Simulator truth",
+        }
+    }
+
+    /// What it does, for the tooltip.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::Threshold => "Pixels pushed in further than a depth",
+            Self::TopPercent => "The deepest share of the pixels",
+            Self::Cad => "Pixels whose membrane point lies near the CAD model at the true pose (the lab's labels)",
+            Self::Unet => "What the mask model predicts from the imprint",
+            Self::Truth => "What the simulator knows",
+        }
+    }
+}
+
+/// Which runtime runs models.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum RuntimeChoice {
+    /// ONNX Runtime where its library is found, else rten.
+    #[default]
+    Auto,
+    /// rten: always there.
+    Rten,
+    /// ONNX Runtime.
+    Ort,
+}
+
+impl RuntimeChoice {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "Automatic",
+            Self::Rten => "rten",
+            Self::Ort => "ONNX Runtime",
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! [`State`]: everything the studio shows. Changed by [`super::apply::apply`] only.
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+
+use super::action::Action;
+use super::command::{Hover, Pane};
+use super::document::Document;
+use super::error::TaskError;
+use super::history::History;
+use super::keys::{PairKey, TouchKey};
+use super::library::Library;
+use super::results::Results;
+use super::settings::Settings;
+use super::tasks::{Log, Tasks};
+use crate::domain::dataset::{PairEntry, PairId};
+use crate::domain::sensor::Finger;
+
+/// Everything the studio shows.
+#[derive(Debug, Default)]
+pub struct State {
+    /// The open data set and its list.
+    pub library: Library,
+    /// What is looked at.
+    pub selection: Selection,
+    /// What a person made.
+    pub document: Document,
+    /// What can be undone.
+    pub history: History,
+    /// What was computed.
+    pub results: Results,
+    /// What a person prefers.
+    pub settings: Settings,
+    /// What runs.
+    pub tasks: Tasks,
+    /// What happened.
+    pub log: Log,
+}
+
+/// What is looked at.
+#[derive(Clone, Debug)]
+pub struct Selection {
+    /// The pair.
+    pub pair: Option<PairId>,
+    /// The active finger.
+    pub finger: Finger,
+    /// Whether both fingers are shown, or only the active one.
+    pub both_fingers: bool,
+    /// The pixel under the pointer: the cross-hair of all images.
+    pub hover: Option<Hover>,
+    /// The point under the pointer in 3D, metres, grasp frame.
+    pub hover_point: Option<DVec3>,
+    /// The panes on screen.
+    pub panes: BTreeSet<Pane>,
+    /// Whether the command palette is open.
+    pub palette: bool,
+    /// Whether the shortcut sheet is open.
+    pub shortcut_sheet: bool,
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        Self {
+            pair: None,
+            finger: Finger::Right,
+            both_fingers: false,
+            hover: None,
+            hover_point: None,
+            panes: BTreeSet::new(),
+            palette: false,
+            shortcut_sheet: false,
+        }
+    }
+}
+
+impl Selection {
+    /// The fingers on screen, the active one first.
+    pub fn fingers(&self) -> Vec<Finger> {
+        let other = if self.finger == Finger::Right { Finger::Left } else { Finger::Right };
+        if self.both_fingers { vec![self.finger, other] } else { vec![self.finger] }
+    }
+}
+
+impl State {
+    /// The selected pair's entry.
+    pub fn entry(&self) -> Option<&PairEntry> {
+        self.library.entry(self.selection.pair?)
+    }
+
+    /// The selected pair's name; empty if there is none.
+    pub fn pair_name(&self) -> &str {
+        self.entry().map_or("", |entry| &entry.name)
+    }
+
+    /// The selected pair.
+    pub fn pair_key(&self) -> Option<PairKey> {
+        Some(self.library.open.as_ref()?.key(self.selection.pair?))
+    }
+
+    /// One finger of the selected pair.
+    pub fn touch_key(&self, finger: Finger) -> Option<TouchKey> {
+        Some(self.pair_key()?.finger(finger))
+    }
+}
+
+/// Something a pane shows, or why it cannot.
+#[derive(Debug)]
+pub enum Lookup<'a, T: ?Sized> {
+    /// Here it is.
+    Ready(&'a T),
+    /// It is being recomputed; this is the one before. Show it dimmed.
+    Stale(&'a T),
+    /// It is being computed.
+    Waiting,
+    /// It could not be computed.
+    Failed(&'a TaskError),
+    /// It cannot be there, for a reason that is no failure.
+    Absent(Absent),
+}
+
+impl<T: ?Sized> Clone for Lookup<'_, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T: ?Sized> Copy for Lookup<'_, T> {}
+
+impl<'a, T: ?Sized> Lookup<'a, T> {
+    /// The value, if it is up to date.
+    pub fn ready(self) -> Option<&'a T> {
+        match self {
+            Self::Ready(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// The value, even the one before.
+    pub fn shown(self) -> Option<&'a T> {
+        match self {
+            Self::Ready(value) | Self::Stale(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// What is in its place, when there is no value.
+    pub fn without<U: ?Sized>(self) -> Lookup<'a, U> {
+        match self {
+            Self::Ready(_) | Self::Stale(_) | Self::Waiting => Lookup::Waiting,
+            Self::Failed(err) => Lookup::Failed(err),
+            Self::Absent(absent) => Lookup::Absent(absent),
+        }
+    }
+
+    /// Looks into a value; `None` becomes `absent`.
+    pub fn and_then<U: ?Sized>(self, absent: Absent, f: impl FnOnce(&'a T) -> Option<&'a U>) -> Lookup<'a, U> {
+        match self {
+            Self::Ready(value) => f(value).map_or(Lookup::Absent(absent), Lookup::Ready),
+            Self::Stale(value) => f(value).map_or(Lookup::Absent(absent), Lookup::Stale),
+            _ => self.without(),
+        }
+    }
+}
+
+/// Why something cannot be shown, and what brings it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Absent {
+    /// No data set is open.
+    NothingOpen,
+    /// No pair is selected.
+    NothingSelected,
+    /// The source has no such finger.
+    NoFinger,
+    /// The finger has no GelSlim image.
+    NoGelSlim,
+    /// The source only has the GelSlim difference image.
+    OnlyDifference,
+    /// The finger has no measured imprint.
+    NoBubble,
+    /// Nothing was generated yet.
+    NoPrediction,
+    /// The source has no camera: no points in space.
+    NoCamera,
+    /// The source does not say which tool it was.
+    NoTool,
+    /// The true pose is not known.
+    NoTruth,
+    /// The source is not simulated.
+    NotSimulated,
+    /// No mask model was found.
+    NoMaskModel,
+    /// No generator was found.
+    NoGenerator,
+    /// The mask has too few contact points.
+    NoContact,
+}
+
+impl Absent {
+    /// What is missing, as a sentence.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::NothingOpen => "No data set is open. Drop a folder here, or open the demo.",
+            Self::NothingSelected => "No pair is selected.",
+            Self::NoFinger => "This source has no such finger.",
+            Self::NoGelSlim => "This finger has no GelSlim image.",
+            Self::OnlyDifference => "This source only has the difference image.",
+            Self::NoBubble => "This finger has no measured imprint.",
+            Self::NoPrediction => "No prediction yet.",
+            Self::NoCamera => "This source has no depth camera: without it there are no points in space and no pose.",
+            Self::NoTool => "This source does not say which tool it was: no CAD model, no pose.",
+            Self::NoTruth => "The true pose of this pair is not known.",
+            Self::NotSimulated => "Only simulated data knows the true contact.",
+            Self::NoMaskModel => "No mask model was found.",
+            Self::NoGenerator => "No generator was found.",
+            Self::NoContact => "The mask has too few contact points for a pose.",
+        }
+    }
+
+    /// The action that brings it, if one does.
+    pub fn action(self) -> Option<Action> {
+        match self {
+            Self::NothingOpen => Some(Action::OpenDemo),
+            Self::NothingSelected => Some(Action::FirstSample),
+            Self::NoPrediction => Some(Action::Generate),
+            _ => None,
+        }
+    }
+}
