@@ -5,5 +5,6 @@
 pub mod atomic;
 pub mod dataset;
 pub mod images;
+pub mod masks;
 pub mod pt;
 pub mod stl;

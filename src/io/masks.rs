@@ -1,0 +1,478 @@
+//! Corrected masks on disk: saved after every stroke, never half, never replaced by something empty.
+//!
+//! One folder per dataset, beside it (`touch2touch_masks`) if that can be written, else in the user's data folder.
+//! Per pair and finger one JSON file with a run-length coded mask; per pair one with the review state and accepted
+//! poses; and one append-only journal of strokes. Files are written beside their place, flushed and renamed, so a
+//! crash costs at most the stroke that was being saved.
+//!
+//! A file that cannot be understood blocks its pair: it is reported, and nothing overwrites it.
+
+mod name;
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::atomic;
+use super::dataset::Dataset;
+use crate::domain::dataset::Problem;
+use crate::domain::frames::PlanarPose;
+use crate::domain::grid::Mask;
+use crate::domain::label::{decode_runs, encode_runs};
+use crate::domain::sensor::Finger;
+
+use name::{escape, unescape};
+
+/// Name of the folder beside a dataset.
+pub const FOLDER: &str = "touch2touch_masks";
+const JOURNAL: &str = "journal.jsonl";
+const FORMAT: &str = "touch2touch-mask";
+const REVIEW_FORMAT: &str = "touch2touch-review";
+const VERSION: u32 = 1;
+const MASK_SUFFIX: &str = ".mask.json";
+const REVIEW_SUFFIX: &str = ".review.json";
+
+/// Why stored labels cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The disk refuses.
+    #[error("cannot {what} ({}): {source}", file.display())]
+    Io {
+        /// The file or folder.
+        file: PathBuf,
+        /// What was tried.
+        what: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The file exists but cannot be understood; it is left as it is and its pair must not be edited.
+    #[error("the stored labels cannot be read, so this pair cannot be edited: {reason} ({})", file.display())]
+    Damaged {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// No folder can be written.
+    #[error("no folder for masks can be written; tried {tried}")]
+    NoFolder {
+        /// The folders tried.
+        tried: String,
+    },
+}
+
+impl StoreError {
+    /// What to do about it.
+    pub fn hint(&self) -> &'static str {
+        match self {
+            Self::Io { .. } => "check the permissions and the free space of the disk",
+            Self::Damaged { .. } => "restore the file from a backup, or move it away to start this mask anew",
+            Self::NoFolder { .. } => "make one of these folders writable, or set XDG_DATA_HOME to one that is",
+        }
+    }
+
+    fn to_problem(&self) -> Problem {
+        let file = match self {
+            Self::Io { file, .. } | Self::Damaged { file, .. } => file.clone(),
+            Self::NoFolder { .. } => PathBuf::new(),
+        };
+        Problem { file, what: self.to_string(), hint: self.hint().into() }
+    }
+}
+
+/// A stored mask with where it came from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredMask {
+    /// The pixels, raw bubble orientation, as large as the imprint.
+    pub mask: Mask,
+    /// What it was made from, e.g. `Threshold 5.00 mm`.
+    pub base: String,
+    /// Who saved it.
+    pub person: String,
+    /// When, seconds since 1970 (UTC); see [`now_unix_s`].
+    pub saved_unix_s: u64,
+}
+
+/// What else a person said about a pair.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StoredReview {
+    /// The review state by its stored name (e.g. `done`).
+    pub review: String,
+    /// Accepted `grasp_from_object`, from the measured and from the predicted imprint.
+    #[serde(default)]
+    pub accepted: [Option<PlanarPose>; 2],
+}
+
+/// One line of the journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JournalEntry {
+    /// When, seconds since 1970 (UTC).
+    pub unix_s: u64,
+    /// Who.
+    pub person: String,
+    /// The pair's name.
+    pub pair: String,
+    /// `right` or `left`.
+    pub finger: String,
+    /// What was done, e.g. `brush`, `eraser`, `fill holes`, `undo`.
+    pub tool: String,
+    /// Brush radius in pixels, where there was one.
+    #[serde(default)]
+    pub radius_px: Option<f32>,
+    /// The pointer's way in image pixels, where there was one.
+    #[serde(default)]
+    pub points: Vec<[f32; 2]>,
+}
+
+/// Seconds since 1970, for [`StoredMask::saved_unix_s`]; 0 if the clock is set before that.
+pub fn now_unix_s() -> u64 {
+    std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs())
+}
+
+/// The user's name as the system knows it, for [`StoredMask::person`].
+pub fn person() -> String {
+    ["USER", "LOGNAME", "USERNAME"].iter().find_map(|v| std::env::var(v).ok()).unwrap_or_else(|| "unknown".into())
+}
+
+/// The file of one mask.
+#[derive(Serialize, Deserialize)]
+struct MaskFile {
+    format: String,
+    version: u32,
+    pair: String,
+    finger: String,
+    width: usize,
+    height: usize,
+    base: String,
+    person: String,
+    saved_unix_s: u64,
+    /// Pixels in contact: checked against the runs.
+    contact_px: usize,
+    runs: Vec<u32>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct ReviewFile {
+    format: String,
+    version: u32,
+    pair: String,
+    #[serde(flatten)]
+    review: StoredReview,
+}
+
+/// The labels of one dataset. Cheap to clone; may be used from any thread, one writer at a time.
+#[derive(Clone, Debug)]
+pub struct MaskStore {
+    /// Where files are written; also read first.
+    folder: PathBuf,
+    /// A folder that is only read: labels beside a dataset that cannot be written.
+    also_read: Option<PathBuf>,
+}
+
+impl MaskStore {
+    /// Finds the store of a dataset. Nothing is created before the first save.
+    ///
+    /// # Errors
+    /// [`StoreError::NoFolder`] if neither the dataset's folder nor the user's data folder can be written.
+    pub fn for_dataset(dataset: &Dataset) -> Result<Self, StoreError> {
+        let key = match &dataset.root {
+            Some(root) => {
+                // The path is part of the name: datasets often share their last folder's name.
+                let name = root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                format!("{}-{}", escape(&name), short_hash(root))
+            }
+            None => escape(&dataset.title),
+        };
+        let user = user_data_folder().map(|folder| folder.join("masks").join(key));
+        Self::choose(dataset.root.as_deref(), user)
+    }
+
+    /// [`MaskStore::for_dataset`] with the two places given.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn choose(dataset_root: Option<&Path>, user_folder: Option<PathBuf>) -> Result<Self, StoreError> {
+        let beside = dataset_root.map(|root| root.join(FOLDER));
+        if let (Some(beside), Some(root)) = (&beside, dataset_root)
+            && is_writable(if beside.is_dir() { beside } else { root })
+        {
+            // Labels made while the dataset was read-only stay visible.
+            let also_read = user_folder.filter(|folder| folder.is_dir());
+            return Ok(Self { folder: beside.clone(), also_read });
+        }
+        let mut tried: Vec<String> = beside.iter().map(|p| p.display().to_string()).collect();
+        if let Some(user) = user_folder {
+            let there = user.ancestors().find(|folder| folder.is_dir());
+            if there.is_some_and(is_writable) {
+                return Ok(Self { folder: user, also_read: beside.filter(|folder| folder.is_dir()) });
+            }
+            tried.push(user.display().to_string());
+        }
+        Err(StoreError::NoFolder { tried: tried.join(", ") })
+    }
+
+    /// A store in a given folder.
+    pub fn in_folder(folder: PathBuf) -> Self {
+        Self { folder, also_read: None }
+    }
+
+    /// Where files are written.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The file of a mask, whether it exists or not.
+    pub fn mask_file(&self, pair: &str, finger: Finger) -> PathBuf {
+        self.folder.join(mask_name(pair, finger))
+    }
+
+    /// Reads a mask; `None` if none was saved.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`]: then the pair must not be edited.
+    pub fn load(&self, pair: &str, finger: Finger) -> Result<Option<StoredMask>, StoreError> {
+        match self.find(&mask_name(pair, finger))? {
+            Some((file, bytes)) => parse_mask(&file, &bytes, pair, finger).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// Saves a mask; `None` removes the file (undo back to "never corrected").
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`] if the file that is there cannot be understood: it is not overwritten.
+    /// [`StoreError::Io`] if the disk refuses; the previous file is then unchanged.
+    pub fn save(&self, pair: &str, finger: Finger, mask: Option<&StoredMask>) -> Result<(), StoreError> {
+        self.load(pair, finger)?;
+        let file = self.mask_file(pair, finger);
+        let Some(stored) = mask else {
+            return match std::fs::remove_file(&file) {
+                Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                    Err(StoreError::Io { file, what: "remove the mask", source })
+                }
+                _ => Ok(()),
+            };
+        };
+        let content = MaskFile {
+            format: FORMAT.into(),
+            version: VERSION,
+            pair: pair.into(),
+            finger: finger.name().into(),
+            width: stored.mask.width(),
+            height: stored.mask.height(),
+            base: stored.base.clone(),
+            person: stored.person.clone(),
+            saved_unix_s: stored.saved_unix_s,
+            contact_px: stored.mask.as_slice().iter().filter(|&&v| v).count(),
+            runs: encode_runs(&stored.mask),
+        };
+        self.write(&file, &content)
+    }
+
+    /// Reads the review state and accepted poses; `None` if none were saved.
+    ///
+    /// # Errors
+    /// As [`MaskStore::load`].
+    pub fn load_review(&self, pair: &str) -> Result<Option<StoredReview>, StoreError> {
+        match self.find(&review_name(pair))? {
+            Some((file, bytes)) => parse_review(&file, &bytes).and_then(|content| {
+                if content.pair == pair {
+                    Ok(Some(content.review))
+                } else {
+                    Err(StoreError::Damaged { file, reason: format!("it belongs to the pair {}", content.pair) })
+                }
+            }),
+            None => Ok(None),
+        }
+    }
+
+    /// Saves the review state and accepted poses.
+    ///
+    /// # Errors
+    /// As [`MaskStore::save`].
+    pub fn save_review(&self, pair: &str, review: &StoredReview) -> Result<(), StoreError> {
+        self.load_review(pair)?;
+        let content =
+            ReviewFile { format: REVIEW_FORMAT.into(), version: VERSION, pair: pair.into(), review: review.clone() };
+        self.write(&self.folder.join(review_name(pair)), &content)
+    }
+
+    /// All review states, by pair name, and the files that cannot be understood (masks among them).
+    pub fn reviews(&self) -> (Vec<(String, StoredReview)>, Vec<Problem>) {
+        let mut reviews = Vec::new();
+        let mut problems = Vec::new();
+        for file in self.files_ending(REVIEW_SUFFIX) {
+            match read(&file).and_then(|bytes| parse_review(&file, &bytes)) {
+                Ok(content) => reviews.push((content.pair, content.review)),
+                Err(err) => problems.push(err.to_problem()),
+            }
+        }
+        reviews.sort_by(|a, b| a.0.cmp(&b.0));
+        // The first one read is the one of the folder that is written.
+        reviews.dedup_by(|later, first| later.0 == first.0);
+        (reviews, problems)
+    }
+
+    /// All saved masks as pair name and finger, sorted; their content is not read.
+    pub fn masks(&self) -> Vec<(String, Finger)> {
+        let mut masks = Vec::new();
+        for file in self.files_ending(MASK_SUFFIX) {
+            let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            let stem = name.strip_suffix(MASK_SUFFIX).unwrap_or(&name);
+            for finger in Finger::BOTH {
+                if let Some(pair) = stem.strip_suffix(finger.name()).and_then(|s| s.strip_suffix('.')) {
+                    // A name too long to be its own file name is in the file.
+                    let pair = unescape(pair).or_else(|| {
+                        let content: MaskFile = serde_json::from_slice(&std::fs::read(&file).ok()?).ok()?;
+                        Some(content.pair)
+                    });
+                    masks.extend(pair.map(|pair| (pair, finger)));
+                }
+            }
+        }
+        masks.sort();
+        masks.dedup();
+        masks
+    }
+
+    /// Appends a line to the journal.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn append_journal(&self, entry: &JournalEntry) -> Result<(), StoreError> {
+        let file = self.folder.join(JOURNAL);
+        let io = |source| StoreError::Io { file: file.clone(), what: "write the journal", source };
+        std::fs::create_dir_all(&self.folder).map_err(io)?;
+        let mut line = serde_json::to_vec(entry).map_err(|err| io(err.into()))?;
+        line.push(b'\n');
+        let mut out = std::fs::OpenOptions::new().create(true).append(true).open(&file).map_err(io)?;
+        // One write, so that a crash can only cut the last line short.
+        out.write_all(&line).and_then(|()| out.sync_data()).map_err(io)
+    }
+
+    /// Reads the journal; a last line cut short by a crash is left out, as are lines that cannot be understood.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn journal(&self) -> Result<Vec<JournalEntry>, StoreError> {
+        let file = self.folder.join(JOURNAL);
+        let bytes = match std::fs::read(&file) {
+            Ok(bytes) => bytes,
+            Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(source) => return Err(StoreError::Io { file, what: "read the journal", source }),
+        };
+        Ok(bytes.split(|&b| b == b'\n').filter_map(|line| serde_json::from_slice(line).ok()).collect())
+    }
+
+    fn folders(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(self.folder.as_path()).chain(self.also_read.as_deref())
+    }
+
+    /// The first file of that name, with its content.
+    fn find(&self, name: &str) -> Result<Option<(PathBuf, Vec<u8>)>, StoreError> {
+        for folder in self.folders() {
+            let file = folder.join(name);
+            match std::fs::read(&file) {
+                Ok(bytes) => return Ok(Some((file, bytes))),
+                Err(err) if err.kind() == std::io::ErrorKind::NotFound => {}
+                // The folder's name is taken by a file: nothing was saved there.
+                Err(err) if err.kind() == std::io::ErrorKind::NotADirectory => {}
+                Err(source) => return Err(StoreError::Io { file, what: "read the stored labels", source }),
+            }
+        }
+        Ok(None)
+    }
+
+    fn files_ending(&self, suffix: &str) -> Vec<PathBuf> {
+        let mut files = Vec::new();
+        for folder in self.folders() {
+            let Ok(entries) = std::fs::read_dir(folder) else { continue };
+            let here = entries.flatten().map(|entry| entry.path()).filter(|path| {
+                let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                name.ends_with(suffix) && !name.starts_with('.')
+            });
+            files.extend(here);
+        }
+        files
+    }
+
+    fn write(&self, file: &Path, content: &impl Serialize) -> Result<(), StoreError> {
+        let io = |source| StoreError::Io { file: file.to_owned(), what: "save the labels", source };
+        std::fs::create_dir_all(&self.folder).map_err(io)?;
+        let mut bytes = serde_json::to_vec(content).map_err(|err| io(err.into()))?;
+        bytes.push(b'\n');
+        atomic::write_bytes(file, &bytes).map_err(io)
+    }
+}
+
+fn mask_name(pair: &str, finger: Finger) -> String {
+    format!("{}.{}{MASK_SUFFIX}", escape(pair), finger.name())
+}
+
+fn review_name(pair: &str) -> String {
+    format!("{}{REVIEW_SUFFIX}", escape(pair))
+}
+
+fn read(file: &Path) -> Result<Vec<u8>, StoreError> {
+    std::fs::read(file).map_err(|source| StoreError::Io {
+        file: file.to_owned(),
+        what: "read the stored labels",
+        source,
+    })
+}
+
+fn parse_mask(file: &Path, bytes: &[u8], pair: &str, finger: Finger) -> Result<StoredMask, StoreError> {
+    let damaged = |reason: String| StoreError::Damaged { file: file.to_owned(), reason };
+    let content: MaskFile = serde_json::from_slice(bytes).map_err(|err| damaged(err.to_string()))?;
+    check_format(file, &content.format, FORMAT, content.version)?;
+    if content.pair != pair || content.finger != finger.name() {
+        return Err(damaged(format!("it belongs to the {} finger of {}", content.finger, content.pair)));
+    }
+    let mask = decode_runs(content.width, content.height, &content.runs).map_err(|err| damaged(err.to_string()))?;
+    let contact = mask.as_slice().iter().filter(|&&v| v).count();
+    if contact != content.contact_px {
+        return Err(damaged(format!("it has {contact} pixels in contact and says {}", content.contact_px)));
+    }
+    Ok(StoredMask { mask, base: content.base, person: content.person, saved_unix_s: content.saved_unix_s })
+}
+
+fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, StoreError> {
+    let content: ReviewFile = serde_json::from_slice(bytes)
+        .map_err(|err| StoreError::Damaged { file: file.to_owned(), reason: err.to_string() })?;
+    check_format(file, &content.format, REVIEW_FORMAT, content.version)?;
+    Ok(content)
+}
+
+fn check_format(file: &Path, format: &str, expected: &str, version: u32) -> Result<(), StoreError> {
+    if format == expected && version == VERSION {
+        return Ok(());
+    }
+    let reason = format!("it is {format} version {version}, expected {expected} version {VERSION}");
+    Err(StoreError::Damaged { file: file.to_owned(), reason })
+}
+
+fn is_writable(folder: &Path) -> bool {
+    tempfile::Builder::new().prefix(".tmp-").tempfile_in(folder).is_ok()
+}
+
+fn short_hash(path: &Path) -> String {
+    use sha2::Digest as _;
+    let digest = sha2::Sha256::digest(path.as_os_str().as_encoded_bytes());
+    digest[..6].iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// The user's folder for this program's data, by the rules of the platform.
+fn user_data_folder() -> Option<PathBuf> {
+    let from = |variable: &str| std::env::var_os(variable).map(PathBuf::from).filter(|p| p.is_absolute());
+    let base = from("XDG_DATA_HOME").or_else(|| {
+        if cfg!(windows) {
+            from("APPDATA")
+        } else if cfg!(target_os = "macos") {
+            Some(from("HOME")?.join("Library/Application Support"))
+        } else {
+            Some(from("HOME")?.join(".local/share"))
+        }
+    })?;
+    Some(base.join("touch2touch"))
+}
