@@ -1,6 +1,6 @@
 //! The renderer on a real or software adapter: properties of single pixels, never whole pictures.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests, too")]
+#![allow(clippy::unwrap_used, clippy::print_stderr, reason = "helpers of tests, too")]
 
 use std::sync::Arc;
 
@@ -43,12 +43,16 @@ struct View {
 }
 
 impl View {
+    /// With the smoothest edges that the adapter can draw.
     fn new() -> Option<Self> {
-        let gpu = gpu_or_skip()?;
+        Some(Self::on(gpu_or_skip()?.smooth()))
+    }
+
+    fn on(gpu: Gpu) -> Self {
         let pipelines = Arc::new(Pipelines::new(&gpu).unwrap());
         let renderer = SceneRenderer::new(&gpu, pipelines).unwrap();
         let target = Target::new(&gpu, SIZE).unwrap();
-        Some(Self { gpu, renderer, target, camera: Camera::default() })
+        Self { gpu, renderer, target, camera: Camera::default() }
     }
 
     fn render(&mut self, scene: &SceneData) -> bool {
@@ -127,6 +131,22 @@ fn a_point_appears_at_its_pixel_in_its_colour_and_size() {
             assert!((centre - at).length() < 0.6, "{centre} for {at}");
         }
     }
+}
+
+#[test]
+fn one_sample_per_pixel_shows_the_same_point() {
+    let Some(mut gpu) = gpu_or_skip() else { return };
+    gpu.samples = 1;
+    let mut view = View::on(gpu);
+    let p = DVec3::new(0.004, 0.003, 0.002);
+    let picture =
+        view.picture(&SceneData { clouds: vec![cloud(&[p], &[[10, 200, 90]], PointSize::Px(9.0))], ..scene() });
+    let [x, y] = view.pixel(p);
+    assert_eq!(picture.rgb(x, y), Some([10, 200, 90]));
+    // Nothing but the two colours: 63.6 px of disc, 28 px of rim that may fall to either side.
+    let ink = inked(&picture);
+    assert!(ink.iter().all(|[x, y]| picture.rgb(*x, *y) == Some([10, 200, 90])));
+    assert!((52..=76).contains(&ink.len()), "{}", ink.len());
 }
 
 #[test]

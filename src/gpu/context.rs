@@ -12,8 +12,15 @@ pub struct Gpu {
     pub device: wgpu::Device,
     /// Takes uploads and commands.
     pub queue: wgpu::Queue,
-    /// Samples per pixel: 4 where the adapter can, else 1.
+    /// Samples per pixel: 4 where the adapter can and is no software renderer, else 1. [`Pipelines`] and [`Target`]s
+    /// are made for this number.
+    ///
+    /// [`Pipelines`]: super::pipelines::Pipelines
+    /// [`Target`]: super::target::Target
     pub samples: u32,
+    /// The adapter is a program: four samples cost it 2.5 times the time of one, so it is spared them.
+    pub software: bool,
+    max_samples: u32,
     /// Name and driver of the adapter, for the log and the about box.
     pub adapter: String,
 }
@@ -33,12 +40,15 @@ impl Gpu {
         let can = resolves && four(super::target::COLOR_FORMAT) && four(super::target::DEPTH_FORMAT);
         let info = adapter.get_info();
         device.on_uncaptured_error(Arc::new(|error| log::error!("graphics device: {error}")));
-        Self {
-            device,
-            queue,
-            samples: if can { 4 } else { 1 },
-            adapter: format!("{} ({})", info.name, info.driver_info),
-        }
+        let software = info.device_type == wgpu::DeviceType::Cpu;
+        let max_samples = if can { 4 } else { 1 };
+        let adapter = format!("{} ({})", info.name, info.driver_info);
+        Self { device, queue, samples: if software { 1 } else { max_samples }, software, max_samples, adapter }
+    }
+
+    /// The same device with the smoothest edges it can draw, for figures.
+    pub fn smooth(&self) -> Self {
+        Self { samples: self.max_samples, ..self.clone() }
     }
 
     /// A device without a window, on the best adapter there is; a software renderer will do.
