@@ -1,0 +1,154 @@
+//! The bubble's membrane: an inflated elastic sheet over an elliptical rim, pressed onto the tool.
+//!
+//! Coordinates of one finger: `n` points away from the finger (towards the other one, 0 in the middle plane), `y`
+//! and `z` are the grasp frame's. Free, the membrane is the dome `n = dome(y, z)`, the exact solution of
+//! "tension times curvature equals pressure" for an elliptical rim. Pressed, it may pass neither the tool nor the
+//! middle plane (where it meets the other finger's membrane, which mirrors it); in between it spans freely, so it
+//! tents between bars. The trapped air cannot leave: part of the volume that the tool takes comes back as extra
+//! pressure, which makes the free parts bulge beyond the dome.
+
+use glam::DVec2;
+
+use super::relax::{Field, Problem};
+use super::tools::ToolSpec;
+use super::{BubbleConfig, MEMBRANE_STEP_M};
+use crate::domain::frames::PlanarPose;
+
+/// A pressed membrane.
+pub struct Membrane<'a> {
+    dome: Dome,
+    tool: &'a ToolSpec,
+    object_from_grasp: PlanarPose,
+    /// Dome minus membrane at the grid nodes, metres.
+    pushed: Field,
+    /// Cells (and their neighbours) in which a bar begins or lies.
+    near_tool: Vec<bool>,
+    origin: DVec2,
+}
+
+/// The undeformed membrane.
+#[derive(Clone, Copy, Debug)]
+pub struct Dome {
+    /// Height of the apex, metres.
+    pub apex: f64,
+    /// Height of the apex over the rim, metres.
+    pub rise: f64,
+    /// Semi-axes of the rim along y and z, metres.
+    pub semi: DVec2,
+    /// Centre of the rim, (y, z), metres.
+    pub centre: DVec2,
+}
+
+impl Dome {
+    /// The dome of a bubble pressed by `config.press_m` onto a tool of this thickness.
+    pub fn new(config: &BubbleConfig, half_thickness_m: f64) -> Self {
+        Self {
+            apex: config.press_m - half_thickness_m,
+            rise: config.dome_rise_m,
+            semi: DVec2::from_array(config.rim_semi_axes_m),
+            centre: DVec2::new(0.0, config.rim_centre_z_m),
+        }
+    }
+
+    /// Height at `(y, z)`; beyond the rim it goes on falling.
+    pub fn height(&self, yz: DVec2) -> f64 {
+        self.apex - self.rise * ((yz - self.centre) / self.semi).length_squared()
+    }
+}
+
+impl<'a> Membrane<'a> {
+    /// Solves the contact of the membrane with `tool` held at `object_from_grasp`.
+    pub fn press(config: &BubbleConfig, tool: &'a ToolSpec, object_from_grasp: PlanarPose) -> Self {
+        let dome = Dome::new(config, tool.half_thickness_m);
+        let step = MEMBRANE_STEP_M;
+        let size = (2.0 * dome.semi / step).ceil();
+        let (columns, rows) = (size.x as usize + 3, size.y as usize + 3);
+        let origin = dome.centre - dome.semi - step;
+
+        let mut obstacle = Field::filled(columns, rows, f32::NEG_INFINITY);
+        let mut free = vec![false; columns * rows];
+        let mut near = vec![false; columns * rows];
+        for j in 0..rows {
+            for i in 0..columns {
+                let k = j * columns + i;
+                let yz = origin + DVec2::new(i as f64, j as f64) * step;
+                free[k] = ((yz - dome.centre) / dome.semi).length_squared() < 1.0;
+                if !free[k] {
+                    continue;
+                }
+                let s = tool.outline_distance(object_from_grasp.transform_yz(yz));
+                near[k] = s < 1.5 * step;
+                let surface = if s <= 0.0 { -tool.height_at(s) } else { 0.0 };
+                obstacle.values[k] = (dome.height(yz) - surface) as f32;
+            }
+        }
+        // the air: a first solution without extra pressure, on a coarse grid, tells the volume taken
+        let mut problem = Problem { obstacle: &obstacle, free: &free, load: 0.0, stiffness: 0.0, step: step as f32 };
+        let first = problem.solve(LEVELS, 4);
+        let taken = first.values.iter().map(|&w| f64::from(w)).sum::<f64>() * step * step;
+        let bulge = config.air_kept * taken * 2.0 / (std::f64::consts::PI * dome.semi.x * dome.semi.y);
+        problem.load = -(bulge * 2.0 * (dome.semi.x.powi(-2) + dome.semi.y.powi(-2))) as f32;
+        let pushed = problem.solve(LEVELS, SWEEPS);
+        Self { dome, tool, object_from_grasp, pushed, near_tool: near, origin }
+    }
+
+    /// The undeformed shape.
+    pub fn dome(&self) -> &Dome {
+        &self.dome
+    }
+
+    /// Height of the membrane at `(y, z)`, metres.
+    pub fn height(&self, yz: DVec2) -> f64 {
+        let at = (yz - self.origin) / MEMBRANE_STEP_M;
+        let free = self.dome.height(yz) - self.pushed.at(at.x, at.y);
+        // between the nodes the tool's edges are sharper than the grid
+        if self.is_near(at) {
+            let s = self.tool.outline_distance(self.object_from_grasp.transform_yz(yz));
+            if s <= 0.0 {
+                return free.min(-self.tool.height_at(s));
+            }
+        }
+        free
+    }
+
+    fn is_near(&self, at: DVec2) -> bool {
+        let columns = self.pushed.columns;
+        if at.x < 0.0 || at.y < 0.0 {
+            return false;
+        }
+        let (i, j) = (at.x as usize, at.y as usize);
+        if i + 1 >= columns || j + 1 >= self.pushed.rows {
+            return false;
+        }
+        let k = j * columns + i;
+        self.near_tool[k] || self.near_tool[k + 1] || self.near_tool[k + columns] || self.near_tool[k + columns + 1]
+    }
+
+    /// Distance of the membrane's point `(n, y, z)` from the tool's surface, metres, negative inside; more than
+    /// `limit` is only known to be more.
+    pub fn distance_to_tool(&self, n: f64, yz: DVec2, limit: f64) -> f64 {
+        let p = self.object_from_grasp.transform_yz(yz);
+        let s = self.tool.outline_distance(p);
+        if s > limit { s } else { self.tool.signed_distance(glam::DVec3::new(n, p.x, p.y)) }
+    }
+
+    /// Largest violation of "touches or is in equilibrium" over the nodes, metres: for tests.
+    pub fn worst_gap(&self) -> f64 {
+        let mut worst = 0.0_f64;
+        for j in 0..self.pushed.rows {
+            for i in 0..self.pushed.columns {
+                let yz = self.origin + DVec2::new(i as f64, j as f64) * MEMBRANE_STEP_M;
+                if let Some(h) = self.tool.height(self.object_from_grasp.transform_yz(yz)) {
+                    let n = self.dome.height(yz) - f64::from(self.pushed.values[j * self.pushed.columns + i]);
+                    worst = worst.max(n + h);
+                }
+            }
+        }
+        worst
+    }
+}
+
+/// Grids in the solver, the coarsest 8 times the finest step.
+const LEVELS: usize = 4;
+/// Sweeps on each grid. 24 leave an error below 0.1 mm against a thousand (tested).
+const SWEEPS: usize = 24;

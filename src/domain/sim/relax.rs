@@ -1,0 +1,173 @@
+//! Obstacle problems on a grid: an elastic sheet that is pulled taut over a shape.
+//!
+//! Finds `w` with `w >= obstacle`, `-∇²w + k w >= load`, and equality in one of the two at every node (the sheet
+//! touches, or it is in equilibrium). Projected successive over-relaxation in red-black order, so the result does
+//! not depend on the sweep direction, from a coarse grid to the fine one.
+
+/// A field on a square grid, row by row.
+#[derive(Clone, Debug)]
+pub(super) struct Field {
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+    pub(super) values: Vec<f32>,
+}
+
+impl Field {
+    pub(super) fn filled(columns: usize, rows: usize, value: f32) -> Self {
+        Self { columns, rows, values: vec![value; columns * rows] }
+    }
+
+    /// Bilinear value at node coordinates; beyond the border the border's value.
+    pub(super) fn at(&self, x: f64, y: f64) -> f64 {
+        let x = x.clamp(0.0, (self.columns - 1) as f64 - 1e-6);
+        let y = y.clamp(0.0, (self.rows - 1) as f64 - 1e-6);
+        let (ix, iy) = (x as usize, y as usize);
+        let (tx, ty) = (x - ix as f64, y - iy as f64);
+        let i = iy * self.columns + ix;
+        let v = |k: usize| f64::from(self.values[k]);
+        let top = v(i) + (v(i + 1) - v(i)) * tx;
+        let bottom = v(i + self.columns) + (v(i + self.columns + 1) - v(i + self.columns)) * tx;
+        top + (bottom - top) * ty
+    }
+
+    /// Every second node, with the largest of the 3 x 3 nodes around it.
+    fn coarser(&self) -> Field {
+        let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
+        let mut out = Field::filled(columns, rows, f32::NEG_INFINITY);
+        for y in 0..rows {
+            for x in 0..columns {
+                let mut best = f32::NEG_INFINITY;
+                for j in (2 * y).saturating_sub(1)..=(2 * y + 1).min(self.rows - 1) {
+                    for i in (2 * x).saturating_sub(1)..=(2 * x + 1).min(self.columns - 1) {
+                        best = best.max(self.values[j * self.columns + i]);
+                    }
+                }
+                out.values[y * columns + x] = best;
+            }
+        }
+        out
+    }
+}
+
+/// The sheet, see the module.
+pub(super) struct Problem<'a> {
+    /// Lowest allowed value; `NEG_INFINITY` where nothing is in the way.
+    pub(super) obstacle: &'a Field,
+    /// Nodes that can move; the others stay at 0. The border never moves.
+    pub(super) free: &'a [bool],
+    /// Load divided by tension, 1/m (per square metre of the grid: the right hand side).
+    pub(super) load: f32,
+    /// Foundation stiffness divided by tension, 1/m².
+    pub(super) stiffness: f32,
+    /// Grid spacing, metres.
+    pub(super) step: f32,
+}
+
+impl Problem<'_> {
+    /// Solves on `levels` grids, each twice as fine as the one before, with `sweeps` sweeps on each.
+    pub(super) fn solve(&self, levels: usize, sweeps: usize) -> Field {
+        let mut start = if levels > 1 && self.obstacle.columns > 8 && self.obstacle.rows > 8 {
+            let obstacle = self.obstacle.coarser();
+            let free: Vec<bool> = (0..obstacle.rows)
+                .flat_map(|y| (0..obstacle.columns).map(move |x| (x, y)))
+                .map(|(x, y)| self.free[2 * y * self.obstacle.columns + 2 * x])
+                .collect();
+            let coarse = Problem { obstacle: &obstacle, free: &free, step: 2.0 * self.step, ..*self };
+            let w = coarse.solve(levels - 1, sweeps);
+            let mut fine = Field::filled(self.obstacle.columns, self.obstacle.rows, 0.0);
+            for y in 0..fine.rows {
+                for x in 0..fine.columns {
+                    if self.free[y * fine.columns + x] {
+                        fine.values[y * fine.columns + x] = w.at(x as f64 * 0.5, y as f64 * 0.5) as f32;
+                    }
+                }
+            }
+            fine
+        } else {
+            Field::filled(self.obstacle.columns, self.obstacle.rows, 0.0)
+        };
+        self.relax(&mut start, sweeps);
+        start
+    }
+
+    /// `sweeps` red-black sweeps in place.
+    pub(super) fn relax(&self, w: &mut Field, sweeps: usize) {
+        let columns = w.columns;
+        let h2 = self.step * self.step;
+        let inverse = 1.0 / (4.0 + self.stiffness * h2);
+        let source = self.load * h2;
+        for sweep in 0..sweeps {
+            // over-relaxation from the second sweep on; a last plain one smooths
+            let omega = if sweep == 0 || sweep + 1 == sweeps { 1.0 } else { 1.75 };
+            for colour in 0..2 {
+                for y in 1..w.rows - 1 {
+                    let row = y * columns;
+                    let first = 1 + (y + colour) % 2;
+                    let (above, rest) = w.values[row - columns..].split_at_mut(columns);
+                    let (here, below) = rest.split_at_mut(columns);
+                    let below = &below[..columns];
+                    let obstacle = &self.obstacle.values[row..row + columns];
+                    let free = &self.free[row..row + columns];
+                    let mut x = first;
+                    while x + 1 < columns {
+                        if free[x] {
+                            let sum = here[x - 1] + here[x + 1] + above[x] + below[x];
+                            let target = (sum + source) * inverse;
+                            here[x] = (here[x] + omega * (target - here[x])).max(obstacle[x]);
+                        }
+                        x += 2;
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sheet over a thin ring of posts must satisfy the complementarity conditions.
+    #[test]
+    fn the_solution_touches_or_is_in_equilibrium() {
+        let n = 65;
+        let step = 1e-3_f32;
+        let mut obstacle = Field::filled(n, n, f32::NEG_INFINITY);
+        for (x, y) in [(20, 20), (21, 20), (44, 30), (32, 50)] {
+            obstacle.values[y * n + x] = 5e-3;
+        }
+        let free = vec![true; n * n];
+        let problem = Problem { obstacle: &obstacle, free: &free, load: -3.0, stiffness: 0.0, step };
+        let w = problem.solve(4, 400);
+        for y in 1..n - 1 {
+            for x in 1..n - 1 {
+                let i = y * n + x;
+                let v = w.values[i];
+                let bend = 4.0 * v - w.values[i - 1] - w.values[i + 1] - w.values[i - n] - w.values[i + n];
+                let push = bend + 3.0 * step * step;
+                assert!(v >= obstacle.values[i], "below the obstacle");
+                assert!(push > -1e-6, "pulled down at {x} {y}: {push}");
+                assert!(push.abs() < 1e-6 || v <= obstacle.values[i] + 1e-7, "held up by nothing at {x} {y}");
+            }
+        }
+        assert!(w.values.iter().any(|&v| v < 0.0), "the load presses the free parts down");
+    }
+
+    #[test]
+    fn a_stiff_foundation_decays_exponentially() {
+        let (n, step, length) = (201, 1e-4_f32, 1e-3_f32);
+        let mut obstacle = Field::filled(n, n, f32::NEG_INFINITY);
+        for x in 0..n {
+            obstacle.values[100 * n + x] = 1e-3;
+        }
+        let free = vec![true; n * n];
+        let problem =
+            Problem { obstacle: &obstacle, free: &free, load: 0.0, stiffness: 1.0 / (length * length), step };
+        let w = problem.solve(3, 200);
+        for d in [5, 10, 20] {
+            let expected = 1e-3 * (-(d as f32) * step / length).exp();
+            let value = w.values[(100 + d) * n + 100];
+            assert!((value - expected).abs() < 2e-5, "{d}: {value} {expected}");
+        }
+    }
+}
