@@ -1,1 +1,479 @@
-//! (filled by its layer)
+//! The simulator: determinism, geometry, mechanics and statistics.
+
+use std::sync::LazyLock;
+
+use glam::{DVec2, DVec3};
+use touch2touch::domain::grid::Grid;
+use touch2touch::domain::sample::{BubbleTouch, GelSlimTouch, Sample};
+use touch2touch::domain::sensor::{Finger, bubble, gelslim};
+use touch2touch::domain::sim::{self, Grasp, SimConfig, ToolSpec};
+
+fn bubble_of(sample: &Sample, finger: Finger) -> &BubbleTouch {
+    sample
+        .finger(finger)
+        .and_then(|t| t.bubble.as_ref())
+        .expect("both fingers have a bubble")
+}
+
+fn gelslim_of(sample: &Sample, finger: Finger) -> &GelSlimTouch {
+    sample
+        .finger(finger)
+        .and_then(|t| t.gelslim.as_ref())
+        .expect("both fingers have a GelSlim")
+}
+
+/// The noise-free membrane point behind every pixel, object frame.
+fn lifted(sample: &Sample, finger: Finger) -> Grid<DVec3> {
+    let touch = bubble_of(sample, finger);
+    let (camera, truth) = (
+        touch.camera.as_ref().unwrap(),
+        touch.truth.as_ref().unwrap(),
+    );
+    let object_from_grasp = sample.grasp_from_object.unwrap().inverse().to_affine();
+    Grid::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| {
+        let z = f64::from(camera.depth_reference[(u, v)] - truth.imprint[(u, v)]);
+        let p = camera
+            .grasp_from_camera
+            .transform_point3(camera.intrinsics.lift(u as f64, v as f64, z));
+        object_from_grasp.transform_point3(p)
+    })
+}
+
+fn contact_pixels(sample: &Sample, finger: Finger) -> Vec<(usize, usize)> {
+    let contact = &bubble_of(sample, finger).truth.as_ref().unwrap().contact;
+    (0..bubble::HEIGHT)
+        .flat_map(|v| (0..bubble::WIDTH).map(move |u| (u, v)))
+        .filter(|&p| contact[p])
+        .collect()
+}
+
+/// One sample of each tool and of a few random ones, made once for all tests.
+fn a_few() -> &'static [(ToolSpec, Sample)] {
+    static SAMPLES: LazyLock<Vec<(ToolSpec, Sample)>> = LazyLock::new(|| {
+        let tools = sim::tools()
+            .iter()
+            .cloned()
+            .chain((0..3).map(sim::random_tool));
+        tools
+            .enumerate()
+            .map(|(i, tool)| {
+                let sample = sim::simulate(
+                    &tool,
+                    sim::random_grasp(i as u64),
+                    i as u64,
+                    &SimConfig::default(),
+                );
+                (tool, sample)
+            })
+            .collect()
+    });
+    &SAMPLES
+}
+
+fn same_bits(a: &Sample, b: &Sample) -> bool {
+    Finger::BOTH.iter().all(|&f| {
+        let bits = |s: &Sample| -> Vec<u32> {
+            let (bubble, gel) = (bubble_of(s, f), gelslim_of(s, f));
+            bubble
+                .imprint
+                .as_slice()
+                .iter()
+                .chain(gel.difference.as_slice().iter().flatten())
+                .map(|v| v.to_bits())
+                .collect()
+        };
+        bits(a) == bits(b)
+    })
+}
+
+#[test]
+fn the_same_seed_gives_the_same_sample_in_any_thread() {
+    let tool = &sim::tools()[4];
+    let make = move |seed| sim::simulate(tool, sim::grid_grasp(100), seed, &SimConfig::default());
+    let here = make(5);
+    let there = std::thread::spawn(move || make(5)).join().unwrap();
+    assert!(same_bits(&here, &there));
+    assert!(!same_bits(&here, &make(6)));
+    assert_eq!(SimConfig::randomised(3), SimConfig::randomised(3));
+    assert_ne!(SimConfig::randomised(3), SimConfig::randomised(4));
+}
+
+/// The key property: depth, intrinsics, rig, pose and CAD agree for both fingers.
+#[test]
+fn contact_points_of_both_fingers_lie_on_the_tool() {
+    for (tool, sample) in a_few() {
+        for finger in Finger::BOTH {
+            let points = lifted(sample, finger);
+            let mut distances: Vec<f64> = contact_pixels(sample, finger)
+                .iter()
+                .map(|&p| tool.signed_distance(points[p]).abs())
+                .collect();
+            assert!(
+                distances.len() > 150,
+                "{}: only {} contact pixels",
+                tool.name,
+                distances.len()
+            );
+            distances.sort_by(f64::total_cmp);
+            let median = distances[distances.len() / 2];
+            assert!(
+                median < 3e-4,
+                "{} {}: median {median}",
+                tool.name,
+                finger.name()
+            );
+            assert!(
+                distances[distances.len() - 1] < 1.05e-3,
+                "{} {}",
+                tool.name,
+                finger.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn the_contact_mask_is_the_labs_signed_distance_rule() {
+    for (tool, sample) in a_few() {
+        for finger in Finger::BOTH {
+            let contact = &bubble_of(sample, finger).truth.as_ref().unwrap().contact;
+            let near = lifted(sample, finger).map(|&p| tool.signed_distance(p) <= 1e-3);
+            let both = contact
+                .as_slice()
+                .iter()
+                .zip(near.as_slice())
+                .filter(|(a, b)| **a && **b)
+                .count();
+            let either = contact
+                .as_slice()
+                .iter()
+                .zip(near.as_slice())
+                .filter(|(a, b)| **a || **b)
+                .count();
+            assert!(
+                both as f64 / either as f64 > 0.98,
+                "{} {}",
+                tool.name,
+                finger.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn the_membrane_never_enters_the_tool() {
+    for (tool, sample) in a_few() {
+        for finger in Finger::BOTH {
+            let deepest = lifted(sample, finger)
+                .as_slice()
+                .iter()
+                .map(|&p| tool.signed_distance(p))
+                .fold(0.0, f64::min);
+            assert!(
+                deepest > -5e-5,
+                "{} {}: {deepest}",
+                tool.name,
+                finger.name()
+            );
+        }
+        let membrane = sim::Membrane::press(
+            &SimConfig::default().bubble,
+            tool,
+            sample.grasp_from_object.unwrap().inverse(),
+        );
+        assert!(membrane.worst_gap() < 1e-6);
+    }
+}
+
+/// A pixel of the GelSlim on a bar's ridge, sent through both cameras, meets the membrane where the bubble has its
+/// ridge: the membrane point of that bubble pixel is on the tool.
+#[test]
+fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
+    for (tool, sample) in a_few() {
+        let grasp_from_object = sample.grasp_from_object.unwrap();
+        for finger in Finger::BOTH {
+            let camera = bubble_of(sample, finger).camera.as_ref().unwrap();
+            let camera_from_grasp = camera.grasp_from_camera.inverse();
+            let contact = &bubble_of(sample, finger).truth.as_ref().unwrap().contact;
+            let (mut on, mut all) = (0, 0);
+            for row in (0..gelslim::HEIGHT).step_by(8) {
+                for column in (0..gelslim::WIDTH).step_by(8) {
+                    let yz = sim::gelslim_yz(finger, column as f64, row as f64);
+                    let object = grasp_from_object.inverse().transform_yz(yz);
+                    // the flat ridge only: the bevel is hidden on the side that faces away
+                    if tool.outline_distance(object) > -tool.bevel_width_m {
+                        continue;
+                    }
+                    let p = DVec3::new(-sim::outward(finger) * tool.half_thickness_m, yz.x, yz.y);
+                    let (u, v) = camera
+                        .intrinsics
+                        .project(camera_from_grasp.transform_point3(p))
+                        .unwrap();
+                    all += 1;
+                    on += usize::from(
+                        contact.get(u.round() as usize, v.round() as usize) == Some(&true),
+                    );
+                }
+            }
+            assert!(
+                all == 0 || f64::from(on as u32) > 0.85 * f64::from(all as u32),
+                "{} {}: {on} of {all}",
+                tool.name,
+                finger.name()
+            );
+        }
+    }
+}
+
+/// The colour streaks appear where the ridges are, in both fingers' pictures.
+#[test]
+fn gelslim_streaks_frame_the_bars() {
+    for (tool, sample) in a_few() {
+        let object_from_grasp = sample.grasp_from_object.unwrap().inverse();
+        for finger in Finger::BOTH {
+            let difference = &gelslim_of(sample, finger).difference;
+            let (mut near, mut far) = (Vec::new(), Vec::new());
+            for row in 0..gelslim::HEIGHT {
+                for column in 0..gelslim::WIDTH {
+                    let yz = sim::gelslim_yz(finger, column as f64, row as f64);
+                    let s = tool.outline_distance(object_from_grasp.transform_yz(yz));
+                    let [r, g, b] = difference[(column, row)];
+                    let colour = (r - g).abs() + (g - b).abs();
+                    if (-1e-3..0.0).contains(&s) {
+                        near.push(f64::from(colour));
+                    } else if s > 4e-3 {
+                        far.push(f64::from(colour));
+                    }
+                }
+            }
+            let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+            if near.len() > 500 && far.len() > 500 {
+                assert!(
+                    mean(&near) > 2.5 * mean(&far),
+                    "{} {}",
+                    tool.name,
+                    finger.name()
+                );
+            }
+        }
+    }
+}
+
+/// A tool that its half turn about z maps to itself feels the same to both fingers: the images are mirrored
+/// (bubble: about the row direction, apart from the cameras' different offsets).
+#[test]
+fn the_fingers_mirror_each_other() {
+    let sample = sim::simulate(&sim::tools()[5], Grasp::default(), 1, &SimConfig::default());
+    let object = |finger| lifted(&sample, finger);
+    let (right, left) = (object(Finger::Right), object(Finger::Left));
+    // the same (y, z) has mirrored x: compare over a common grid of (y, z)
+    let height_at = |points: &Grid<DVec3>, yz: DVec2| {
+        points
+            .as_slice()
+            .iter()
+            .min_by(|a, b| {
+                let d = |p: &DVec3| (DVec2::new(p.y, p.z) - yz).length_squared();
+                d(a).total_cmp(&d(b))
+            })
+            .map(|p| p.x)
+            .unwrap()
+    };
+    for i in 0..25 {
+        let yz = DVec2::new(f64::from(i % 5) - 2.0, f64::from(i / 5) - 2.0) * 0.006;
+        let (r, l) = (height_at(&right, yz), height_at(&left, yz));
+        assert!(r > 0.0 && l < 0.0);
+        assert!((r + l).abs() < 6e-4, "{yz}: {r} {l}");
+    }
+    // rows run in opposite directions, columns in the same
+    let at = |g: &Grid<DVec3>, u, v| g[(u, v)];
+    assert!(
+        at(&right, 70, 20).y > at(&right, 70, 120).y && at(&left, 70, 20).y < at(&left, 70, 120).y
+    );
+    assert!(
+        at(&right, 20, 70).z > at(&right, 150, 70).z && at(&left, 20, 70).z > at(&left, 150, 70).z
+    );
+}
+
+/// Turning the grasp the other way is mirroring the tool: the simulator prefers no direction.
+#[test]
+fn opposite_angles_are_mirror_images() {
+    let rod = &sim::tools()[5];
+    let at = |theta: f64| {
+        let grasp = Grasp {
+            theta_rad: theta,
+            x_m: 0.0,
+            y_m: 0.0,
+        };
+        sim::Membrane::press(&SimConfig::default().bubble, rod, grasp.object_from_grasp())
+    };
+    let (plus, minus) = (at(0.3), at(-0.3));
+    for i in 0..400 {
+        let yz = DVec2::new(f64::from(i % 20) - 10.0, f64::from(i / 20) - 10.0) * 0.0025;
+        let (a, b) = (plus.height(yz), minus.height(DVec2::new(-yz.x, yz.y)));
+        assert!((a - b).abs() < 1e-4, "{yz}: {a} {b}");
+    }
+}
+
+struct Moments {
+    mean: f64,
+    deviation: f64,
+    low: f64,
+    high: f64,
+}
+
+fn moments(values: impl Iterator<Item = f64>) -> Moments {
+    let (mut n, mut sum, mut square) = (0.0, 0.0, 0.0);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for v in values {
+        n += 1.0;
+        sum += v;
+        square += v * v;
+        low = low.min(v);
+        high = high.max(v);
+    }
+    let mean = sum / n;
+    Moments {
+        mean,
+        deviation: (square / n - mean * mean).sqrt(),
+        low,
+        high,
+    }
+}
+
+/// The published statistics of the lab's dataset, in bands.
+#[test]
+fn statistics_are_those_of_the_labs_data() {
+    let samples: Vec<Sample> = (0..24)
+        .map(|i| {
+            let tool = &sim::tools()[i % 9];
+            sim::simulate(
+                tool,
+                sim::random_grasp(900 + i as u64),
+                i as u64,
+                &SimConfig::default(),
+            )
+        })
+        .collect();
+    let each = || samples.iter().flat_map(|s| Finger::BOTH.map(|f| (s, f)));
+
+    let m = moments(each().flat_map(|(s, f)| {
+        bubble_of(s, f)
+            .imprint
+            .as_slice()
+            .iter()
+            .map(|&v| f64::from(v))
+    }));
+    assert!(
+        (0.0030..0.0066).contains(&m.mean),
+        "imprint mean {}",
+        m.mean
+    );
+    assert!(
+        (0.0035..0.0060).contains(&m.deviation),
+        "imprint deviation {}",
+        m.deviation
+    );
+    assert!(
+        (-0.022..-0.004).contains(&m.low) && (0.014..0.032).contains(&m.high),
+        "imprint {} .. {}",
+        m.low,
+        m.high
+    );
+
+    for (c, (mean, deviation)) in [(-0.0107, 0.0687), (-0.0063, 0.0428), (-0.0087, 0.0576)]
+        .into_iter()
+        .enumerate()
+    {
+        let m = moments(each().flat_map(|(s, f)| {
+            gelslim_of(s, f)
+                .difference
+                .as_slice()
+                .iter()
+                .map(move |p| f64::from(p[c]) / 255.0)
+        }));
+        assert!(
+            (m.mean - mean).abs() < 0.012,
+            "channel {c}: mean {}",
+            m.mean
+        );
+        assert!(
+            (0.65..1.45).contains(&(m.deviation / deviation)),
+            "channel {c}: deviation {}",
+            m.deviation
+        );
+        assert!(
+            m.low > -0.9 && m.high < 0.9,
+            "channel {c}: {} .. {}",
+            m.low,
+            m.high
+        );
+    }
+    for (c, mean) in [0.2966, 0.3886, 0.5625].into_iter().enumerate() {
+        let m = moments(each().flat_map(|(s, f)| {
+            let images = gelslim_of(s, f).images.as_ref().unwrap();
+            images
+                .raw
+                .as_slice()
+                .iter()
+                .map(move |p| f64::from(p[c]) / 255.0)
+        }));
+        assert!(
+            (m.mean - mean).abs() < 0.05,
+            "raw channel {c}: mean {}",
+            m.mean
+        );
+        assert!(m.low >= 0.0 && m.high <= 1.0);
+    }
+    for (s, f) in each() {
+        let images = gelslim_of(s, f).images.as_ref().unwrap();
+        assert!(
+            images
+                .raw
+                .as_slice()
+                .iter()
+                .flatten()
+                .all(|v| v.fract() == 0.0)
+        );
+    }
+}
+
+#[test]
+fn random_sensors_and_tools_give_finite_images() {
+    for seed in 0..6 {
+        let config = SimConfig::randomised(seed);
+        let sample = sim::simulate(
+            &sim::random_tool(seed),
+            sim::random_grasp(seed),
+            seed,
+            &config,
+        );
+        for finger in Finger::BOTH {
+            let touch = bubble_of(&sample, finger);
+            assert!(
+                touch
+                    .imprint
+                    .as_slice()
+                    .iter()
+                    .all(|v| v.is_finite() && v.abs() < 0.06)
+            );
+            assert!(
+                touch
+                    .truth
+                    .as_ref()
+                    .unwrap()
+                    .contact
+                    .as_slice()
+                    .iter()
+                    .any(|&c| c)
+            );
+            assert!(
+                gelslim_of(&sample, finger)
+                    .difference
+                    .as_slice()
+                    .iter()
+                    .flatten()
+                    .all(|v| v.abs() <= 255.0)
+            );
+        }
+    }
+}

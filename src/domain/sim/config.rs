@@ -53,9 +53,9 @@ pub struct BubbleConfig {
 impl Default for BubbleConfig {
     fn default() -> Self {
         Self {
-            press_m: 0.010,
-            dome_rise_m: 0.030,
-            rim_semi_axes_m: [0.042, 0.058],
+            press_m: 0.0125,
+            dome_rise_m: 0.0145,
+            rim_semi_axes_m: [0.046, 0.066],
             rim_centre_z_m: 0.006,
             air_kept: 0.5,
             noise_m: 0.000_6,
@@ -136,7 +136,7 @@ impl Default for GelSlimConfig {
             smoothing_m: 0.000_08,
             // green lights the wrist side; red and blue 120 degrees away
             led_angle_rad: [-1.12, std::f64::consts::PI, 1.05],
-            led_gain: [95.0, 62.0, 84.0],
+            led_gain: [72.0, 29.0, 40.0],
             led_falloff: 0.16,
             base: [78.0, 102.0, 147.0],
             saturation: 150.0,
@@ -147,7 +147,7 @@ impl Default for GelSlimConfig {
             marker_phase: [0.2, 0.4],
             marker_angle_rad: 0.01,
             marker_fan: 0.10,
-            marker_darkness: 0.82,
+            marker_darkness: 0.7,
             marker_push_m: 0.000_55,
             spread_m: 0.001_6,
             shear_m: 0.000_12,
@@ -169,7 +169,8 @@ impl SimConfig {
     /// Another pair of sensors, drawn around the nominal one: for training that must not depend on one sensor.
     pub fn randomised(seed: u64) -> Self {
         let mut noise = Noise::new(seed, Stream::Config, 0);
-        let mut around = |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
+        let mut around =
+            |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
         let (b, g) = (BubbleConfig::default(), GelSlimConfig::default());
         let bubble = BubbleConfig {
             press_m: around(b.press_m, 0.15),

@@ -20,7 +20,11 @@ pub(super) struct Rays {
 
 impl Rays {
     pub(super) fn new(finger: Finger, intrinsics: Intrinsics, grasp_from_camera: DAffine3) -> Self {
-        Self { intrinsics, grasp_from_camera, outward: rig::outward(finger) }
+        Self {
+            intrinsics,
+            grasp_from_camera,
+            outward: rig::outward(finger),
+        }
     }
 
     /// Origin of all rays.
@@ -52,7 +56,11 @@ pub(super) fn dome_depth(rays: &Rays, dome: &Dome) -> DepthMap {
 }
 
 /// Depth of the pressed membrane, metres, and where it lies on the tool.
-pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>, reference: &DepthMap) -> (DepthMap, Mask) {
+pub(super) fn membrane_depth(
+    rays: &Rays,
+    membrane: &Membrane<'_>,
+    reference: &DepthMap,
+) -> (DepthMap, Mask) {
     let origin = rays.origin();
     let mut contact = Mask::filled(bubble::WIDTH, bubble::HEIGHT, false);
     let depth = DepthMap::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| {
@@ -77,11 +85,16 @@ pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>, reference: &D
         let (mut low, mut high) = (last, z);
         for _ in 0..10 {
             let middle = 0.5 * (low + high);
-            if above(middle) < 0.0 { low = middle } else { high = middle }
+            if above(middle) < 0.0 {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         let hit = origin + d * high;
         let yz = DVec2::new(hit.y, hit.z);
-        contact[(u, v)] = membrane.distance_to_tool(hit.x, yz, CONTACT_DISTANCE_M) <= CONTACT_DISTANCE_M;
+        contact[(u, v)] =
+            membrane.distance_to_tool(hit.x, yz, CONTACT_DISTANCE_M) <= CONTACT_DISTANCE_M;
         high as f32
     });
     (depth, contact)
@@ -128,10 +141,10 @@ pub(super) fn measure(
 
 /// White noise blurred to the grain of the real images (correlation 0.5 at one pixel), deviation 1.
 fn correlated(noise: &mut Noise, w: usize, h: usize) -> Grid<f32> {
-    let mut grain = blur3(&noise.white(w, h), 0.2);
-    // the blur keeps 0.36 + 2 * 0.04 of the variance along each axis
+    let mut grain = blur3(&noise.white(w, h), 0.25);
+    // the blur keeps 0.25 + 2 * 0.0625 of the variance along each axis
     for g in grain.as_mut_slice() {
-        *g /= 0.44;
+        *g /= 0.375;
     }
     grain
 }
@@ -148,7 +161,9 @@ fn texture(config: &BubbleConfig, finger: Finger) -> Grid<f32> {
     let count = (config.speckle_density * (w * h) as f64) as usize;
     for _ in 0..count {
         let (cx, cy) = (noise.uniform(0.0, w as f64), noise.uniform(0.0, h as f64));
-        let height = config.speckle_m * noise.uniform(0.4, 1.0) * if noise.unit() < 0.65 { -1.0 } else { 0.8 };
+        let height = config.speckle_m
+            * noise.uniform(0.4, 1.0)
+            * if noise.unit() < 0.65 { -1.0 } else { 0.8 };
         let radius = noise.uniform(0.8, 1.5);
         for v in (cy - 4.0).max(0.0) as usize..((cy + 4.0) as usize).min(h) {
             for u in (cx - 4.0).max(0.0) as usize..((cx + 4.0) as usize).min(w) {

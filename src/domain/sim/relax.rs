@@ -14,7 +14,11 @@ pub(super) struct Field {
 
 impl Field {
     pub(super) fn filled(columns: usize, rows: usize, value: f32) -> Self {
-        Self { columns, rows, values: vec![value; columns * rows] }
+        Self {
+            columns,
+            rows,
+            values: vec![value; columns * rows],
+        }
     }
 
     /// Bilinear value at node coordinates; beyond the border the border's value.
@@ -30,15 +34,15 @@ impl Field {
         top + (bottom - top) * ty
     }
 
-    /// Every second node, with the largest of the 3 x 3 nodes around it.
-    fn coarser(&self) -> Field {
+    /// Every second node, with the largest value within `reach` nodes of it.
+    fn coarser(&self, reach: usize) -> Field {
         let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
         let mut out = Field::filled(columns, rows, f32::NEG_INFINITY);
         for y in 0..rows {
             for x in 0..columns {
                 let mut best = f32::NEG_INFINITY;
-                for j in (2 * y).saturating_sub(1)..=(2 * y + 1).min(self.rows - 1) {
-                    for i in (2 * x).saturating_sub(1)..=(2 * x + 1).min(self.columns - 1) {
+                for j in (2 * y).saturating_sub(reach)..=(2 * y + reach).min(self.rows - 1) {
+                    for i in (2 * x).saturating_sub(reach)..=(2 * x + reach).min(self.columns - 1) {
                         best = best.max(self.values[j * self.columns + i]);
                     }
                 }
@@ -64,21 +68,34 @@ pub(super) struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Solves on `levels` grids, each twice as fine as the one before, with `sweeps` sweeps on each.
+    /// Solves on `levels` grids, each twice as fine as the one before, with `sweeps` sweeps on the finest and twice
+    /// as many on each coarser one.
     pub(super) fn solve(&self, levels: usize, sweeps: usize) -> Field {
+        self.solve_from(levels, sweeps, 0)
+    }
+
+    /// `reach` is how far a coarser obstacle gathers its values: bars are wider than the second finest step, but
+    /// could fall between the nodes of the coarser ones.
+    fn solve_from(&self, levels: usize, sweeps: usize, reach: usize) -> Field {
         let mut start = if levels > 1 && self.obstacle.columns > 8 && self.obstacle.rows > 8 {
-            let obstacle = self.obstacle.coarser();
+            let obstacle = self.obstacle.coarser(reach);
             let free: Vec<bool> = (0..obstacle.rows)
                 .flat_map(|y| (0..obstacle.columns).map(move |x| (x, y)))
                 .map(|(x, y)| self.free[2 * y * self.obstacle.columns + 2 * x])
                 .collect();
-            let coarse = Problem { obstacle: &obstacle, free: &free, step: 2.0 * self.step, ..*self };
-            let w = coarse.solve(levels - 1, sweeps);
+            let coarse = Problem {
+                obstacle: &obstacle,
+                free: &free,
+                step: 2.0 * self.step,
+                ..*self
+            };
+            let w = coarse.solve_from(levels - 1, 2 * sweeps, 1);
             let mut fine = Field::filled(self.obstacle.columns, self.obstacle.rows, 0.0);
             for y in 0..fine.rows {
                 for x in 0..fine.columns {
                     if self.free[y * fine.columns + x] {
-                        fine.values[y * fine.columns + x] = w.at(x as f64 * 0.5, y as f64 * 0.5) as f32;
+                        fine.values[y * fine.columns + x] =
+                            w.at(x as f64 * 0.5, y as f64 * 0.5) as f32;
                     }
                 }
             }
@@ -98,7 +115,11 @@ impl Problem<'_> {
         let source = self.load * h2;
         for sweep in 0..sweeps {
             // over-relaxation from the second sweep on; a last plain one smooths
-            let omega = if sweep == 0 || sweep + 1 == sweeps { 1.0 } else { 1.75 };
+            let omega = if sweep == 0 || sweep + 1 == sweeps {
+                1.0
+            } else {
+                1.75
+            };
             for colour in 0..2 {
                 for y in 1..w.rows - 1 {
                     let row = y * columns;
@@ -137,20 +158,33 @@ mod tests {
             obstacle.values[y * n + x] = 5e-3;
         }
         let free = vec![true; n * n];
-        let problem = Problem { obstacle: &obstacle, free: &free, load: -3.0, stiffness: 0.0, step };
+        let problem = Problem {
+            obstacle: &obstacle,
+            free: &free,
+            load: -3.0,
+            stiffness: 0.0,
+            step,
+        };
         let w = problem.solve(4, 400);
         for y in 1..n - 1 {
             for x in 1..n - 1 {
                 let i = y * n + x;
                 let v = w.values[i];
-                let bend = 4.0 * v - w.values[i - 1] - w.values[i + 1] - w.values[i - n] - w.values[i + n];
+                let bend =
+                    4.0 * v - w.values[i - 1] - w.values[i + 1] - w.values[i - n] - w.values[i + n];
                 let push = bend + 3.0 * step * step;
                 assert!(v >= obstacle.values[i], "below the obstacle");
                 assert!(push > -1e-6, "pulled down at {x} {y}: {push}");
-                assert!(push.abs() < 1e-6 || v <= obstacle.values[i] + 1e-7, "held up by nothing at {x} {y}");
+                assert!(
+                    push.abs() < 1e-6 || v <= obstacle.values[i] + 1e-7,
+                    "held up by nothing at {x} {y}"
+                );
             }
         }
-        assert!(w.values.iter().any(|&v| v < 0.0), "the load presses the free parts down");
+        assert!(
+            w.values.iter().any(|&v| v < 0.0),
+            "the load presses the free parts down"
+        );
     }
 
     #[test]
@@ -161,8 +195,13 @@ mod tests {
             obstacle.values[100 * n + x] = 1e-3;
         }
         let free = vec![true; n * n];
-        let problem =
-            Problem { obstacle: &obstacle, free: &free, load: 0.0, stiffness: 1.0 / (length * length), step };
+        let problem = Problem {
+            obstacle: &obstacle,
+            free: &free,
+            load: 0.0,
+            stiffness: 1.0 / (length * length),
+            step,
+        };
         let w = problem.solve(3, 200);
         for d in [5, 10, 20] {
             let expected = 1e-3 * (-(d as f32) * step / length).exp();
