@@ -11,9 +11,7 @@ const GAP: u32 = 3;
 
 fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args().skip(1);
-    let path = arguments
-        .next()
-        .unwrap_or_else(|| "docs/simulated_tiles.png".to_owned());
+    let path = arguments.next().unwrap_or_else(|| "docs/simulated_tiles.png".to_owned());
     let columns: u32 = arguments.next().map_or(Ok(9), |n| n.parse())?;
     let seed: u64 = arguments.next().map_or(Ok(1), |n| n.parse())?;
     let sensor: Option<u64> = arguments.next().map(|n| n.parse()).transpose()?;
@@ -23,11 +21,7 @@ fn main() -> anyhow::Result<()> {
     let per_tool = 3;
     let count = tools.len() as u32 * per_tool;
     let rows = count.div_ceil(columns);
-    let mut sheet = RgbImage::from_pixel(
-        columns * (TILE + GAP),
-        2 * rows * (TILE + GAP),
-        Rgb([255; 3]),
-    );
+    let mut sheet = RgbImage::from_pixel(columns * (TILE + GAP), 2 * rows * (TILE + GAP), Rgb([255; 3]));
     let start = std::time::Instant::now();
     for n in 0..count {
         let tool = &tools[(n / per_tool) as usize];
@@ -81,21 +75,13 @@ fn scaled(tile: &[[f32; 3]]) -> Vec<[u8; 3]> {
     let grey = tile.iter().all(|p| p[0] == p[1] && p[1] == p[2]);
     let value = |p: &[f32; 3], c: usize| if grey { p[c] } else { p[c] / deviation[c] };
     let all = || tile.iter().flat_map(|p| (0..3).map(move |c| value(p, c)));
-    let (lo, hi) = all().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| {
-        (a.min(v), b.max(v))
-    });
-    tile.iter()
-        .map(|p| std::array::from_fn(|c| ((value(p, c) - lo) / (hi - lo).max(1e-9) * 255.0) as u8))
-        .collect()
+    let (lo, hi) = all().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+    tile.iter().map(|p| std::array::from_fn(|c| ((value(p, c) - lo) / (hi - lo).max(1e-9) * 255.0) as u8)).collect()
 }
 
 fn put(sheet: &mut RgbImage, column: u32, row: u32, tile: &[[u8; 3]]) {
     for (i, pixel) in tile.iter().enumerate() {
         let (x, y) = (i as u32 % TILE, i as u32 / TILE);
-        sheet.put_pixel(
-            column * (TILE + GAP) + x,
-            row * (TILE + GAP) + y,
-            Rgb(*pixel),
-        );
+        sheet.put_pixel(column * (TILE + GAP) + x, row * (TILE + GAP) + y, Rgb(*pixel));
     }
 }

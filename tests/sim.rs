@@ -9,60 +9,38 @@ use touch2touch::domain::sensor::{Finger, bubble, gelslim};
 use touch2touch::domain::sim::{self, Grasp, SimConfig, ToolSpec};
 
 fn bubble_of(sample: &Sample, finger: Finger) -> &BubbleTouch {
-    sample
-        .finger(finger)
-        .and_then(|t| t.bubble.as_ref())
-        .expect("both fingers have a bubble")
+    sample.finger(finger).and_then(|t| t.bubble.as_ref()).expect("both fingers have a bubble")
 }
 
 fn gelslim_of(sample: &Sample, finger: Finger) -> &GelSlimTouch {
-    sample
-        .finger(finger)
-        .and_then(|t| t.gelslim.as_ref())
-        .expect("both fingers have a GelSlim")
+    sample.finger(finger).and_then(|t| t.gelslim.as_ref()).expect("both fingers have a GelSlim")
 }
 
 /// The noise-free membrane point behind every pixel, object frame.
 fn lifted(sample: &Sample, finger: Finger) -> Grid<DVec3> {
     let touch = bubble_of(sample, finger);
-    let (camera, truth) = (
-        touch.camera.as_ref().unwrap(),
-        touch.truth.as_ref().unwrap(),
-    );
+    let (camera, truth) = (touch.camera.as_ref().unwrap(), touch.truth.as_ref().unwrap());
     let object_from_grasp = sample.grasp_from_object.unwrap().inverse().to_affine();
     Grid::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| {
         let z = f64::from(camera.depth_reference[(u, v)] - truth.imprint[(u, v)]);
-        let p = camera
-            .grasp_from_camera
-            .transform_point3(camera.intrinsics.lift(u as f64, v as f64, z));
+        let p = camera.grasp_from_camera.transform_point3(camera.intrinsics.lift(u as f64, v as f64, z));
         object_from_grasp.transform_point3(p)
     })
 }
 
 fn contact_pixels(sample: &Sample, finger: Finger) -> Vec<(usize, usize)> {
     let contact = &bubble_of(sample, finger).truth.as_ref().unwrap().contact;
-    (0..bubble::HEIGHT)
-        .flat_map(|v| (0..bubble::WIDTH).map(move |u| (u, v)))
-        .filter(|&p| contact[p])
-        .collect()
+    (0..bubble::HEIGHT).flat_map(|v| (0..bubble::WIDTH).map(move |u| (u, v))).filter(|&p| contact[p]).collect()
 }
 
 /// One sample of each tool and of a few random ones, made once for all tests.
 fn a_few() -> &'static [(ToolSpec, Sample)] {
     static SAMPLES: LazyLock<Vec<(ToolSpec, Sample)>> = LazyLock::new(|| {
-        let tools = sim::tools()
-            .iter()
-            .cloned()
-            .chain((0..3).map(sim::random_tool));
+        let tools = sim::tools().iter().cloned().chain((0..3).map(sim::random_tool));
         tools
             .enumerate()
             .map(|(i, tool)| {
-                let sample = sim::simulate(
-                    &tool,
-                    sim::random_grasp(i as u64),
-                    i as u64,
-                    &SimConfig::default(),
-                );
+                let sample = sim::simulate(&tool, sim::random_grasp(i as u64), i as u64, &SimConfig::default());
                 (tool, sample)
             })
             .collect()
@@ -104,30 +82,13 @@ fn contact_points_of_both_fingers_lie_on_the_tool() {
     for (tool, sample) in a_few() {
         for finger in Finger::BOTH {
             let points = lifted(sample, finger);
-            let mut distances: Vec<f64> = contact_pixels(sample, finger)
-                .iter()
-                .map(|&p| tool.signed_distance(points[p]).abs())
-                .collect();
-            assert!(
-                distances.len() > 150,
-                "{}: only {} contact pixels",
-                tool.name,
-                distances.len()
-            );
+            let mut distances: Vec<f64> =
+                contact_pixels(sample, finger).iter().map(|&p| tool.signed_distance(points[p]).abs()).collect();
+            assert!(distances.len() > 150, "{}: only {} contact pixels", tool.name, distances.len());
             distances.sort_by(f64::total_cmp);
             let median = distances[distances.len() / 2];
-            assert!(
-                median < 3e-4,
-                "{} {}: median {median}",
-                tool.name,
-                finger.name()
-            );
-            assert!(
-                distances[distances.len() - 1] < 1.05e-3,
-                "{} {}",
-                tool.name,
-                finger.name()
-            );
+            assert!(median < 3e-4, "{} {}: median {median}", tool.name, finger.name());
+            assert!(distances[distances.len() - 1] < 1.05e-3, "{} {}", tool.name, finger.name());
         }
     }
 }
@@ -138,24 +99,9 @@ fn the_contact_mask_is_the_labs_signed_distance_rule() {
         for finger in Finger::BOTH {
             let contact = &bubble_of(sample, finger).truth.as_ref().unwrap().contact;
             let near = lifted(sample, finger).map(|&p| tool.signed_distance(p) <= 1e-3);
-            let both = contact
-                .as_slice()
-                .iter()
-                .zip(near.as_slice())
-                .filter(|(a, b)| **a && **b)
-                .count();
-            let either = contact
-                .as_slice()
-                .iter()
-                .zip(near.as_slice())
-                .filter(|(a, b)| **a || **b)
-                .count();
-            assert!(
-                both as f64 / either as f64 > 0.98,
-                "{} {}",
-                tool.name,
-                finger.name()
-            );
+            let both = contact.as_slice().iter().zip(near.as_slice()).filter(|(a, b)| **a && **b).count();
+            let either = contact.as_slice().iter().zip(near.as_slice()).filter(|(a, b)| **a || **b).count();
+            assert!(both as f64 / either as f64 > 0.98, "{} {}", tool.name, finger.name());
         }
     }
 }
@@ -164,23 +110,12 @@ fn the_contact_mask_is_the_labs_signed_distance_rule() {
 fn the_membrane_never_enters_the_tool() {
     for (tool, sample) in a_few() {
         for finger in Finger::BOTH {
-            let deepest = lifted(sample, finger)
-                .as_slice()
-                .iter()
-                .map(|&p| tool.signed_distance(p))
-                .fold(0.0, f64::min);
-            assert!(
-                deepest > -5e-5,
-                "{} {}: {deepest}",
-                tool.name,
-                finger.name()
-            );
+            let deepest =
+                lifted(sample, finger).as_slice().iter().map(|&p| tool.signed_distance(p)).fold(0.0, f64::min);
+            assert!(deepest > -5e-5, "{} {}: {deepest}", tool.name, finger.name());
         }
-        let membrane = sim::Membrane::press(
-            &SimConfig::default().bubble,
-            tool,
-            sample.grasp_from_object.unwrap().inverse(),
-        );
+        let membrane =
+            sim::Membrane::press(&SimConfig::default().bubble, tool, sample.grasp_from_object.unwrap().inverse());
         assert!(membrane.worst_gap() < 1e-6);
     }
 }
@@ -205,14 +140,9 @@ fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
                         continue;
                     }
                     let p = DVec3::new(-sim::outward(finger) * tool.half_thickness_m, yz.x, yz.y);
-                    let (u, v) = camera
-                        .intrinsics
-                        .project(camera_from_grasp.transform_point3(p))
-                        .unwrap();
+                    let (u, v) = camera.intrinsics.project(camera_from_grasp.transform_point3(p)).unwrap();
                     all += 1;
-                    on += usize::from(
-                        contact.get(u.round() as usize, v.round() as usize) == Some(&true),
-                    );
+                    on += usize::from(contact.get(u.round() as usize, v.round() as usize) == Some(&true));
                 }
             }
             assert!(
@@ -248,12 +178,7 @@ fn gelslim_streaks_frame_the_bars() {
             }
             let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
             if near.len() > 500 && far.len() > 500 {
-                assert!(
-                    mean(&near) > 2.5 * mean(&far),
-                    "{} {}",
-                    tool.name,
-                    finger.name()
-                );
+                assert!(mean(&near) > 2.5 * mean(&far), "{} {}", tool.name, finger.name());
             }
         }
     }
@@ -286,12 +211,8 @@ fn the_fingers_mirror_each_other() {
     }
     // rows run in opposite directions, columns in the same
     let at = |g: &Grid<DVec3>, u, v| g[(u, v)];
-    assert!(
-        at(&right, 70, 20).y > at(&right, 70, 120).y && at(&left, 70, 20).y < at(&left, 70, 120).y
-    );
-    assert!(
-        at(&right, 20, 70).z > at(&right, 150, 70).z && at(&left, 20, 70).z > at(&left, 150, 70).z
-    );
+    assert!(at(&right, 70, 20).y > at(&right, 70, 120).y && at(&left, 70, 20).y < at(&left, 70, 120).y);
+    assert!(at(&right, 20, 70).z > at(&right, 150, 70).z && at(&left, 20, 70).z > at(&left, 150, 70).z);
 }
 
 /// Turning the grasp the other way is mirroring the tool: the simulator prefers no direction.
@@ -299,11 +220,7 @@ fn the_fingers_mirror_each_other() {
 fn opposite_angles_are_mirror_images() {
     let rod = &sim::tools()[5];
     let at = |theta: f64| {
-        let grasp = Grasp {
-            theta_rad: theta,
-            x_m: 0.0,
-            y_m: 0.0,
-        };
+        let grasp = Grasp { theta_rad: theta, x_m: 0.0, y_m: 0.0 };
         sim::Membrane::press(&SimConfig::default().bubble, rod, grasp.object_from_grasp())
     };
     let (plus, minus) = (at(0.3), at(-0.3));
@@ -332,12 +249,7 @@ fn moments(values: impl Iterator<Item = f64>) -> Moments {
         high = high.max(v);
     }
     let mean = sum / n;
-    Moments {
-        mean,
-        deviation: (square / n - mean * mean).sqrt(),
-        low,
-        high,
-    }
+    Moments { mean, deviation: (square / n - mean * mean).sqrt(), low, high }
 }
 
 /// The published statistics of the lab's dataset, in bands.
@@ -346,94 +258,36 @@ fn statistics_are_those_of_the_labs_data() {
     let samples: Vec<Sample> = (0..24)
         .map(|i| {
             let tool = &sim::tools()[i % 9];
-            sim::simulate(
-                tool,
-                sim::random_grasp(900 + i as u64),
-                i as u64,
-                &SimConfig::default(),
-            )
+            sim::simulate(tool, sim::random_grasp(900 + i as u64), i as u64, &SimConfig::default())
         })
         .collect();
     let each = || samples.iter().flat_map(|s| Finger::BOTH.map(|f| (s, f)));
 
-    let m = moments(each().flat_map(|(s, f)| {
-        bubble_of(s, f)
-            .imprint
-            .as_slice()
-            .iter()
-            .map(|&v| f64::from(v))
-    }));
-    assert!(
-        (0.0030..0.0066).contains(&m.mean),
-        "imprint mean {}",
-        m.mean
-    );
-    assert!(
-        (0.0035..0.0060).contains(&m.deviation),
-        "imprint deviation {}",
-        m.deviation
-    );
-    assert!(
-        (-0.022..-0.004).contains(&m.low) && (0.014..0.032).contains(&m.high),
-        "imprint {} .. {}",
-        m.low,
-        m.high
-    );
+    let m = moments(each().flat_map(|(s, f)| bubble_of(s, f).imprint.as_slice().iter().map(|&v| f64::from(v))));
+    assert!((0.0030..0.0066).contains(&m.mean), "imprint mean {}", m.mean);
+    assert!((0.0035..0.0060).contains(&m.deviation), "imprint deviation {}", m.deviation);
+    assert!((-0.022..-0.004).contains(&m.low) && (0.014..0.032).contains(&m.high), "imprint {} .. {}", m.low, m.high);
 
-    for (c, (mean, deviation)) in [(-0.0107, 0.0687), (-0.0063, 0.0428), (-0.0087, 0.0576)]
-        .into_iter()
-        .enumerate()
-    {
-        let m = moments(each().flat_map(|(s, f)| {
-            gelslim_of(s, f)
-                .difference
-                .as_slice()
-                .iter()
-                .map(move |p| f64::from(p[c]) / 255.0)
-        }));
-        assert!(
-            (m.mean - mean).abs() < 0.012,
-            "channel {c}: mean {}",
-            m.mean
-        );
-        assert!(
-            (0.65..1.45).contains(&(m.deviation / deviation)),
-            "channel {c}: deviation {}",
-            m.deviation
-        );
-        assert!(
-            m.low > -0.9 && m.high < 0.9,
-            "channel {c}: {} .. {}",
-            m.low,
-            m.high
-        );
+    for (c, (mean, deviation)) in [(-0.0107, 0.0687), (-0.0063, 0.0428), (-0.0087, 0.0576)].into_iter().enumerate() {
+        let m =
+            moments(each().flat_map(|(s, f)| {
+                gelslim_of(s, f).difference.as_slice().iter().map(move |p| f64::from(p[c]) / 255.0)
+            }));
+        assert!((m.mean - mean).abs() < 0.012, "channel {c}: mean {}", m.mean);
+        assert!((0.65..1.45).contains(&(m.deviation / deviation)), "channel {c}: deviation {}", m.deviation);
+        assert!(m.low > -0.9 && m.high < 0.9, "channel {c}: {} .. {}", m.low, m.high);
     }
     for (c, mean) in [0.2966, 0.3886, 0.5625].into_iter().enumerate() {
         let m = moments(each().flat_map(|(s, f)| {
             let images = gelslim_of(s, f).images.as_ref().unwrap();
-            images
-                .raw
-                .as_slice()
-                .iter()
-                .map(move |p| f64::from(p[c]) / 255.0)
+            images.raw.as_slice().iter().map(move |p| f64::from(p[c]) / 255.0)
         }));
-        assert!(
-            (m.mean - mean).abs() < 0.05,
-            "raw channel {c}: mean {}",
-            m.mean
-        );
+        assert!((m.mean - mean).abs() < 0.05, "raw channel {c}: mean {}", m.mean);
         assert!(m.low >= 0.0 && m.high <= 1.0);
     }
     for (s, f) in each() {
         let images = gelslim_of(s, f).images.as_ref().unwrap();
-        assert!(
-            images
-                .raw
-                .as_slice()
-                .iter()
-                .flatten()
-                .all(|v| v.fract() == 0.0)
-        );
+        assert!(images.raw.as_slice().iter().flatten().all(|v| v.fract() == 0.0));
     }
 }
 
@@ -441,39 +295,12 @@ fn statistics_are_those_of_the_labs_data() {
 fn random_sensors_and_tools_give_finite_images() {
     for seed in 0..6 {
         let config = SimConfig::randomised(seed);
-        let sample = sim::simulate(
-            &sim::random_tool(seed),
-            sim::random_grasp(seed),
-            seed,
-            &config,
-        );
+        let sample = sim::simulate(&sim::random_tool(seed), sim::random_grasp(seed), seed, &config);
         for finger in Finger::BOTH {
             let touch = bubble_of(&sample, finger);
-            assert!(
-                touch
-                    .imprint
-                    .as_slice()
-                    .iter()
-                    .all(|v| v.is_finite() && v.abs() < 0.06)
-            );
-            assert!(
-                touch
-                    .truth
-                    .as_ref()
-                    .unwrap()
-                    .contact
-                    .as_slice()
-                    .iter()
-                    .any(|&c| c)
-            );
-            assert!(
-                gelslim_of(&sample, finger)
-                    .difference
-                    .as_slice()
-                    .iter()
-                    .flatten()
-                    .all(|v| v.abs() <= 255.0)
-            );
+            assert!(touch.imprint.as_slice().iter().all(|v| v.is_finite() && v.abs() < 0.06));
+            assert!(touch.truth.as_ref().unwrap().contact.as_slice().iter().any(|&c| c));
+            assert!(gelslim_of(&sample, finger).difference.as_slice().iter().flatten().all(|v| v.abs() <= 255.0));
         }
     }
 }

@@ -42,21 +42,11 @@ pub fn simulate(tool: &ToolSpec, grasp: Grasp, seed: u64, config: &SimConfig) ->
     let membrane = Membrane::press(&config.bubble, tool, object_from_grasp);
     let fingers = Finger::BOTH.map(|finger| {
         Some(FingerTouch {
-            gelslim: Some(gelslim::touch(
-                &config.gelslim,
-                tool,
-                object_from_grasp,
-                finger,
-                seed,
-            )),
+            gelslim: Some(gelslim::touch(&config.gelslim, tool, object_from_grasp, finger, seed)),
             bubble: Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed)),
         })
     });
-    Sample {
-        fingers,
-        grasp_from_object: Some(object_from_grasp.inverse()),
-        scale: Scale::Measured,
-    }
+    Sample { fingers, grasp_from_object: Some(object_from_grasp.inverse()), scale: Scale::Measured }
 }
 
 fn bubble_touch(
@@ -78,15 +68,8 @@ fn bubble_touch(
     }
     BubbleTouch {
         imprint,
-        camera: Some(BubbleCamera {
-            depth_reference,
-            intrinsics: INTRINSICS,
-            grasp_from_camera: nominal,
-        }),
-        truth: Some(BubbleTruth {
-            imprint: truth,
-            contact,
-        }),
+        camera: Some(BubbleCamera { depth_reference, intrinsics: INTRINSICS, grasp_from_camera: nominal }),
+        truth: Some(BubbleTruth { imprint: truth, contact }),
     }
 }
 

@@ -57,7 +57,7 @@ impl Default for BubbleConfig {
             dome_rise_m: 0.0145,
             rim_semi_axes_m: [0.046, 0.066],
             rim_centre_z_m: 0.006,
-            air_kept: 0.5,
+            air_kept: 0.9,
             noise_m: 0.000_6,
             drift_m: 0.000_25,
             texture_m: 0.000_5,
@@ -169,8 +169,7 @@ impl SimConfig {
     /// Another pair of sensors, drawn around the nominal one: for training that must not depend on one sensor.
     pub fn randomised(seed: u64) -> Self {
         let mut noise = Noise::new(seed, Stream::Config, 0);
-        let mut around =
-            |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
+        let mut around = |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
         let (b, g) = (BubbleConfig::default(), GelSlimConfig::default());
         let bubble = BubbleConfig {
             press_m: around(b.press_m, 0.15),

@@ -20,11 +20,7 @@ pub(super) struct Rays {
 
 impl Rays {
     pub(super) fn new(finger: Finger, intrinsics: Intrinsics, grasp_from_camera: DAffine3) -> Self {
-        Self {
-            intrinsics,
-            grasp_from_camera,
-            outward: rig::outward(finger),
-        }
+        Self { intrinsics, grasp_from_camera, outward: rig::outward(finger) }
     }
 
     /// Origin of all rays.
@@ -56,11 +52,7 @@ pub(super) fn dome_depth(rays: &Rays, dome: &Dome) -> DepthMap {
 }
 
 /// Depth of the pressed membrane, metres, and where it lies on the tool.
-pub(super) fn membrane_depth(
-    rays: &Rays,
-    membrane: &Membrane<'_>,
-    reference: &DepthMap,
-) -> (DepthMap, Mask) {
+pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>, reference: &DepthMap) -> (DepthMap, Mask) {
     let origin = rays.origin();
     let mut contact = Mask::filled(bubble::WIDTH, bubble::HEIGHT, false);
     let depth = DepthMap::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| {
@@ -85,16 +77,11 @@ pub(super) fn membrane_depth(
         let (mut low, mut high) = (last, z);
         for _ in 0..10 {
             let middle = 0.5 * (low + high);
-            if above(middle) < 0.0 {
-                low = middle
-            } else {
-                high = middle
-            }
+            if above(middle) < 0.0 { low = middle } else { high = middle }
         }
         let hit = origin + d * high;
         let yz = DVec2::new(hit.y, hit.z);
-        contact[(u, v)] =
-            membrane.distance_to_tool(hit.x, yz, CONTACT_DISTANCE_M) <= CONTACT_DISTANCE_M;
+        contact[(u, v)] = membrane.distance_to_tool(hit.x, yz, CONTACT_DISTANCE_M) <= CONTACT_DISTANCE_M;
         high as f32
     });
     (depth, contact)
@@ -161,9 +148,7 @@ fn texture(config: &BubbleConfig, finger: Finger) -> Grid<f32> {
     let count = (config.speckle_density * (w * h) as f64) as usize;
     for _ in 0..count {
         let (cx, cy) = (noise.uniform(0.0, w as f64), noise.uniform(0.0, h as f64));
-        let height = config.speckle_m
-            * noise.uniform(0.4, 1.0)
-            * if noise.unit() < 0.65 { -1.0 } else { 0.8 };
+        let height = config.speckle_m * noise.uniform(0.4, 1.0) * if noise.unit() < 0.65 { -1.0 } else { 0.8 };
         let radius = noise.uniform(0.8, 1.5);
         for v in (cy - 4.0).max(0.0) as usize..((cy + 4.0) as usize).min(h) {
             for u in (cx - 4.0).max(0.0) as usize..((cx + 4.0) as usize).min(w) {

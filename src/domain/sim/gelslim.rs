@@ -38,14 +38,11 @@ impl Gel {
         finger: Finger,
         noise: &mut Noise,
     ) -> Self {
-        let columns =
-            (gelslim::WIDTH as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1;
+        let columns = (gelslim::WIDTH as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1;
         let rows = (gelslim::HEIGHT as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1;
         // the two surfaces are never quite parallel
-        let tilt =
-            DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.tilt_rad;
-        let depth =
-            config.indentation_m * (1.0 + config.indentation_spread * f64::from(noise.normal()));
+        let tilt = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.tilt_rad;
+        let depth = config.indentation_m * (1.0 + config.indentation_spread * f64::from(noise.normal()));
         let mut obstacle = Field::filled(columns, rows, f32::NEG_INFINITY);
         for j in 0..rows {
             for i in 0..columns {
@@ -60,24 +57,13 @@ impl Gel {
         }
         let free = vec![true; columns * rows];
         let stiffness = (config.decay_m * config.decay_m).recip() as f32;
-        let problem = Problem {
-            obstacle: &obstacle,
-            free: &free,
-            load: 0.0,
-            stiffness,
-            step: STEP_M as f32,
-        };
-        Self {
-            pushed: problem.solve(3, 14),
-        }
+        let problem = Problem { obstacle: &obstacle, free: &free, load: 0.0, stiffness, step: STEP_M as f32 };
+        Self { pushed: problem.solve(3, 14) }
     }
 
     /// A much smoother copy: the sideways movement of the gel follows its slopes.
     fn bulk(&self, length_m: f64) -> Field {
-        let (columns, rows) = (
-            self.pushed.columns.div_ceil(4),
-            self.pushed.rows.div_ceil(4),
-        );
+        let (columns, rows) = (self.pushed.columns.div_ceil(4), self.pushed.rows.div_ceil(4));
         let mut mean = Field::filled(columns, rows, 0.0);
         for j in 0..rows {
             for i in 0..columns {
@@ -108,9 +94,7 @@ fn blur(field: &mut Field, sigma: f64) {
         line.clear();
         line.extend((0..count).map(|k| values[start + k * stride]));
         let at = |line: &[f32], k: isize| line[k.clamp(0, count as isize - 1) as usize];
-        let mut sum: f32 = (-(radius as isize)..=radius as isize)
-            .map(|k| at(&line, k))
-            .sum();
+        let mut sum: f32 = (-(radius as isize)..=radius as isize).map(|k| at(&line, k)).sum();
         for k in 0..count {
             values[start + k * stride] = sum / (2 * radius + 1) as f32;
             let k = k as isize;
@@ -130,10 +114,7 @@ fn blur(field: &mut Field, sigma: f64) {
 /// The slope of a field at every node, metres per metre.
 fn slopes(field: &Field, step: f64) -> [Field; 2] {
     let (columns, rows) = (field.columns, field.rows);
-    let mut out = [
-        Field::filled(columns, rows, 0.0),
-        Field::filled(columns, rows, 0.0),
-    ];
+    let mut out = [Field::filled(columns, rows, 0.0), Field::filled(columns, rows, 0.0)];
     let scale = (0.5 / step) as f32;
     for j in 1..rows - 1 {
         for i in 1..columns - 1 {
@@ -162,27 +143,17 @@ pub(super) fn touch(
     for &(at, size) in &markers {
         stamp(&mut reference, at, size, config.marker_darkness);
     }
-    add_noise(
-        &mut reference,
-        config.noise,
-        &mut Noise::new(config.sensor_seed, Stream::GelReference, finger.index()),
-    );
+    add_noise(&mut reference, config.noise, &mut Noise::new(config.sensor_seed, Stream::GelReference, finger.index()));
 
     let mut raw = base;
     shade(&mut raw, config, &gel, &mut noise);
     for (at, size) in moved(&markers, config, &gel, &mut noise) {
         stamp(&mut raw, at, size, config.marker_darkness);
     }
-    add_noise(
-        &mut raw,
-        config.noise,
-        &mut Noise::new(seed, Stream::GelNoise, finger.index()),
-    );
+    add_noise(&mut raw, config.noise, &mut Noise::new(seed, Stream::GelNoise, finger.index()));
     // same size by construction
-    GelSlimTouch::from_images(raw, reference.clone()).unwrap_or_else(|| GelSlimTouch {
-        images: None,
-        difference: reference,
-    })
+    GelSlimTouch::from_images(raw, reference.clone())
+        .unwrap_or_else(|| GelSlimTouch { images: None, difference: reference })
 }
 
 /// The light without contact and without markers: each LED is brighter on its own side.
@@ -190,15 +161,11 @@ fn illumination(config: &GelSlimConfig, finger: Finger) -> RgbGrid {
     let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 8 + finger.index());
     let stain = noise.smooth(gelslim::WIDTH, gelslim::HEIGHT, 150.0);
     let leds = config.led_directions();
-    let centre = DVec2::new(
-        0.5 * (gelslim::WIDTH - 1) as f64,
-        0.5 * (gelslim::HEIGHT - 1) as f64,
-    );
+    let centre = DVec2::new(0.5 * (gelslim::WIDTH - 1) as f64, 0.5 * (gelslim::HEIGHT - 1) as f64);
     RgbGrid::from_fn(gelslim::WIDTH, gelslim::HEIGHT, |x, y| {
         let p = (DVec2::new(x as f64, y as f64) - centre) / centre.x;
         std::array::from_fn(|c| {
-            let fall =
-                1.0 + config.led_falloff * leds[c].dot(p) - 0.12 * (p.length_squared() - 0.5);
+            let fall = 1.0 + config.led_falloff * leds[c].dot(p) - 0.12 * (p.length_squared() - 0.5);
             (config.base[c] * fall) as f32 * (1.0 + 0.02 * stain[(x, y)])
         })
     })
@@ -209,15 +176,11 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, noise: &mut Noi
     let mut pushed = gel.pushed.clone();
     blur(&mut pushed, config.smoothing_m / STEP_M);
     let slopes = slopes(&pushed, STEP_M);
-    let slow: [_; 3] =
-        std::array::from_fn(|_| noise.smooth(gelslim::WIDTH, gelslim::HEIGHT, 130.0));
+    let slow: [_; 3] = std::array::from_fn(|_| noise.smooth(gelslim::WIDTH, gelslim::HEIGHT, 130.0));
     let leds = config.led_directions();
     for y in 0..gelslim::HEIGHT {
         for x in 0..gelslim::WIDTH {
-            let (i, j) = (
-                x as f64 / PX_PER_STEP + MARGIN_STEPS,
-                y as f64 / PX_PER_STEP + MARGIN_STEPS,
-            );
+            let (i, j) = (x as f64 / PX_PER_STEP + MARGIN_STEPS, y as f64 / PX_PER_STEP + MARGIN_STEPS);
             // the side of a dent faces away from where it is deepest
             let facing = -DVec2::new(slopes[0].at(i, j), slopes[1].at(i, j));
             let steep = facing.length_squared();
@@ -235,11 +198,7 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, noise: &mut Noi
 
 /// Centre (pixels) and radius (pixels) of each marker without contact.
 fn marker_grid(config: &GelSlimConfig, finger: Finger) -> Vec<(DVec2, f64)> {
-    let mut noise = Noise::new(
-        config.sensor_seed,
-        Stream::GelReference,
-        16 + finger.index(),
-    );
+    let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 16 + finger.index());
     let pitch = config.marker_pitch_m * gelslim::PX_PER_M;
     let radius = config.marker_radius_m * gelslim::PX_PER_M;
     let centre = DVec2::new(0.5 * gelslim::WIDTH as f64, 0.5 * gelslim::HEIGHT as f64);
@@ -248,18 +207,14 @@ fn marker_grid(config: &GelSlimConfig, finger: Finger) -> Vec<(DVec2, f64)> {
     let mut markers = Vec::new();
     for j in -reach..=reach {
         for i in -reach..=reach {
-            let cell = DVec2::new(
-                f64::from(i) + config.marker_phase[0],
-                f64::from(j) + config.marker_phase[1],
-            );
+            let cell = DVec2::new(f64::from(i) + config.marker_phase[0], f64::from(j) + config.marker_phase[1]);
             let jitter = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * 0.03;
             let flat = turn.rotate(cell + jitter) * pitch;
             // the gel is curved: the grid looks wider towards the rim
             let p = centre + flat * (1.0 + config.marker_fan * (flat / centre.x).length_squared());
             let size = radius * (1.0 + 0.12 * f64::from(noise.normal()));
             let inside = p.cmpge(DVec2::splat(-10.0)).all()
-                && p.cmple(DVec2::new(gelslim::WIDTH as f64, gelslim::HEIGHT as f64) + 10.0)
-                    .all();
+                && p.cmple(DVec2::new(gelslim::WIDTH as f64, gelslim::HEIGHT as f64) + 10.0).all();
             if inside {
                 markers.push((p, size));
             }
@@ -269,12 +224,7 @@ fn marker_grid(config: &GelSlimConfig, finger: Finger) -> Vec<(DVec2, f64)> {
 }
 
 /// The markers during the touch: pushed away from the dents, plus the shear and twist of the grasp.
-fn moved(
-    markers: &[(DVec2, f64)],
-    config: &GelSlimConfig,
-    gel: &Gel,
-    noise: &mut Noise,
-) -> Vec<(DVec2, f64)> {
+fn moved(markers: &[(DVec2, f64)], config: &GelSlimConfig, gel: &Gel, noise: &mut Noise) -> Vec<(DVec2, f64)> {
     let bulk = gel.bulk(config.spread_m);
     let slopes = slopes(&bulk, 4.0 * STEP_M);
     let shear = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.shear_m;
@@ -288,12 +238,8 @@ fn moved(
             let away = -DVec2::new(slopes[0].at(node.x, node.y), slopes[1].at(node.x, node.y));
             // friction drags the gel along where it is pressed
             let held = bulk.at(node.x, node.y) / f64::from(deepest);
-            let drag =
-                (shear * gelslim::PX_PER_M + (p - centre).perp() * twist) * (0.35 + 0.65 * held);
-            (
-                p + away * config.marker_push_m * gelslim::PX_PER_M + drag,
-                size,
-            )
+            let drag = (shear * gelslim::PX_PER_M + (p - centre).perp() * twist) * (0.35 + 0.65 * held);
+            (p + away * config.marker_push_m * gelslim::PX_PER_M + drag, size)
         })
         .collect()
 }
@@ -301,9 +247,7 @@ fn moved(
 /// Darkens a soft round spot.
 fn stamp(image: &mut RgbGrid, at: DVec2, radius: f64, darkness: f64) {
     let reach = radius + 2.5;
-    let span = |c: f64, n: usize| {
-        (c - reach).max(0.0) as usize..((c + reach).max(0.0) as usize + 1).min(n)
-    };
+    let span = |c: f64, n: usize| (c - reach).max(0.0) as usize..((c + reach).max(0.0) as usize + 1).min(n);
     for y in span(at.y, image.height()) {
         for x in span(at.x, image.width()) {
             let r = (DVec2::new(x as f64, y as f64) - at).length();
@@ -321,9 +265,7 @@ fn add_noise(image: &mut RgbGrid, deviation: f64, noise: &mut Noise) {
     let deviation = deviation as f32;
     for pixel in image.as_mut_slice() {
         for value in pixel {
-            *value = (*value + deviation * noise.normal())
-                .round()
-                .clamp(0.0, 255.0);
+            *value = (*value + deviation * noise.normal()).round().clamp(0.0, 255.0);
         }
     }
 }

@@ -60,19 +60,11 @@ mod tests {
         let grasps: Vec<Grasp> = (0..GRID_GRASPS).map(grid_grasp).collect();
         assert!((grasps[0].theta_rad + THETA_RANGE_RAD).abs() < 1e-12);
         assert!((grasps[6].theta_rad - THETA_RANGE_RAD).abs() < 1e-12);
-        assert_eq!(
-            (grasps[0].x_m, grasps[0].y_m),
-            (grasps[6].x_m, grasps[6].y_m)
-        );
+        assert_eq!((grasps[0].x_m, grasps[0].y_m), (grasps[6].x_m, grasps[6].y_m));
         assert!(grasps[7].x_m > grasps[6].x_m);
         for (i, a) in grasps.iter().enumerate() {
-            assert!(
-                a.x_m.abs() <= POSITION_RANGE_M + 1e-12 && a.y_m.abs() <= POSITION_RANGE_M + 1e-12
-            );
-            assert!(
-                grasps[..i].iter().all(|b| a != b),
-                "grasp {i} appears twice"
-            );
+            assert!(a.x_m.abs() <= POSITION_RANGE_M + 1e-12 && a.y_m.abs() <= POSITION_RANGE_M + 1e-12);
+            assert!(grasps[..i].iter().all(|b| a != b), "grasp {i} appears twice");
         }
         assert_eq!(grid_grasp(GRID_GRASPS + 3), grasps[3]);
     }

@@ -85,17 +85,10 @@ impl<'a> Membrane<'a> {
             }
         }
         // the air: a first solution without extra pressure, on a coarse grid, tells the volume taken
-        let mut problem = Problem {
-            obstacle: &obstacle,
-            free: &free,
-            load: 0.0,
-            stiffness: 0.0,
-            step: step as f32,
-        };
+        let mut problem = Problem { obstacle: &obstacle, free: &free, load: 0.0, stiffness: 0.0, step: step as f32 };
         let first = problem.solve(LEVELS, 4);
         let taken = first.values.iter().map(|&w| f64::from(w)).sum::<f64>() * step * step;
-        let bulge =
-            config.air_kept * taken * 2.0 / (std::f64::consts::PI * dome.semi.x * dome.semi.y);
+        let bulge = config.air_kept * taken * 2.0 / (std::f64::consts::PI * dome.semi.x * dome.semi.y);
         problem.load = -(bulge * 2.0 * (dome.semi.x.powi(-2) + dome.semi.y.powi(-2))) as f32;
         let pushed = problem.solve(LEVELS, SWEEPS);
         Self {
@@ -121,9 +114,7 @@ impl<'a> Membrane<'a> {
         let free = self.dome.height(yz) - self.pushed.at(at.x, at.y);
         // between the nodes the tool's edges are sharper than the grid
         if self.is_near(at) {
-            let s = self
-                .tool
-                .outline_distance(self.object_from_grasp.transform_yz(yz));
+            let s = self.tool.outline_distance(self.object_from_grasp.transform_yz(yz));
             if s <= 0.0 {
                 return free.min(-self.tool.height_at(s));
             }
@@ -141,10 +132,7 @@ impl<'a> Membrane<'a> {
             return false;
         }
         let k = j * columns + i;
-        self.near_tool[k]
-            || self.near_tool[k + 1]
-            || self.near_tool[k + columns]
-            || self.near_tool[k + columns + 1]
+        self.near_tool[k] || self.near_tool[k + 1] || self.near_tool[k + columns] || self.near_tool[k + columns + 1]
     }
 
     /// Distance of the membrane's point `(n, y, z)` from the tool's surface, metres, negative inside; more than
@@ -152,37 +140,19 @@ impl<'a> Membrane<'a> {
     pub fn distance_to_tool(&self, n: f64, yz: DVec2, limit: f64) -> f64 {
         let p = self.object_from_grasp.transform_yz(yz);
         let s = self.tool.outline_distance(p);
-        if s > limit {
-            s
-        } else {
-            self.tool.signed_distance(glam::DVec3::new(n, p.x, p.y))
-        }
+        if s > limit { s } else { self.tool.signed_distance(glam::DVec3::new(n, p.x, p.y)) }
     }
 
     /// Largest and mean difference, metres, from the solution after many more sweeps.
     #[cfg(test)]
     fn error_against_many_sweeps(&self, sweeps: usize) -> (f64, f64) {
         let (obstacle, free, load) = &self.rest;
-        let problem = Problem {
-            obstacle,
-            free,
-            load: *load,
-            stiffness: 0.0,
-            step: MEMBRANE_STEP_M as f32,
-        };
+        let problem = Problem { obstacle, free, load: *load, stiffness: 0.0, step: MEMBRANE_STEP_M as f32 };
         let mut converged = self.pushed.clone();
         problem.relax(&mut converged, sweeps);
         let error = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
-        let errors: Vec<f64> = converged
-            .values
-            .iter()
-            .zip(&self.pushed.values)
-            .map(error)
-            .collect();
-        (
-            errors.iter().copied().fold(0.0, f64::max),
-            errors.iter().sum::<f64>() / errors.len() as f64,
-        )
+        let errors: Vec<f64> = converged.values.iter().zip(&self.pushed.values).map(error).collect();
+        (errors.iter().copied().fold(0.0, f64::max), errors.iter().sum::<f64>() / errors.len() as f64)
     }
 
     /// Largest depth of a grid node inside the tool, metres.
@@ -192,8 +162,7 @@ impl<'a> Membrane<'a> {
             for i in 0..self.pushed.columns {
                 let yz = self.origin + DVec2::new(i as f64, j as f64) * MEMBRANE_STEP_M;
                 if let Some(h) = self.tool.height(self.object_from_grasp.transform_yz(yz)) {
-                    let n = self.dome.height(yz)
-                        - f64::from(self.pushed.values[j * self.pushed.columns + i]);
+                    let n = self.dome.height(yz) - f64::from(self.pushed.values[j * self.pushed.columns + i]);
                     worst = worst.max(n + h);
                 }
             }
@@ -215,31 +184,18 @@ mod tests {
     #[test]
     fn few_sweeps_are_enough() {
         for (i, tool) in tools().iter().enumerate().step_by(4) {
-            let membrane = Membrane::press(
-                &SimConfig::default().bubble,
-                tool,
-                random_grasp(i as u64).object_from_grasp(),
-            );
+            let membrane =
+                Membrane::press(&SimConfig::default().bubble, tool, random_grasp(i as u64).object_from_grasp());
             let before = membrane.pushed.clone();
             let (worst, mean) = membrane.error_against_many_sweeps(3000);
-            assert!(
-                worst < 2e-4 && mean < 8e-5,
-                "{}: worst {worst}, mean {mean}",
-                tool.name
-            );
-            assert!(
-                before.values.iter().any(|&w| w < -1e-3),
-                "the free parts bulge"
-            );
+            assert!(worst < 2e-4 && mean < 8e-5, "{}: worst {worst}, mean {mean}", tool.name);
+            assert!(before.values.iter().any(|&w| w < -1e-3), "the free parts bulge");
         }
     }
 
     #[test]
     fn without_contact_the_membrane_is_the_dome() {
-        let config = BubbleConfig {
-            press_m: -0.002,
-            ..BubbleConfig::default()
-        };
+        let config = BubbleConfig { press_m: -0.002, ..BubbleConfig::default() };
         let membrane = Membrane::press(&config, &tools()[0], Grasp::default().object_from_grasp());
         assert!(membrane.pushed.values.iter().all(|w| w.abs() < 1e-7));
     }

@@ -50,9 +50,7 @@ impl Noise {
     /// times cheaper than an exact normal, and sensor noise has no far tails (those are separate effects here).
     pub(super) fn normal(&mut self) -> f32 {
         let bits = self.0.next_u64();
-        let sum = (0..4)
-            .map(|i| (bits >> (16 * i)) as u16 as f32)
-            .sum::<f32>();
+        let sum = (0..4).map(|i| (bits >> (16 * i)) as u16 as f32).sum::<f32>();
         (sum - 131_070.0) / 37_837.2
     }
 
@@ -87,8 +85,7 @@ pub(super) fn blur3(image: &Grid<f32>, side: f32) -> Grid<f32> {
         side * (row[x.saturating_sub(1)] + row[(x + 1).min(w - 1)]) + (1.0 - 2.0 * side) * row[x]
     });
     Grid::from_fn(w, h, |x, y| {
-        side * (rows[(x, y.saturating_sub(1))] + rows[(x, (y + 1).min(h - 1))])
-            + (1.0 - 2.0 * side) * rows[(x, y)]
+        side * (rows[(x, y.saturating_sub(1))] + rows[(x, (y + 1).min(h - 1))]) + (1.0 - 2.0 * side) * rows[(x, y)]
     })
 }
 
@@ -99,12 +96,7 @@ mod tests {
     fn deviation(values: &[f32]) -> f64 {
         let n = values.len() as f64;
         let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / n;
-        (values
-            .iter()
-            .map(|&v| (f64::from(v) - mean).powi(2))
-            .sum::<f64>()
-            / n)
-            .sqrt()
+        (values.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / n).sqrt()
     }
 
     #[test]

@@ -14,11 +14,7 @@ pub(super) struct Field {
 
 impl Field {
     pub(super) fn filled(columns: usize, rows: usize, value: f32) -> Self {
-        Self {
-            columns,
-            rows,
-            values: vec![value; columns * rows],
-        }
+        Self { columns, rows, values: vec![value; columns * rows] }
     }
 
     /// Bilinear value at node coordinates; beyond the border the border's value.
@@ -83,19 +79,13 @@ impl Problem<'_> {
                 .flat_map(|y| (0..obstacle.columns).map(move |x| (x, y)))
                 .map(|(x, y)| self.free[2 * y * self.obstacle.columns + 2 * x])
                 .collect();
-            let coarse = Problem {
-                obstacle: &obstacle,
-                free: &free,
-                step: 2.0 * self.step,
-                ..*self
-            };
+            let coarse = Problem { obstacle: &obstacle, free: &free, step: 2.0 * self.step, ..*self };
             let w = coarse.solve_from(levels - 1, 2 * sweeps, 1);
             let mut fine = Field::filled(self.obstacle.columns, self.obstacle.rows, 0.0);
             for y in 0..fine.rows {
                 for x in 0..fine.columns {
                     if self.free[y * fine.columns + x] {
-                        fine.values[y * fine.columns + x] =
-                            w.at(x as f64 * 0.5, y as f64 * 0.5) as f32;
+                        fine.values[y * fine.columns + x] = w.at(x as f64 * 0.5, y as f64 * 0.5) as f32;
                     }
                 }
             }
@@ -115,11 +105,7 @@ impl Problem<'_> {
         let source = self.load * h2;
         for sweep in 0..sweeps {
             // over-relaxation from the second sweep on; a last plain one smooths
-            let omega = if sweep == 0 || sweep + 1 == sweeps {
-                1.0
-            } else {
-                1.75
-            };
+            let omega = if sweep == 0 || sweep + 1 == sweeps { 1.0 } else { 1.75 };
             for colour in 0..2 {
                 for y in 1..w.rows - 1 {
                     let row = y * columns;
@@ -158,33 +144,20 @@ mod tests {
             obstacle.values[y * n + x] = 5e-3;
         }
         let free = vec![true; n * n];
-        let problem = Problem {
-            obstacle: &obstacle,
-            free: &free,
-            load: -3.0,
-            stiffness: 0.0,
-            step,
-        };
+        let problem = Problem { obstacle: &obstacle, free: &free, load: -3.0, stiffness: 0.0, step };
         let w = problem.solve(4, 400);
         for y in 1..n - 1 {
             for x in 1..n - 1 {
                 let i = y * n + x;
                 let v = w.values[i];
-                let bend =
-                    4.0 * v - w.values[i - 1] - w.values[i + 1] - w.values[i - n] - w.values[i + n];
+                let bend = 4.0 * v - w.values[i - 1] - w.values[i + 1] - w.values[i - n] - w.values[i + n];
                 let push = bend + 3.0 * step * step;
                 assert!(v >= obstacle.values[i], "below the obstacle");
                 assert!(push > -1e-6, "pulled down at {x} {y}: {push}");
-                assert!(
-                    push.abs() < 1e-6 || v <= obstacle.values[i] + 1e-7,
-                    "held up by nothing at {x} {y}"
-                );
+                assert!(push.abs() < 1e-6 || v <= obstacle.values[i] + 1e-7, "held up by nothing at {x} {y}");
             }
         }
-        assert!(
-            w.values.iter().any(|&v| v < 0.0),
-            "the load presses the free parts down"
-        );
+        assert!(w.values.iter().any(|&v| v < 0.0), "the load presses the free parts down");
     }
 
     #[test]
@@ -195,13 +168,7 @@ mod tests {
             obstacle.values[100 * n + x] = 1e-3;
         }
         let free = vec![true; n * n];
-        let problem = Problem {
-            obstacle: &obstacle,
-            free: &free,
-            load: 0.0,
-            stiffness: 1.0 / (length * length),
-            step,
-        };
+        let problem = Problem { obstacle: &obstacle, free: &free, load: 0.0, stiffness: 1.0 / (length * length), step };
         let w = problem.solve(3, 200);
         for d in [5, 10, 20] {
             let expected = 1e-3 * (-(d as f32) * step / length).exp();

@@ -16,12 +16,7 @@ pub const RANGE_M: f64 = 0.083;
 const CAMERA_ANGLE_DEG: f64 = 55.04;
 
 /// Intrinsics of the full image. Focal length from the scale (2.36 px/mm at about 90 mm).
-pub const INTRINSICS: Intrinsics = Intrinsics {
-    fx: 212.0,
-    fy: 212.0,
-    cx: 112.0,
-    cy: 86.0,
-};
+pub const INTRINSICS: Intrinsics = Intrinsics { fx: 212.0, fy: 212.0, cx: 112.0, cy: 86.0 };
 
 /// The sign that turns grasp x into "away from this finger": the finger's side of the tool is at negative values.
 pub fn outward(finger: Finger) -> f64 {
@@ -36,18 +31,11 @@ pub fn grasp_from_camera(finger: Finger, half_thickness_m: f64) -> DAffine3 {
     let (s, c) = CAMERA_ANGLE_DEG.to_radians().sin_cos();
     let o = outward(finger);
     // columns: where the camera's right, down and forward point in the grasp frame
-    let rotation = DMat3::from_cols(
-        DVec3::new(o * c, 0.0, -s),
-        DVec3::new(0.0, o, 0.0),
-        DVec3::new(o * s, 0.0, c),
-    );
+    let rotation = DMat3::from_cols(DVec3::new(o * c, 0.0, -s), DVec3::new(0.0, o, 0.0), DVec3::new(o * s, 0.0, c));
     let touched = DVec3::new(-o * half_thickness_m, 0.0, 0.0);
     let [u, v, _, _] = gelslim_footprint_in_bubble(finger);
     let translation = touched - rotation * INTRINSICS.lift(u, v, RANGE_M);
-    DAffine3 {
-        matrix3: rotation,
-        translation,
-    }
+    DAffine3 { matrix3: rotation, translation }
 }
 
 /// The (y, z) in the grasp frame, metres, that GelSlim pixel `(column, row)` looks at.
@@ -75,8 +63,7 @@ mod tests {
         let right = grasp_from_camera(Finger::Right, 0.008);
         let expected = DMat3::from_rotation_y(CAMERA_ANGLE_DEG.to_radians());
         assert!(left.matrix3.abs_diff_eq(expected, 1e-12));
-        let expected =
-            DMat3::from_cols_array(&[-0.5729, 0.0, -0.8196, 0.0, -1.0, 0.0, -0.8196, 0.0, 0.5729]);
+        let expected = DMat3::from_cols_array(&[-0.5729, 0.0, -0.8196, 0.0, -1.0, 0.0, -0.8196, 0.0, 0.5729]);
         assert!(right.matrix3.abs_diff_eq(expected, 1e-3));
         assert!((right.matrix3.determinant() - 1.0).abs() < 1e-12);
         for (camera, side) in [(left, -1.0), (right, 1.0)] {
@@ -95,9 +82,7 @@ mod tests {
                 let (c, r) = gelslim_pixel(finger, yz);
                 assert!((c - column).abs() < 1e-9 && (r - row).abs() < 1e-9);
                 let p = DVec3::new(-outward(finger) * 0.008, yz.x, yz.y);
-                INTRINSICS
-                    .project(camera_from_grasp.transform_point3(p))
-                    .expect("in front of the camera")
+                INTRINSICS.project(camera_from_grasp.transform_point3(p)).expect("in front of the camera")
             };
             let [x, y, width, height] = gelslim_footprint_in_bubble(finger);
             let (cx, cy) = project(213.0, 159.5);
@@ -107,14 +92,8 @@ mod tests {
             let (top, bottom) = (project(213.0, -0.5), project(213.0, 319.5));
             assert!(left.0 > right.0 && top.1 > bottom.1);
             // the published rectangle ignores the tilt: it is right to within 5.5 px
-            assert!(
-                (left.0 - (x + 0.5 * width)).abs() < 5.5
-                    && (right.0 - (x - 0.5 * width)).abs() < 5.5
-            );
-            assert!(
-                (top.1 - (y + 0.5 * height)).abs() < 1.5
-                    && (bottom.1 - (y - 0.5 * height)).abs() < 1.5
-            );
+            assert!((left.0 - (x + 0.5 * width)).abs() < 5.5 && (right.0 - (x - 0.5 * width)).abs() < 5.5);
+            assert!((top.1 - (y + 0.5 * height)).abs() < 1.5 && (bottom.1 - (y - 0.5 * height)).abs() < 1.5);
         }
     }
 }

@@ -31,11 +31,7 @@ fn grid(tool: &ToolSpec, step: f64) -> Sheet {
     let [lo, hi] = tool.outline_bounds();
     let columns = ((hi.x - lo.x) / step).ceil() as usize + 3;
     let rows = ((hi.y - lo.y) / step).ceil() as usize + 3;
-    let mut sheet = Sheet {
-        points: Vec::new(),
-        values: Vec::new(),
-        triangles: Vec::new(),
-    };
+    let mut sheet = Sheet { points: Vec::new(), values: Vec::new(), triangles: Vec::new() };
     for j in 0..rows {
         for i in 0..columns {
             let p = lo + DVec2::new(i as f64 - 1.0, j as f64 - 1.0) * step;
@@ -48,10 +44,7 @@ fn grid(tool: &ToolSpec, step: f64) -> Sheet {
             let at = |di: usize, dj: usize| ((j + dj) * columns + i + di) as u32;
             let (a, b, c, d) = (at(0, 0), at(1, 0), at(1, 1), at(0, 1));
             // cells wholly outside are never part of the tool
-            if [a, b, c, d]
-                .iter()
-                .all(|&v| sheet.values[v as usize] > 2.0 * step)
-            {
+            if [a, b, c, d].iter().all(|&v| sheet.values[v as usize] > 2.0 * step) {
                 continue;
             }
             if (i + j) % 2 == 0 {
@@ -90,9 +83,7 @@ impl Sheet {
                 triangles.extend([[a, b, m], [a, m, c]]);
             } else {
                 // one corner is alone on its side
-                let k = (0..3)
-                    .find(|&k| side[k] != side[(k + 1) % 3] && side[k] != side[(k + 2) % 3])
-                    .unwrap_or(0);
+                let k = (0..3).find(|&k| side[k] != side[(k + 1) % 3] && side[k] != side[(k + 2) % 3]).unwrap_or(0);
                 let (a, b, c) = (t[k], t[(k + 1) % 3], t[(k + 2) % 3]);
                 let m = self.cut(tool, level, a, b, &mut cuts);
                 let n = self.cut(tool, level, a, c, &mut cuts);
@@ -103,14 +94,7 @@ impl Sheet {
     }
 
     /// The vertex where edge `a b` crosses `level`, found by bisection.
-    fn cut(
-        &mut self,
-        tool: &ToolSpec,
-        level: f64,
-        a: u32,
-        b: u32,
-        cuts: &mut HashMap<(u32, u32), u32>,
-    ) -> u32 {
+    fn cut(&mut self, tool: &ToolSpec, level: f64, a: u32, b: u32, cuts: &mut HashMap<(u32, u32), u32>) -> u32 {
         *cuts.entry((a.min(b), a.max(b))).or_insert_with(|| {
             let (mut low, mut high) = (self.points[a as usize], self.points[b as usize]);
             if self.values[a as usize] > level {
@@ -118,11 +102,7 @@ impl Sheet {
             }
             for _ in 0..40 {
                 let middle = 0.5 * (low + high);
-                if tool.outline_distance(middle) < level {
-                    low = middle
-                } else {
-                    high = middle
-                }
+                if tool.outline_distance(middle) < level { low = middle } else { high = middle }
             }
             self.points.push(0.5 * (low + high));
             self.values.push(level);
@@ -150,10 +130,7 @@ impl Sheet {
         for &v in self.triangles.iter().flatten() {
             if index[v as usize] == u32::MAX {
                 index[v as usize] = vertices.len() as u32;
-                let (p, h) = (
-                    self.points[v as usize],
-                    tool.height_at(self.values[v as usize].min(0.0)),
-                );
+                let (p, h) = (self.points[v as usize], tool.height_at(self.values[v as usize].min(0.0)));
                 vertices.push(DVec3::new(h, p.x, p.y));
                 vertices.push(DVec3::new(-h, p.x, p.y));
             }
@@ -173,9 +150,6 @@ impl Sheet {
                 triangles.push([b, a + 1, b + 1]);
             }
         }
-        TriMesh {
-            vertices,
-            triangles,
-        }
+        TriMesh { vertices, triangles }
     }
 }

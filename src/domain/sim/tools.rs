@@ -39,11 +39,7 @@ impl Bar {
             inside &= ab.perp_dot(ap) >= 0.0;
         }
         let distance = nearest.sqrt();
-        if inside {
-            -distance - self.half_width_m
-        } else {
-            distance - self.half_width_m
-        }
+        if inside { -distance - self.half_width_m } else { distance - self.half_width_m }
     }
 }
 
@@ -67,10 +63,7 @@ pub struct ToolSpec {
 impl ToolSpec {
     /// Distance of `(y, z)` (metres, object frame) to the outline, metres, negative inside.
     pub fn outline_distance(&self, p: DVec2) -> f64 {
-        self.bars
-            .iter()
-            .map(|bar| bar.outline_distance(p))
-            .fold(f64::INFINITY, f64::min)
+        self.bars.iter().map(|bar| bar.outline_distance(p)).fold(f64::INFINITY, f64::min)
     }
 
     /// Distance of the surface from the y-z plane at `(y, z)`, metres; `None` beside the tool.
@@ -93,10 +86,7 @@ impl ToolSpec {
 
     /// Distance in the plane of (outline distance, height) to the profile: flat top, bevel, wall.
     fn profile_distance(&self, s: f64, h: f64) -> f64 {
-        let (top, rim) = (
-            self.half_thickness_m,
-            self.half_thickness_m - self.bevel_depth_m,
-        );
+        let (top, rim) = (self.half_thickness_m, self.half_thickness_m - self.bevel_depth_m);
         let p = DVec2::new(s, h);
         let segment = |a: DVec2, b: DVec2| {
             let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
@@ -104,14 +94,9 @@ impl ToolSpec {
         };
         let crest = DVec2::new(-self.bevel_width_m, top);
         let edge = DVec2::new(0.0, rim);
-        let distance = segment(DVec2::new(-1.0, top), crest)
-            .min(segment(crest, edge))
-            .min(segment(edge, DVec2::new(0.0, 0.0)));
-        if s <= 0.0 && h <= self.height_at(s) {
-            -distance
-        } else {
-            distance
-        }
+        let distance =
+            segment(DVec2::new(-1.0, top), crest).min(segment(crest, edge)).min(segment(edge, DVec2::new(0.0, 0.0)));
+        if s <= 0.0 && h <= self.height_at(s) { -distance } else { distance }
     }
 
     /// Smallest and largest (y, z) of the outline, metres.
@@ -152,10 +137,7 @@ fn arm(degrees: f64, length_mm: f64, width_mm: f64) -> Bar {
 /// A bar through the origin, from `back_mm` behind it to `front_mm` in front of it.
 fn line(degrees: f64, back_mm: f64, front_mm: f64, width_mm: f64) -> Bar {
     let d = direction(degrees);
-    Bar {
-        core: vec![d * (-back_mm * 1e-3), d * (front_mm * 1e-3)],
-        half_width_m: 0.5e-3 * width_mm,
-    }
+    Bar { core: vec![d * (-back_mm * 1e-3), d * (front_mm * 1e-3)], half_width_m: 0.5e-3 * width_mm }
 }
 
 fn tool(name: &str, seen: bool, bars: Vec<Bar>) -> ToolSpec {
@@ -163,7 +145,7 @@ fn tool(name: &str, seen: bool, bars: Vec<Bar>) -> ToolSpec {
         name: name.to_owned(),
         seen,
         bars,
-        half_thickness_m: 0.008,
+        half_thickness_m: 0.011,
         bevel_width_m: 0.0012,
         bevel_depth_m: 0.0016,
     }
@@ -174,10 +156,7 @@ fn ring(corners_mm: &[[f64; 2]], width_mm: f64) -> Vec<Bar> {
     let point = |c: [f64; 2]| DVec2::new(c[0], c[1]) * 1e-3;
     (0..corners_mm.len())
         .map(|i| Bar {
-            core: vec![
-                point(corners_mm[i]),
-                point(corners_mm[(i + 1) % corners_mm.len()]),
-            ],
+            core: vec![point(corners_mm[i]), point(corners_mm[(i + 1) % corners_mm.len()])],
             half_width_m: 0.5e-3 * width_mm,
         })
         .collect()
@@ -185,29 +164,13 @@ fn ring(corners_mm: &[[f64; 2]], width_mm: f64) -> Vec<Bar> {
 
 fn lab_tools() -> Vec<ToolSpec> {
     vec![
-        tool(
-            "pattern_01_2_lines_angle_1",
-            true,
-            vec![line(6.0, 20.0, 22.0, 3.6), line(34.0, 17.0, 14.0, 3.6)],
-        ),
-        tool(
-            "pattern_02_2_lines_angle_2",
-            true,
-            vec![line(-32.0, 21.0, 17.0, 3.6), line(22.0, 15.0, 19.0, 3.6)],
-        ),
-        tool(
-            "pattern_03_2_lines_angle_3",
-            true,
-            vec![line(-4.0, 19.0, 20.0, 3.6), line(80.0, 14.0, 17.0, 3.6)],
-        ),
+        tool("pattern_01_2_lines_angle_1", true, vec![line(6.0, 20.0, 22.0, 3.6), line(34.0, 17.0, 14.0, 3.6)]),
+        tool("pattern_02_2_lines_angle_2", true, vec![line(-32.0, 21.0, 17.0, 3.6), line(22.0, 15.0, 19.0, 3.6)]),
+        tool("pattern_03_2_lines_angle_3", true, vec![line(-4.0, 19.0, 20.0, 3.6), line(80.0, 14.0, 17.0, 3.6)]),
         tool(
             "pattern_04_3_lines_angle_1",
             true,
-            vec![
-                arm(180.0, 21.0, 3.6),
-                arm(62.0, 17.0, 3.6),
-                arm(-58.0, 16.0, 3.6),
-            ],
+            vec![arm(180.0, 21.0, 3.6), arm(62.0, 17.0, 3.6), arm(-58.0, 16.0, 3.6)],
         ),
         tool(
             "pattern_06_5_lines_angle_1",
@@ -221,49 +184,20 @@ fn lab_tools() -> Vec<ToolSpec> {
             ],
         ),
         tool("pattern_31_rod", true, vec![line(0.0, 21.0, 21.0, 4.0)]),
-        tool(
-            "pattern_32",
-            true,
-            vec![arm(166.0, 20.0, 3.6), arm(-152.0, 22.0, 3.6)],
-        ),
-        tool(
-            "pattern_33",
-            true,
-            vec![arm(8.0, 21.0, 3.6), arm(70.0, 18.0, 3.6)],
-        ),
+        tool("pattern_32", true, vec![arm(166.0, 20.0, 3.6), arm(-152.0, 22.0, 3.6)]),
+        tool("pattern_33", true, vec![arm(8.0, 21.0, 3.6), arm(70.0, 18.0, 3.6)]),
         tool(
             "pattern_37",
             true,
-            vec![
-                arm(24.0, 19.0, 3.6),
-                arm(-28.0, 21.0, 3.6),
-                arm(108.0, 13.0, 3.6),
-                arm(-128.0, 16.0, 3.6),
-            ],
+            vec![arm(24.0, 19.0, 3.6), arm(-28.0, 21.0, 3.6), arm(108.0, 13.0, 3.6), arm(-128.0, 16.0, 3.6)],
         ),
         tool(
             "pattern_05_3_lines_angle_2",
             false,
-            vec![
-                arm(182.0, 20.0, 3.6),
-                arm(38.0, 18.0, 3.6),
-                arm(-44.0, 16.0, 3.6),
-            ],
+            vec![arm(182.0, 20.0, 3.6), arm(38.0, 18.0, 3.6), arm(-44.0, 16.0, 3.6)],
         ),
-        tool(
-            "pattern_35",
-            false,
-            vec![
-                arm(140.0, 18.0, 3.6),
-                arm(-138.0, 20.0, 3.6),
-                arm(0.0, 15.0, 3.6),
-            ],
-        ),
-        tool(
-            "pattern_36",
-            false,
-            ring(&[[-11.0, 9.0], [0.0, -12.0], [12.0, 8.0]], 3.6),
-        ),
+        tool("pattern_35", false, vec![arm(140.0, 18.0, 3.6), arm(-138.0, 20.0, 3.6), arm(0.0, 15.0, 3.6)]),
+        tool("pattern_36", false, ring(&[[-11.0, 9.0], [0.0, -12.0], [12.0, 8.0]], 3.6)),
     ]
 }
 
@@ -281,11 +215,7 @@ pub fn random_tool(seed: u64) -> ToolSpec {
             let mut angle = noise.uniform(-180.0, 180.0);
             for _ in 0..count {
                 let front = noise.uniform(9.0, 23.0);
-                let back = if through || count == 1 {
-                    noise.uniform(4.0, 22.0)
-                } else {
-                    0.0
-                };
+                let back = if through || count == 1 { noise.uniform(4.0, 22.0) } else { 0.0 };
                 bars.push(line(angle, back, front, width));
                 angle += noise.uniform(22.0, if through { 90.0 } else { 125.0 });
             }
@@ -298,11 +228,7 @@ pub fn random_tool(seed: u64) -> ToolSpec {
             bars.push(arm(angle + half, noise.uniform(13.0, 24.0), width));
             if noise.unit() < 0.4 {
                 let turn = if noise.unit() < 0.5 { 0.0 } else { 180.0 };
-                bars.push(arm(
-                    angle + turn + noise.uniform(-15.0, 15.0),
-                    noise.uniform(9.0, 20.0),
-                    width,
-                ));
+                bars.push(arm(angle + turn + noise.uniform(-15.0, 15.0), noise.uniform(9.0, 20.0), width));
             }
         }
         12..15 => {
@@ -328,20 +254,10 @@ pub fn random_tool(seed: u64) -> ToolSpec {
                     bars.pop();
                 }
             } else {
-                let core = corners
-                    .iter()
-                    .map(|c| DVec2::from_array(*c) * 1e-3)
-                    .collect::<Vec<_>>();
+                let core = corners.iter().map(|c| DVec2::from_array(*c) * 1e-3).collect::<Vec<_>>();
                 let turn = (core[1] - core[0]).perp_dot(core[2] - core[0]);
-                let core = if turn >= 0.0 {
-                    core
-                } else {
-                    core.into_iter().rev().collect()
-                };
-                bars.push(Bar {
-                    core,
-                    half_width_m: 0.5e-3 * width,
-                });
+                let core = if turn >= 0.0 { core } else { core.into_iter().rev().collect() };
+                bars.push(Bar { core, half_width_m: 0.5e-3 * width });
             }
         }
     }
@@ -355,7 +271,7 @@ pub fn random_tool(seed: u64) -> ToolSpec {
         name: format!("random_{seed}"),
         seen: true,
         bars,
-        half_thickness_m: noise.uniform(0.007, 0.0095),
+        half_thickness_m: noise.uniform(0.0095, 0.0125),
         bevel_width_m: half_width_m * noise.uniform(0.45, 0.85),
         bevel_depth_m: noise.uniform(0.0008, 0.002),
     }
@@ -367,15 +283,8 @@ mod tests {
 
     #[test]
     fn names_are_the_labs() {
-        let unseen: Vec<&str> = tools()
-            .iter()
-            .filter(|t| !t.seen)
-            .map(|t| t.name.as_str())
-            .collect();
-        assert_eq!(
-            unseen,
-            ["pattern_05_3_lines_angle_2", "pattern_35", "pattern_36"]
-        );
+        let unseen: Vec<&str> = tools().iter().filter(|t| !t.seen).map(|t| t.name.as_str()).collect();
+        assert_eq!(unseen, ["pattern_05_3_lines_angle_2", "pattern_35", "pattern_36"]);
         assert_eq!(tools().len(), 12);
     }
 
@@ -385,12 +294,7 @@ mod tests {
         for tool in tools().iter().chain(&randoms) {
             let mesh = tool.mesh();
             assert!(mesh.is_watertight(), "{}", tool.name);
-            assert!(
-                (500..60_000).contains(&mesh.triangles.len()),
-                "{}: {}",
-                tool.name,
-                mesh.triangles.len()
-            );
+            assert!((500..60_000).contains(&mesh.triangles.len()), "{}: {}", tool.name, mesh.triangles.len());
             let mut worst = 0.0_f64;
             for i in 0..mesh.triangles.len() {
                 let [a, b, c] = mesh.corners(i);
@@ -398,11 +302,7 @@ mod tests {
                     worst = worst.max(tool.signed_distance(p).abs());
                 }
             }
-            assert!(
-                worst < 2.5e-4,
-                "{}: a mesh point is {worst} m off the surface",
-                tool.name
-            );
+            assert!(worst < 2.5e-4, "{}: a mesh point is {worst} m off the surface", tool.name);
             // the volume is positive only if the triangles face outwards
             let volume: f64 = (0..mesh.triangles.len())
                 .map(|i| {
