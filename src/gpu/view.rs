@@ -362,7 +362,10 @@ mod tests {
                     let pick = |bit: usize, axis: usize| bounds[i >> bit & 1][axis];
                     let corner = DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2));
                     let (px, _) = camera.project(corner, size).unwrap();
-                    assert!(px.x >= 0.0 && px.y >= 0.0 && px.x <= size[0].into() && px.y <= size[1].into(), "{px}");
+                    assert!(
+                        px.x >= 0.0 && px.y >= 0.0 && px.x <= f64::from(size[0]) && px.y <= f64::from(size[1]),
+                        "{px}"
+                    );
                 }
                 let anchor = DVec2::new(150.0, 90.0);
                 let before = camera.ray(anchor, size).meets_plane(camera.target, camera.axes()[2]).unwrap();
