@@ -1,1 +1,19 @@
 //! Model bundles and the engines that run them.
+//!
+//! * [`bundle`]: a folder with a manifest and ONNX graphs, checked completely when it is opened.
+//! * [`engine`]: one small trait over two engines, rten (built in) and ONNX Runtime (used where its library is found).
+//! * [`runtime`]: where that library is looked for, and how it is fetched.
+//! * [`generator`], [`mask`]: what a bundle does, from a GelSlim difference to a decoder's picture and from a depth map
+//!   to a contact mask.
+//! * [`recipe`]: everything a generated result depends on.
+//!
+//! Without the feature `onnx` everything here compiles, bundles can be opened and checked, and running one is an
+//! error that says so.
+
+pub mod bundle;
+pub mod engine;
+pub mod generator;
+pub mod mask;
+mod onnx_header;
+pub mod recipe;
+pub mod runtime;

@@ -1,1 +1,393 @@
-//! (filled by its layer)
+//! Bundles, engines and models on the tiny bundles of `tests/data/bundles` (written by `make_bundles.py` there).
+
+use std::path::{Path, PathBuf};
+
+use touch2touch::infer::bundle::{Bundle, MANIFEST, find};
+
+fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name)
+}
+
+/// A copy of a fixture that may be damaged.
+fn copy(name: &str) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(fixture(name)).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, dir.path().join(path.file_name().unwrap())).unwrap();
+    }
+    dir
+}
+
+fn edit(dir: &Path, change: impl FnOnce(&mut serde_json::Value)) {
+    let path = dir.join(MANIFEST);
+    let mut manifest = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    change(&mut manifest);
+    std::fs::write(path, manifest.to_string()).unwrap();
+}
+
+/// Everything said about a bundle that must be refused.
+fn refusal(dir: &Path) -> String {
+    Bundle::open(dir).expect_err("the bundle must be refused").to_string()
+}
+
+#[test]
+fn whole_bundles_open() {
+    let generator = Bundle::open(&fixture("generator")).unwrap();
+    assert_eq!(generator.name(), "Tiny generator of the tests");
+    assert_eq!(generator.generator().unwrap().defaults.steps, 6);
+    assert_eq!(generator.hash().len(), 64);
+    assert!(generator.provenance()["made_by"].is_string());
+    let mask = Bundle::open(&fixture("mask")).unwrap();
+    assert_eq!(mask.mask_unet().unwrap().output.classes, 2);
+    assert!(mask.generator().is_none());
+}
+
+#[test]
+fn a_refusal_lists_everything_that_is_wrong() {
+    let dir = copy("generator");
+    let decoder = dir.path().join("decoder.onnx");
+    let mut bytes = std::fs::read(&decoder).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    std::fs::write(&decoder, bytes).unwrap();
+    std::fs::remove_file(dir.path().join("condition_encoder.onnx")).unwrap();
+    edit(dir.path(), |m| {
+        m["latent"]["shape"] = serde_json::json!([3, 4, 4]);
+        m["input"]["std"] = serde_json::json!([0.07, 0.0, 0.06]);
+        m["schedule"]["beta_end"] = serde_json::json!(1.5);
+        m["output"]["range_m"] = serde_json::json!([0.02, 0.01]);
+        m["prediction"] = serde_json::json!("velocity");
+        m["surprise"] = serde_json::json!(1);
+        m["defaults"]["eta"] = serde_json::json!(2.0);
+        m.as_object_mut().unwrap().remove("condition");
+    });
+    let text = refusal(dir.path());
+    for expected in [
+        "condition_encoder.onnx: cannot be read",
+        "decoder.onnx: its SHA-256 is not the manifest's",
+        "input.std: not positive",
+        "schedule: the betas run from 0.0015 to 1.5",
+        "output.range_m: empty",
+        "prediction: unknown variant `velocity`",
+        "surprise: unknown key",
+        "condition: missing",
+        "defaults.eta: out of range",
+    ] {
+        assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
+    }
+}
+
+#[test]
+fn shapes_that_disagree_with_the_manifest_are_refused() {
+    let dir = copy("generator");
+    edit(dir.path(), |m| {
+        m["latent"]["shape"] = serde_json::json!([3, 4, 4]);
+        m["output"]["channels"] = serde_json::json!(1);
+        m["input"]["size"] = serde_json::json!([16, 32]);
+    });
+    let text = refusal(dir.path());
+    for expected in [
+        "denoiser.onnx: input `latent`: shape [N, 4, 4, 4], but the manifest says [N, 3, 4, 4]",
+        "denoiser.onnx: output `prediction`: shape",
+        "decoder.onnx: input `latent`: shape",
+        "decoder.onnx: output `image`: shape [N, 3, 16, 16], but the manifest says [N, 1, 16, 16]",
+        "condition_encoder.onnx: input `gelslim`: shape [N, 3, 16, 16], but the manifest says [N, 3, 32, 16]",
+    ] {
+        assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
+    }
+}
+
+#[test]
+fn swapped_graphs_and_foreign_files_are_refused() {
+    let dir = copy("generator");
+    edit(dir.path(), |m| {
+        let files = &mut m["files"];
+        let decoder = files["decoder"].clone();
+        files["decoder"] = files["denoiser"].clone();
+        files["denoiser"] = decoder;
+    });
+    let text = refusal(dir.path());
+    assert!(text.contains("no output named `image`, only [\"prediction\"]"), "{text}");
+    assert!(text.contains("no input named `timestep`"), "{text}");
+    assert!(text.contains("an input `timestep` that nothing is given to"), "{text}");
+
+    let dir = copy("mask");
+    std::fs::write(dir.path().join("mask_unet.onnx"), b"not a graph").unwrap();
+    let text = refusal(dir.path());
+    assert!(text.contains("SHA-256") && text.contains("not an ONNX file"), "{text}");
+}
+
+#[test]
+fn other_versions_formats_and_paths_are_refused() {
+    let with = |change: fn(&mut serde_json::Value)| {
+        let dir = copy("mask");
+        edit(dir.path(), change);
+        refusal(dir.path())
+    };
+    assert!(with(|m| m["format_version"] = 2.into()).contains("format_version: 2, but this program reads version 1"));
+    assert!(with(|m| m["format"] = "other".into()).contains("another program's file"));
+    assert!(with(|m| m["kind"] = "painter".into()).contains("kind: \"painter\" is unknown"));
+    for path in ["../mask_unet.onnx", "/etc/hostname", ""] {
+        let dir = copy("mask");
+        edit(dir.path(), |m| m["files"]["mask_unet"]["path"] = path.into());
+        assert!(refusal(dir.path()).contains("leads out of the folder"), "{path}");
+    }
+    assert!(with(|m| m["files"] = serde_json::json!({})).contains("files.mask_unet: missing"));
+    assert!(with(|m| m["files"]["decoder"] = m["files"]["mask_unet"].clone()).contains("files.decoder: not part"));
+
+    let dir = tempfile::tempdir().unwrap();
+    assert!(refusal(dir.path()).contains("manifest.json: cannot be read"));
+    for text in ["", "{", "[]", "null", "\u{feff}{}", "{\"format\": \"touch2touch-bundle\"}"] {
+        std::fs::write(dir.path().join(MANIFEST), text).unwrap();
+        assert!(refusal(dir.path()).contains("1 problem"), "{text}");
+    }
+}
+
+#[test]
+fn bundles_are_found_once_and_broken_ones_reported() {
+    let broken = copy("mask");
+    edit(broken.path(), |m| m["output"]["classes"] = 7.into());
+    let roots = [fixture(""), fixture("generator"), broken.path().to_path_buf(), PathBuf::from("/nowhere")];
+    let found = find(&roots);
+    let names: Vec<&str> = found.bundles.iter().map(Bundle::name).collect();
+    assert_eq!(names, ["Tiny generator of the tests", "Tiny mask UNet of the tests"]);
+    assert!(found.problems.iter().any(|p| p.what.contains("output.classes")));
+}
+
+#[cfg(feature = "onnx")]
+mod running {
+    use std::ops::ControlFlow;
+
+    use touch2touch::domain::diffusion::{GenerateConfig, Progress, Tensor};
+    use touch2touch::domain::grid::{Grid, RgbGrid};
+    use touch2touch::domain::postprocess::{RawPrediction, ShiftMode};
+    use touch2touch::infer::bundle::Role;
+    use touch2touch::infer::engine::{EngineChoice, EngineKind, Graph, Input, resolve};
+    use touch2touch::infer::generator::{GenerateError, Generator};
+    use touch2touch::infer::mask::{MaskError, MaskModel};
+
+    use super::*;
+    use crate::support::require;
+
+    /// The engines of this machine. rten always; ONNX Runtime where it is found, and it must be if `REQUIRE_ORT` is set.
+    fn engines() -> Vec<EngineChoice> {
+        match resolve(EngineChoice::Ort) {
+            Ok(_) => vec![EngineChoice::Rten, EngineChoice::Ort],
+            Err(err) => {
+                assert!(!require("REQUIRE_ORT"), "{err}");
+                eprintln!("{err}: the tests run on the built-in engine only");
+                vec![EngineChoice::Rten]
+            }
+        }
+    }
+
+    fn image() -> RgbGrid {
+        Grid::from_fn(43, 32, |x, y| {
+            let bar = if (x + y / 2) % 20 < 5 { 40.0 } else { 0.0 };
+            [bar, -bar * 0.5, (x as f32 * 0.3).sin() * 10.0]
+        })
+    }
+
+    fn go_on(_: Progress) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    fn config() -> GenerateConfig {
+        GenerateConfig { steps: 6, ..Default::default() }
+    }
+
+    fn largest_difference(a: &RawPrediction, b: &RawPrediction) -> f32 {
+        let pairs = a.channels.iter().zip(&b.channels).flat_map(|(a, b)| a.as_slice().iter().zip(b.as_slice()));
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+    }
+
+    /// Each graph on each engine against onnx's own evaluator in numpy.
+    #[test]
+    fn every_engine_computes_what_the_standard_says() {
+        let text = std::fs::read(fixture("reference.json")).unwrap();
+        let reference: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        let wave = |n: usize, f: fn(f32) -> f32, step: f64| (0..n).map(|i| f((i as f64 * step) as f32)).collect();
+        let gelslim = Tensor::new(vec![2, 3, 16, 16], wave(1536, f32::sin, 0.37)).unwrap();
+        let latent = Tensor::new(vec![2, 4, 4, 4], wave(128, f32::cos, 0.71)).unwrap();
+        let near = |found: Vec<f32>, key: &str, engine| {
+            let expected = reference[key].as_array().unwrap();
+            assert_eq!(found.len(), expected.len());
+            for (a, b) in found.iter().zip(expected) {
+                // Values of about 1 through a few dozen sums in f32, and inputs that differ in the last bit.
+                assert!((f64::from(*a) - b.as_f64().unwrap()).abs() < 2e-5, "{engine:?} {key}: {a} for {b}");
+            }
+        };
+        for choice in engines() {
+            let engine = resolve(choice).unwrap();
+            let load = |role: Role| {
+                Graph::load(engine, role, &fixture("generator").join(format!("{}.onnx", role.key()))).unwrap()
+            };
+            let condition = load(Role::ConditionEncoder)
+                .run(&[("gelslim", Input::F32(&gelslim))], "condition", &[2, 5, 4, 4])
+                .unwrap();
+            let inputs = [
+                ("latent", Input::F32(&latent)),
+                ("timestep", Input::I64(&[700, 700])),
+                ("condition", Input::F32(&condition)),
+            ];
+            let prediction = load(Role::Denoiser).run(&inputs, "prediction", &[2, 4, 4, 4]).unwrap();
+            let image = load(Role::Decoder).run(&[("latent", Input::F32(&latent))], "image", &[2, 3, 16, 16]).unwrap();
+            near(condition.into_data(), "condition", engine);
+            near(prediction.into_data(), "prediction", engine);
+            near(image.into_data().into_iter().step_by(7).collect(), "image", engine);
+        }
+    }
+
+    #[test]
+    fn engines_agree_from_image_to_picture() {
+        let bundle = Bundle::open(&fixture("generator")).unwrap();
+        let results: Vec<RawPrediction> = engines()
+            .into_iter()
+            .map(|choice| Generator::open(&bundle, choice).unwrap().generate(&image(), &config(), &mut go_on).unwrap())
+            .collect();
+        for other in &results[1..] {
+            // Six steps, each adding rounding of about 1e-6; the picture is of size 1.
+            let difference = largest_difference(&results[0], other);
+            assert!(difference < 1e-4, "the engines differ by {difference}");
+        }
+    }
+
+    #[test]
+    fn a_seed_gives_the_same_picture_again_and_another_seed_another() {
+        let bundle = Bundle::open(&fixture("generator")).unwrap();
+        for choice in engines() {
+            let mut generator = Generator::open(&bundle, choice).unwrap();
+            let mut go = |seed| generator.generate(&image(), &GenerateConfig { seed, ..config() }, &mut go_on).unwrap();
+            let first = go(1);
+            assert_eq!(first.channels.len(), 3);
+            assert_eq!(first.channels[0].size(), [16, 16]);
+            assert_eq!(go(1), first);
+            assert!(largest_difference(&first, &go(2)) > 1e-2);
+            let again = Generator::open(&bundle, choice).unwrap().generate(
+                &image(),
+                &GenerateConfig { seed: 1, ..config() },
+                &mut go_on,
+            );
+            assert_eq!(again.unwrap(), first, "a freshly loaded model must agree");
+        }
+    }
+
+    #[test]
+    fn a_batch_gives_what_its_images_give_alone() {
+        let bundle = Bundle::open(&fixture("generator")).unwrap();
+        let other = image().map(|p| [p[2], p[0], -p[1]]);
+        for choice in engines() {
+            let mut generator = Generator::open(&bundle, choice).unwrap();
+            let both = generator.generate_batch(&[&image(), &other], &config(), &mut go_on).unwrap();
+            let alone = [image(), other.clone()].map(|i| generator.generate(&i, &config(), &mut go_on).unwrap());
+            for (a, b) in both.iter().zip(&alone) {
+                // Engines may sum in another order for another batch size.
+                assert!(largest_difference(a, b) < 1e-5);
+            }
+            let seeds = generator.generate_seeds(&image(), &[42, 7], &config(), &mut go_on).unwrap();
+            assert!(largest_difference(&seeds[0], &alone[0]) < 1e-5);
+            assert!(largest_difference(&seeds[0], &seeds[1]) > 1e-2);
+            assert!(generator.generate_batch(&[], &config(), &mut go_on).unwrap().is_empty());
+        }
+    }
+
+    #[test]
+    fn cancelling_stops_within_one_step() {
+        let bundle = Bundle::open(&fixture("generator")).unwrap();
+        for choice in engines() {
+            let mut generator = Generator::open(&bundle, choice).unwrap();
+            let mut last = None;
+            let result = generator.generate(&image(), &config(), &mut |p| {
+                last = Some(p);
+                if p.step == 2 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            });
+            assert!(matches!(result, Err(GenerateError::Cancelled)));
+            assert_eq!(last, Some(Progress { step: 2, of: 6 }));
+            assert!(generator.generate(&image(), &config(), &mut go_on).is_ok(), "the model stays usable");
+        }
+    }
+
+    #[test]
+    fn pictures_become_depth_in_every_reading() {
+        let bundle = Bundle::open(&fixture("generator")).unwrap();
+        let mut generator = Generator::open(&bundle, EngineChoice::Auto).unwrap();
+        let raw = generator.generate(&image(), &config(), &mut go_on).unwrap();
+        let depth = |mode| generator.depth(&raw, mode).unwrap();
+        let (saved, exact) = (depth(ShiftMode::Raw), depth(ShiftMode::ExactInverse));
+        assert_eq!(saved.size(), [18, 14]);
+        for (&r, &d) in saved.as_slice().iter().zip(exact.as_slice()) {
+            assert!((2.0 * f64::from(r) - 0.0225 - f64::from(d)).abs() < 1e-7);
+            assert!((-0.0117..=0.0226).contains(&d));
+        }
+        assert_ne!(depth(ShiftMode::PaperShift), exact);
+        let (_, ledger) = generator.spec().depth_chain(ShiftMode::PaperShift).unwrap().run_with_ledger(&raw).unwrap();
+        assert_eq!(ledger.len(), 4);
+    }
+
+    #[test]
+    fn impossible_requests_are_errors() {
+        let generator = Bundle::open(&fixture("generator")).unwrap();
+        let mask = Bundle::open(&fixture("mask")).unwrap();
+        assert!(matches!(Generator::open(&mask, EngineChoice::Rten), Err(GenerateError::NotAGenerator(_))));
+        assert!(matches!(MaskModel::open(&generator, EngineChoice::Rten), Err(MaskError::NotAMaskUnet(_))));
+        let mut model = Generator::open(&generator, EngineChoice::Rten).unwrap();
+        for config in [
+            GenerateConfig { steps: 0, ..config() },
+            GenerateConfig { steps: 1001, ..config() },
+            GenerateConfig { eta: f64::NAN, ..config() },
+        ] {
+            assert!(matches!(model.generate(&image(), &config, &mut go_on), Err(GenerateError::Diffusion(_))));
+        }
+        let holes = Grid::filled(4, 4, [f32::NAN; 3]);
+        let result = model.generate(&holes, &config(), &mut go_on);
+        assert!(matches!(result, Err(GenerateError::BadImage { bad: 48, .. })));
+        let damaged = copy("mask");
+        std::fs::write(damaged.path().join("mask_unet.onnx"), b"gone").unwrap();
+        for choice in engines() {
+            let engine = resolve(choice).unwrap();
+            let load = |path: &Path| Graph::load(engine, Role::MaskUnet, path).unwrap_err().to_string();
+            assert!(load(&damaged.path().join("mask_unet.onnx")).contains("cannot load the graph `mask_unet`"));
+            assert!(load(&damaged.path().join("absent.onnx")).contains("absent.onnx"));
+            let mut graph = Graph::load(engine, Role::MaskUnet, &fixture("mask/mask_unet.onnx")).unwrap();
+            let wrong = Tensor::filled(vec![1, 1, 3, 3], 0.0);
+            assert!(graph.run(&[("imprint", Input::F32(&wrong))], "logits", &[1, 2, 14, 18]).is_err());
+            assert!(graph.run(&[], "logits", &[1, 2, 14, 18]).is_err());
+        }
+    }
+
+    #[test]
+    fn the_mask_model_marks_what_is_deep_and_keeps_size_and_orientation() {
+        let bundle = Bundle::open(&fixture("mask")).unwrap();
+        for choice in engines() {
+            let mut model = MaskModel::open(&bundle, choice).unwrap();
+            // The graph answers "deeper than 5 mm"; the bundle turns the imprint by 180 degrees and back.
+            let mut imprint = Grid::from_fn(18, 14, |x, y| if x < 6 && y > 3 { 0.008 } else { 0.001 });
+            let expected = imprint.map(|&d| d > 0.005);
+            assert_eq!(model.predict(&imprint).unwrap(), expected);
+            imprint[(2, 8)] = f32::NAN;
+            assert!(!model.predict(&imprint).unwrap()[(2, 8)]);
+            let large = Grid::from_fn(36, 28, |x, y| if x < 12 && y > 7 { 0.008 } else { 0.001 });
+            let mask = model.predict(&large).unwrap();
+            assert_eq!(mask, large.map(|&d| d > 0.005));
+            let nothing = Grid::filled(18, 14, f32::NAN);
+            assert!(matches!(model.predict(&nothing), Err(MaskError::Nothing { .. })));
+        }
+    }
+
+    #[test]
+    fn the_recipe_names_everything_the_result_depends_on() {
+        let bundle = Bundle::open(&fixture("generator")).unwrap();
+        let generator = Generator::open(&bundle, EngineChoice::Rten).unwrap();
+        let finger = touch2touch::domain::sensor::Finger::Right;
+        let recipe = generator.recipe("tool/data_1", finger, &config());
+        assert_eq!((recipe.bundle.as_str(), recipe.engine), (bundle.hash(), EngineKind::Rten));
+        assert_eq!(recipe.config(), config());
+    }
+}
+
+#[cfg(not(feature = "onnx"))]
+#[test]
+fn a_build_without_models_says_so() {
+    use touch2touch::infer::engine::{EngineChoice, EngineError, resolve};
+    assert!(matches!(resolve(EngineChoice::Auto), Err(EngineError::NotInThisBuild)));
+}

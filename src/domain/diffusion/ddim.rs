@@ -22,7 +22,7 @@ pub enum Prediction {
 }
 
 /// How the noise is taken away.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampler {
     /// Denoising diffusion implicit models; `eta` 0 is deterministic, 1 is ancestral sampling.

@@ -11,7 +11,7 @@ pub struct Schedule {
 }
 
 /// Which training steps a sampler visits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Spacing {
     /// The public latent-diffusion release's: `1, 1 + c, 1 + 2c, …` with `c = T / steps` rounded down. The last, noisiest

@@ -1,0 +1,119 @@
+//! Compares a graph's inputs and outputs with what the manifest promises.
+
+use super::manifest::{BundleSpec, GeneratorSpec, MaskSpec, TimestepType};
+use super::{Problems, Role};
+use crate::infer::onnx_header::{self, FLOAT32, INT64, Port};
+
+/// A tensor the manifest promises: its name, element types, and shape after the batch.
+struct Promise {
+    name: &'static str,
+    elements: &'static [u64],
+    shape: Vec<usize>,
+}
+
+fn float(name: &'static str, shape: impl Into<Vec<usize>>) -> Promise {
+    Promise { name, elements: &[FLOAT32], shape: shape.into() }
+}
+
+/// Adds everything in which the graph differs from the manifest, and notes the timestep's type in `spec`.
+pub(super) fn check(role: Role, bytes: &[u8], spec: &mut BundleSpec, problems: &mut Problems) {
+    let header = match onnx_header::read(bytes) {
+        Ok(header) => header,
+        Err(err) => {
+            problems.add(err.to_string(), "export the graph again, or copy the bundle again");
+            return;
+        }
+    };
+    if header.external_data {
+        problems.add("its weights lie in another file", "export the graph as one file");
+    }
+    let Some((inputs, outputs)) = promised(role, spec) else {
+        return; // A file that is not part of this kind of bundle: the manifest's check says so.
+    };
+    for (ports, promises, what) in [(&header.inputs, &inputs, "input"), (&header.outputs, &outputs, "output")] {
+        for promise in promises {
+            match ports.iter().find(|port| port.name == promise.name) {
+                Some(port) => compare(port, promise, what, problems),
+                None => {
+                    let names: Vec<&str> = ports.iter().map(|p| p.name.as_str()).collect();
+                    problems.add(
+                        format!("no {what} named `{}`, only {names:?}", promise.name),
+                        "export the graph with the names of the manifest's documentation",
+                    );
+                }
+            }
+        }
+    }
+    for port in header.inputs.iter().filter(|port| inputs.iter().all(|promise| promise.name != port.name)) {
+        problems.add(format!("an input `{}` that nothing is given to", port.name), "export the graph without it");
+    }
+    if let BundleSpec::Generator(generator) = spec
+        && header.inputs.iter().any(|port| port.name == "timestep" && port.element == FLOAT32)
+    {
+        generator.timestep = TimestepType::Float32;
+    }
+}
+
+fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<Promise>, Vec<Promise>)> {
+    match (role, spec) {
+        (Role::MaskUnet, BundleSpec::MaskUnet(MaskSpec { input, output })) => {
+            let [width, height] = input.size;
+            Some((vec![float("imprint", [1, height, width])], vec![float("logits", [output.classes, height, width])]))
+        }
+        (_, BundleSpec::Generator(GeneratorSpec { input, condition, latent, output, .. })) => {
+            let [width, height] = input.size;
+            let latent = || float("latent", latent.shape);
+            match role {
+                Role::ConditionEncoder => {
+                    Some((vec![float("gelslim", [3, height, width])], vec![float("condition", condition.shape)]))
+                }
+                Role::Denoiser => {
+                    let timestep = Promise { name: "timestep", elements: &[INT64, FLOAT32], shape: vec![] };
+                    let inputs = vec![latent(), timestep, float("condition", condition.shape)];
+                    Some((inputs, vec![Promise { name: "prediction", ..latent() }]))
+                }
+                Role::Decoder => {
+                    let [width, height] = output.size;
+                    Some((vec![latent()], vec![float("image", [output.channels, height, width])]))
+                }
+                Role::MaskUnet => None,
+            }
+        }
+        _ => None,
+    }
+}
+
+fn compare(port: &Port, promise: &Promise, what: &str, problems: &mut Problems) {
+    let name = promise.name;
+    if !promise.elements.contains(&port.element) {
+        let expected = if promise.elements.contains(&INT64) { "int64 or float32" } else { "float32" };
+        let found = port.element;
+        problems.add(
+            format!("{what} `{name}`: element type {found} instead of {expected}"),
+            "export the graph in 32-bit floating point",
+        );
+    }
+    // A graph may leave an output's shape open; it is then checked when it runs.
+    let Some(shape) = &port.shape else { return };
+    let text = |dims: &mut dyn Iterator<Item = Option<u64>>| {
+        let dims: Vec<String> = dims.map(|d| d.map_or("N".into(), |d| d.to_string())).collect();
+        format!("[{}]", dims.join(", "))
+    };
+    let expected: Vec<Option<u64>> =
+        std::iter::once(None).chain(promise.shape.iter().map(|&d| Some(d as u64))).collect();
+    let agrees = shape.len() == expected.len()
+        && shape.iter().zip(&expected).skip(1).all(|(found, expected)| found.is_none() || found == expected);
+    if !agrees {
+        let (found, expected) = (text(&mut shape.iter().copied()), text(&mut expected.iter().copied()));
+        problems.add(
+            format!("{what} `{name}`: shape {found}, but the manifest says {expected}"),
+            "correct the manifest, or use the graph that belongs to it",
+        );
+    }
+    if let Some(Some(batch)) = shape.first() {
+        problems.add(
+            format!("{what} `{name}`: the batch is fixed to {batch}"),
+            "export the graph with a dynamic first axis",
+        );
+    }
+}

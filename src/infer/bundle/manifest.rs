@@ -1,0 +1,490 @@
+//! The manifest's keys, and what makes a manifest wrong.
+
+use std::collections::BTreeMap;
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::{Problems, Role};
+use crate::domain::diffusion::{GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
+use crate::domain::postprocess::{
+    DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
+};
+use crate::domain::resample::Resampling;
+
+const FORMAT: &str = "touch2touch-bundle";
+const VERSION: u64 = 1;
+/// No side of an image or latent may be longer; a larger number is a mistake and would exhaust the memory.
+const MAX_SIDE: usize = 4096;
+
+/// One graph's file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileEntry {
+    /// Relative to the bundle's folder.
+    pub path: String,
+    /// Of the whole file, hex.
+    pub sha256: String,
+}
+
+/// What a bundle is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BundleSpec {
+    /// GelSlim difference to Soft Bubble imprint.
+    Generator(GeneratorSpec),
+    /// Imprint to contact mask.
+    MaskUnet(MaskSpec),
+}
+
+/// A latent-diffusion generator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GeneratorSpec {
+    /// How the difference image is prepared.
+    pub input: GeneratorInput,
+    /// Shape of the condition.
+    pub condition: TensorSpec,
+    /// Shape and scale of the latent.
+    pub latent: LatentSpec,
+    /// How noise was added in training.
+    pub schedule: Schedule,
+    /// What the denoiser's output means.
+    pub prediction: Prediction,
+    /// How the decoder's picture is read.
+    pub output: OutputSpec,
+    /// Statistics for the paper's shift; `None` if the bundle has none.
+    pub shift: Option<ShiftStats>,
+    /// What to generate with if nobody chooses.
+    pub defaults: GenerateConfig,
+    /// What the denoiser's graph takes as its timestep.
+    pub timestep: TimestepType,
+}
+
+impl GeneratorSpec {
+    /// The steps from the decoder's picture to depth, for the user's choice of shift.
+    ///
+    /// # Errors
+    /// [`PostprocessError::NoStatistics`] for the paper's shift of a bundle without statistics.
+    pub fn depth_chain(&self, mode: ShiftMode) -> Result<DepthChain, PostprocessError> {
+        let chain = DepthChain {
+            range: self.output.range_m,
+            mapping: Mapping::Correct,
+            reduction: self.output.reduction,
+            shift: Shift::None,
+            size: self.output.imprint_size,
+            resampling: self.output.resampling,
+            rotation_deg: self.output.rotation_deg,
+        };
+        chain.with_mode(mode, self.shift)
+    }
+}
+
+/// The element type of the denoiser's `timestep`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TimestepType {
+    /// int64, as in latent diffusion.
+    Int64,
+    /// float32 holding the same whole number.
+    Float32,
+}
+
+/// `input` of a generator.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GeneratorInput {
+    /// Which sensor: always `gelslim`, the difference of touched and untouched image, RGB.
+    pub sensor: GelslimSensor,
+    /// `[width, height]` the difference is resized to, pixels.
+    pub size: [usize; 2],
+    /// Scale of the difference before mean and deviation.
+    pub scale: InputScale,
+    /// Subtracted per channel.
+    pub mean: [f64; 3],
+    /// Divided by per channel.
+    pub std: [f64; 3],
+    /// How it is resized.
+    #[serde(default = "bilinear")]
+    pub resampling: Resampling,
+    /// Rotation of the prepared image: 0 or 180 degrees.
+    #[serde(default)]
+    pub rotation_deg: u32,
+}
+
+/// The only sensor a generator can start from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GelslimSensor {
+    /// GelSlim.
+    Gelslim,
+}
+
+/// The only sensor a mask UNet can start from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BubbleSensor {
+    /// Soft Bubble.
+    Bubble,
+}
+
+/// Scale of the difference image that mean and deviation belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum InputScale {
+    /// Divided by 255.
+    #[serde(rename = "0..1")]
+    Unit,
+    /// As stored.
+    #[serde(rename = "0..255")]
+    Byte,
+}
+
+/// The shape of a tensor without its batch: channels, rows, columns.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TensorSpec {
+    /// `[channels, height, width]`.
+    pub shape: [usize; 3],
+}
+
+/// `latent`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LatentSpec {
+    /// `[channels, height, width]`.
+    pub shape: [usize; 3],
+    /// The decoder is given `latent / scale_factor`.
+    pub scale_factor: f64,
+}
+
+/// `schedule`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScheduleSpec {
+    /// Which formula.
+    pub kind: ScheduleKind,
+    /// Training steps.
+    pub steps: usize,
+    /// First beta; not for the cosine schedule.
+    pub beta_start: Option<f64>,
+    /// Last beta; not for the cosine schedule.
+    pub beta_end: Option<f64>,
+}
+
+/// The formula of a schedule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ScheduleKind {
+    /// [`Schedule::scaled_linear`], what latent diffusion calls "linear".
+    ScaledLinear,
+    /// [`Schedule::linear`].
+    Linear,
+    /// [`Schedule::cosine`].
+    Cosine,
+}
+
+impl ScheduleSpec {
+    /// The schedule's values.
+    ///
+    /// # Errors
+    /// [`ScheduleError`] for impossible numbers; missing betas count as NaN.
+    pub fn build(&self) -> Result<Schedule, ScheduleError> {
+        let (start, end) = (self.beta_start.unwrap_or(f64::NAN), self.beta_end.unwrap_or(f64::NAN));
+        match self.kind {
+            ScheduleKind::ScaledLinear => Schedule::scaled_linear(self.steps, start, end),
+            ScheduleKind::Linear => Schedule::linear(self.steps, start, end),
+            ScheduleKind::Cosine => Schedule::cosine(self.steps),
+        }
+    }
+}
+
+/// `output` of a generator.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OutputSpec {
+    /// `[width, height]` of the decoder's picture.
+    pub size: [usize; 2],
+    /// Channels of the decoder's picture.
+    pub channels: usize,
+    /// What -1 and 1 mean, metres.
+    pub range_m: DepthRange,
+    /// How channels become one.
+    #[serde(default)]
+    pub reduction: Reduction,
+    /// Rotation from the picture to the raw orientation of the lab's bubble files: 0 or 180 degrees.
+    #[serde(default)]
+    pub rotation_deg: u32,
+    /// `[width, height]` of the imprint the picture stands for.
+    pub imprint_size: [usize; 2],
+    /// How the picture is brought to that size.
+    #[serde(default = "bilinear")]
+    pub resampling: Resampling,
+}
+
+fn bilinear() -> Resampling {
+    Resampling::Bilinear
+}
+
+/// A contact mask UNet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskSpec {
+    /// How the imprint is prepared.
+    pub input: MaskInput,
+    /// How the output is read.
+    pub output: MaskOutput,
+}
+
+/// `input` of a mask UNet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaskInput {
+    /// Which sensor: always `bubble`.
+    pub sensor: BubbleSensor,
+    /// `[width, height]`, pixels.
+    pub size: [usize; 2],
+    /// The imprint's depth that becomes 0 and 1, metres.
+    pub range_m: DepthRange,
+    /// How depth becomes 0..1.
+    #[serde(default)]
+    pub cast: Cast,
+    /// Rotation of the raw imprint before the graph (and back after it): 0 or 180 degrees.
+    #[serde(default)]
+    pub rotation_deg: u32,
+}
+
+/// What happens between the scaled imprint and the graph.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cast {
+    /// Truncated to eight bits, clamped to 0..255, divided by 255.
+    #[default]
+    Saturate,
+    /// As the lab: truncated to eight bits, wrapping around outside, divided by 255.
+    Wrap,
+    /// Clamped to 0..1, not truncated.
+    None,
+}
+
+/// `output` of a mask UNet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaskOutput {
+    /// 2: softmax, the second is contact. 1: sigmoid.
+    pub classes: usize,
+    /// Probability from which a pixel is contact.
+    #[serde(default = "half")]
+    pub threshold: f64,
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+/// `defaults`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Defaults {
+    steps: u32,
+    #[serde(default)]
+    sampler: Sampler,
+    #[serde(default)]
+    spacing: Spacing,
+    #[serde(default)]
+    eta: f64,
+    #[serde(default = "default_seed")]
+    seed: u64,
+}
+
+fn default_seed() -> u64 {
+    GenerateConfig::default().seed
+}
+
+/// A parsed manifest. `spec` is `None` if something kept it from being read (the problems then say what).
+pub(super) struct Manifest {
+    pub(super) name: String,
+    pub(super) files: BTreeMap<Role, FileEntry>,
+    pub(super) spec: Option<BundleSpec>,
+    pub(super) provenance: Value,
+}
+
+/// Reads the manifest and adds all that is wrong with it; `None` if it is no manifest of this version at all.
+pub(super) fn parse(text: &[u8], problems: &mut Problems) -> Option<Manifest> {
+    let value: Value = match serde_json::from_slice(text) {
+        Ok(value) => value,
+        Err(err) => {
+            problems.add(format!("is not valid JSON: {err}"), "correct it, or copy the bundle again");
+            return None;
+        }
+    };
+    let Value::Object(mut keys) = value else {
+        problems.add("is not a JSON object", "see the description of the manifest in the documentation");
+        return None;
+    };
+    if keys.remove("format").as_ref().and_then(Value::as_str) != Some(FORMAT) {
+        problems.add(format!("format: must be \"{FORMAT}\""), "this is another program's file");
+        return None;
+    }
+    match keys.remove("format_version") {
+        Some(version) if version.as_u64() == Some(VERSION) => {}
+        version => {
+            let version = version.map_or("missing".to_owned(), |v| v.to_string());
+            problems.add(
+                format!("format_version: {version}, but this program reads version {VERSION}"),
+                "use a bundle made for this version of the program, or update the program",
+            );
+            return None;
+        }
+    }
+
+    let name: String = section(&mut keys, "name", problems).unwrap_or_default();
+    let files: BTreeMap<Role, FileEntry> = section(&mut keys, "files", problems).unwrap_or_default();
+    let provenance = keys.remove("provenance").unwrap_or_default();
+    let kind: Option<String> = section(&mut keys, "kind", problems);
+    let (spec, roles): (_, &[Role]) = match kind.as_deref() {
+        Some("generator") => (generator(&mut keys, problems), &[Role::ConditionEncoder, Role::Denoiser, Role::Decoder]),
+        Some("mask_unet") => (mask(&mut keys, problems), &[Role::MaskUnet]),
+        other => {
+            if let Some(other) = other {
+                problems.add(format!("kind: \"{other}\" is unknown"), "it must be \"generator\" or \"mask_unet\"");
+            }
+            return None;
+        }
+    };
+    for role in roles {
+        if !files.contains_key(role) {
+            problems.add(format!("files.{}: missing", role.key()), "name the graph's file and its SHA-256");
+        }
+    }
+    for role in files.keys().filter(|role| !roles.contains(role)) {
+        problems.add(format!("files.{}: not part of this kind of bundle", role.key()), "remove it");
+    }
+    for key in keys.keys() {
+        problems.add(format!("{key}: unknown key"), "remove it, or move it under provenance");
+    }
+    Some(Manifest { name, files, spec, provenance })
+}
+
+/// Takes one key out of the manifest and reads it.
+fn section<T: DeserializeOwned>(keys: &mut Map<String, Value>, key: &str, problems: &mut Problems) -> Option<T> {
+    let value = keys.remove(key).or_else(|| {
+        problems.add(format!("{key}: missing"), "add it as the documentation of the manifest describes");
+        None
+    })?;
+    serde_json::from_value(value)
+        .map_err(|err| {
+            problems.add(format!("{key}: {err}"), "correct it as the documentation of the manifest describes")
+        })
+        .ok()
+}
+
+fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<BundleSpec> {
+    // Every section is read before any is given up, so that the list of problems is whole.
+    let input: Option<GeneratorInput> = section(keys, "input", problems);
+    let condition: Option<TensorSpec> = section(keys, "condition", problems);
+    let latent: Option<LatentSpec> = section(keys, "latent", problems);
+    let schedule: Option<ScheduleSpec> = section(keys, "schedule", problems);
+    let prediction: Option<Prediction> = section(keys, "prediction", problems);
+    let output: Option<OutputSpec> = section(keys, "output", problems);
+    let shift: Option<ShiftStats> = if keys.contains_key("shift") { section(keys, "shift", problems) } else { None };
+    let defaults: Option<Defaults> = section(keys, "defaults", problems);
+
+    let mut check = |fine: bool, what: &str, hint: &str| {
+        if !fine {
+            problems.add(what, hint);
+        }
+    };
+    if let Some(input) = &input {
+        check(sides(&input.size), "input.size: out of range", SIDES);
+        check(turn(input.rotation_deg), "input.rotation_deg: not supported", TURNS);
+        check(input.mean.iter().all(|m| m.is_finite()), "input.mean: not numbers", "give three numbers");
+        let positive = input.std.iter().all(|&s| s > 0.0 && s.is_finite());
+        check(positive, "input.std: not positive", "give three positive numbers");
+    }
+    if let Some(condition) = &condition {
+        check(sides(&condition.shape), "condition.shape: out of range", SIDES);
+    }
+    if let Some(latent) = &latent {
+        check(sides(&latent.shape), "latent.shape: out of range", SIDES);
+        let usable = latent.scale_factor > 0.0 && latent.scale_factor.is_finite();
+        check(usable, "latent.scale_factor: not positive", "give the factor used in training");
+    }
+    if let Some(output) = &output {
+        check(sides(&output.size), "output.size: out of range", SIDES);
+        check(sides(&output.imprint_size), "output.imprint_size: out of range", SIDES);
+        check(output.range_m.is_valid(), "output.range_m: empty", "give [smallest, largest] depth in metres");
+        check(turn(output.rotation_deg), "output.rotation_deg: not supported", TURNS);
+        check((1..=4).contains(&output.channels), "output.channels: out of range", "1 to 4 channels can be used");
+        let luma = output.reduction != Reduction::Luma || output.channels == 3;
+        check(luma, "output.reduction: luma needs 3 channels", "use \"mean\"");
+    }
+    if let Some(s) = &shift {
+        let finite = [s.pred_mean, s.pred_std, s.gt_mean, s.gt_std].iter().all(|v| v.is_finite());
+        check(finite && s.pred_std >= 0.0 && s.gt_std >= 0.0, "shift: not usable", "give four finite numbers");
+    }
+    let schedule = schedule.and_then(|spec| {
+        let built = spec.build();
+        built.map_err(|err| problems.add(format!("schedule: {err}"), "give the schedule used in training")).ok()
+    });
+    let defaults = defaults.map(|d| GenerateConfig {
+        steps: d.steps,
+        eta: d.eta,
+        seed: d.seed,
+        sampler: d.sampler,
+        spacing: d.spacing,
+    });
+    if let Some(d) = &defaults {
+        if !(0.0..=1.0).contains(&d.eta) {
+            problems.add("defaults.eta: out of range", "choose 0 to 1");
+        }
+        if let (Some(schedule), Some(prediction)) = (&schedule, prediction)
+            && let Err(err) = schedule.steps(d.steps, d.spacing, prediction)
+        {
+            problems.add(format!("defaults: {err}"), "change the steps, the spacing or the schedule");
+        }
+    }
+    Some(BundleSpec::Generator(GeneratorSpec {
+        input: input?,
+        condition: condition?,
+        latent: latent?,
+        schedule: schedule?,
+        prediction: prediction?,
+        output: output?,
+        shift,
+        defaults: defaults?,
+        timestep: TimestepType::Int64,
+    }))
+}
+
+fn mask(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<BundleSpec> {
+    let input: Option<MaskInput> = section(keys, "input", problems);
+    let output: Option<MaskOutput> = section(keys, "output", problems);
+    if let Some(input) = &input {
+        if !sides(&input.size) {
+            problems.add("input.size: out of range", SIDES);
+        }
+        if !input.range_m.is_valid() {
+            problems.add("input.range_m: empty", "give [smallest, largest] depth in metres");
+        }
+        if !turn(input.rotation_deg) {
+            problems.add("input.rotation_deg: not supported", TURNS);
+        }
+    }
+    if let Some(output) = &output {
+        if !(1..=2).contains(&output.classes) {
+            problems.add("output.classes: out of range", "1 (sigmoid) or 2 (softmax)");
+        }
+        if !(output.threshold > 0.0 && output.threshold < 1.0) {
+            problems.add("output.threshold: out of range", "give a probability between 0 and 1");
+        }
+    }
+    Some(BundleSpec::MaskUnet(MaskSpec { input: input?, output: output? }))
+}
+
+const SIDES: &str = "every side must be 1 to 4096";
+const TURNS: &str = "it must be 0 or 180";
+
+fn sides(sides: &[usize]) -> bool {
+    sides.iter().all(|&n| (1..=MAX_SIDE).contains(&n))
+}
+
+fn turn(degrees: u32) -> bool {
+    matches!(degrees, 0 | 180)
+}

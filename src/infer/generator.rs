@@ -1,0 +1,279 @@
+//! [`Generator`]: a GelSlim difference image to a decoder's picture, with the graphs of a bundle.
+
+use std::ops::ControlFlow;
+
+use super::bundle::{Bundle, GeneratorInput, GeneratorSpec, InputScale, Role, TimestepType};
+use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, resolve};
+use super::recipe::Recipe;
+use crate::domain::diffusion::{
+    Denoiser, DiffusionError, GenerateConfig, ModelError, Prediction, Progress, Tensor, sample_seeds,
+};
+use crate::domain::grid::{DepthMap, Grid, RgbGrid};
+use crate::domain::postprocess::{PostprocessError, RawPrediction, ShiftMode};
+use crate::domain::sensor::Finger;
+
+/// Why there is no prediction.
+#[derive(Debug, thiserror::Error)]
+pub enum GenerateError {
+    /// The progress closure asked to stop.
+    #[error("cancelled")]
+    Cancelled,
+    /// The bundle is of another kind.
+    #[error("the bundle \"{0}\" is not a generator; choose one whose manifest says kind \"generator\"")]
+    NotAGenerator(String),
+    /// No engine, or it does not take a graph.
+    #[error(transparent)]
+    Engine(#[from] EngineError),
+    /// The sampler or the denoiser failed.
+    #[error(transparent)]
+    Diffusion(DiffusionError),
+    /// The condition encoder or the decoder failed.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The image has no pixels, or some are not numbers.
+    #[error(
+        "the difference image of {width} x {height} pixels has {bad} values that are not numbers; nothing can be predicted from it"
+    )]
+    BadImage {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// NaN or infinite values.
+        bad: usize,
+    },
+}
+
+/// A generator with its graphs loaded, ready to be used again and again.
+#[derive(Debug)]
+pub struct Generator {
+    spec: GeneratorSpec,
+    hash: String,
+    engine: EngineKind,
+    encoder: Graph,
+    denoiser: Graph,
+    decoder: Graph,
+}
+
+impl Generator {
+    /// Loads the three graphs of a checked bundle.
+    ///
+    /// # Errors
+    /// [`GenerateError::NotAGenerator`] and [`GenerateError::Engine`].
+    pub fn open(bundle: &Bundle, choice: EngineChoice) -> Result<Self, GenerateError> {
+        let not = || GenerateError::NotAGenerator(bundle.name().to_owned());
+        let spec = bundle.generator().ok_or_else(not)?.clone();
+        let engine = resolve(choice)?;
+        let load = |role| -> Result<Graph, GenerateError> {
+            Ok(Graph::load(engine, role, bundle.file(role).ok_or_else(not)?)?)
+        };
+        Ok(Self {
+            encoder: load(Role::ConditionEncoder)?,
+            denoiser: load(Role::Denoiser)?,
+            decoder: load(Role::Decoder)?,
+            hash: bundle.hash().to_owned(),
+            spec,
+            engine,
+        })
+    }
+
+    /// The bundle's description.
+    pub fn spec(&self) -> &GeneratorSpec {
+        &self.spec
+    }
+
+    /// The engine in use.
+    pub fn engine(&self) -> EngineKind {
+        self.engine
+    }
+
+    /// The key of what [`Generator::generate`] returns for `pair` and `finger`.
+    pub fn recipe(&self, pair: &str, finger: Finger, config: &GenerateConfig) -> Recipe {
+        Recipe::new(pair.to_owned(), finger, self.hash.clone(), self.engine, config)
+    }
+
+    /// Predicts what the Soft Bubble feels where the GelSlim felt `difference` (signed, 0..255 scale, any size).
+    ///
+    /// The result is in the decoder's range and orientation; [`Generator::depth`] turns it into metres.
+    /// `progress` is called before each sampling step; `Break` cancels within one step.
+    ///
+    /// # Errors
+    /// See [`GenerateError`].
+    pub fn generate(
+        &mut self,
+        difference: &RgbGrid,
+        config: &GenerateConfig,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<RawPrediction, GenerateError> {
+        let mut one = self.run(&[(difference, config.seed)], config, progress)?;
+        Ok(one.remove(0))
+    }
+
+    /// As [`Generator::generate`] for several images (both fingers, say) in one go, each from the same seed, so that
+    /// each comes out as it would alone (up to rounding inside the engine).
+    ///
+    /// # Errors
+    /// See [`GenerateError`].
+    pub fn generate_batch(
+        &mut self,
+        differences: &[&RgbGrid],
+        config: &GenerateConfig,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Vec<RawPrediction>, GenerateError> {
+        let items: Vec<(&RgbGrid, u64)> = differences.iter().map(|&d| (d, config.seed)).collect();
+        self.run(&items, config, progress)
+    }
+
+    /// Several predictions of one image, one per seed.
+    ///
+    /// # Errors
+    /// See [`GenerateError`].
+    pub fn generate_seeds(
+        &mut self,
+        difference: &RgbGrid,
+        seeds: &[u64],
+        config: &GenerateConfig,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Vec<RawPrediction>, GenerateError> {
+        let items: Vec<(&RgbGrid, u64)> = seeds.iter().map(|&seed| (difference, seed)).collect();
+        self.run(&items, config, progress)
+    }
+
+    /// The depth in metres, in the raw orientation of the lab's bubble files, as the user wants it read.
+    ///
+    /// # Errors
+    /// [`PostprocessError::NoStatistics`] for the paper's shift without statistics.
+    pub fn depth(&self, raw: &RawPrediction, mode: ShiftMode) -> Result<DepthMap, PostprocessError> {
+        self.spec.depth_chain(mode)?.run(raw)
+    }
+
+    fn run(
+        &mut self,
+        items: &[(&RgbGrid, u64)],
+        config: &GenerateConfig,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<Vec<RawPrediction>, GenerateError> {
+        if items.is_empty() {
+            return Ok(Vec::new());
+        }
+        let spec = &self.spec;
+        let with_batch =
+            |shape: &[usize]| std::iter::once(items.len()).chain(shape.iter().copied()).collect::<Vec<_>>();
+        let images = items.iter().map(|(image, _)| prepare(image, &spec.input)).collect::<Result<Vec<_>, _>>()?;
+        let images = Tensor::stack(&images).expect("prepared images have one shape and there is at least one");
+
+        let condition =
+            self.encoder.run(&[("gelslim", Input::F32(&images))], "condition", &with_batch(&spec.condition.shape))?;
+        let seeds: Vec<u64> = items.iter().map(|&(_, seed)| seed).collect();
+        let mut denoiser = BundleDenoiser { graph: &mut self.denoiser, spec };
+        let latent = sample_seeds(&mut denoiser, &spec.schedule, config, &seeds, &condition, progress);
+        let mut latent = latent.map_err(|err| match err {
+            DiffusionError::Cancelled => GenerateError::Cancelled,
+            DiffusionError::Model(err) => GenerateError::Model(err),
+            err => GenerateError::Diffusion(err),
+        })?;
+
+        let scale = spec.latent.scale_factor;
+        latent.data_mut().iter_mut().for_each(|v| *v = (f64::from(*v) / scale) as f32);
+        let [width, height] = spec.output.size;
+        let channels = spec.output.channels;
+        let shape = with_batch(&[channels, height, width]);
+        let pictures = self.decoder.run(&[("latent", Input::F32(&latent))], "image", &shape)?;
+        let planes: Vec<Grid<f32>> = pictures
+            .data()
+            .chunks_exact(width * height)
+            .map(|plane| Grid::from_vec(width, height, plane.to_vec()).expect("the chunks have this length"))
+            .collect();
+        Ok(planes.chunks_exact(channels).map(|channels| RawPrediction { channels: channels.to_vec() }).collect())
+    }
+}
+
+/// The denoiser's graph, as the sampler wants it.
+struct BundleDenoiser<'a> {
+    graph: &'a mut Graph,
+    spec: &'a GeneratorSpec,
+}
+
+impl Denoiser for BundleDenoiser<'_> {
+    fn predict(&mut self, latent: &Tensor, timestep: u32, condition: &Tensor) -> Result<Tensor, ModelError> {
+        let batch = latent.batch();
+        let whole = vec![i64::from(timestep); batch];
+        let float = Tensor::filled(vec![batch], timestep as f32);
+        let timestep = match self.spec.timestep {
+            TimestepType::Int64 => Input::I64(&whole),
+            TimestepType::Float32 => Input::F32(&float),
+        };
+        let inputs = [("latent", Input::F32(latent)), ("timestep", timestep), ("condition", Input::F32(condition))];
+        self.graph.run(&inputs, "prediction", latent.shape())
+    }
+
+    fn prediction(&self) -> Prediction {
+        self.spec.prediction
+    }
+
+    fn latent_shape(&self) -> Vec<usize> {
+        self.spec.latent.shape.to_vec()
+    }
+}
+
+/// The difference image as the condition encoder wants it: scaled, resized, normalised, turned; `[3, height, width]`.
+///
+/// # Errors
+/// [`GenerateError::BadImage`] for an image without pixels or with values that are not numbers.
+pub fn prepare(difference: &RgbGrid, input: &GeneratorInput) -> Result<Tensor, GenerateError> {
+    let bad = difference.as_slice().iter().flatten().filter(|v| !v.is_finite()).count();
+    if bad > 0 || difference.is_empty() {
+        return Err(GenerateError::BadImage { width: difference.width(), height: difference.height(), bad });
+    }
+    let scale = match input.scale {
+        InputScale::Unit => 1.0 / 255.0,
+        InputScale::Byte => 1.0,
+    };
+    let [width, height] = input.size;
+    let resized = input.resampling.resize_rgb(difference, width, height);
+    let turned = if input.rotation_deg == 180 { resized.rotated_180() } else { resized };
+    let plane = |c: usize| {
+        let normalise = move |p: &[f32; 3]| ((f64::from(p[c]) * scale - input.mean[c]) / input.std[c]) as f32;
+        turned.as_slice().iter().map(normalise).collect::<Vec<f32>>()
+    };
+    let data = (0..3).flat_map(plane).collect();
+    Ok(Tensor::new(vec![3, height, width], data).expect("three planes of this size"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::resample::Resampling;
+    use crate::infer::bundle::GelslimSensor;
+
+    fn input(scale: InputScale, rotation_deg: u32) -> GeneratorInput {
+        GeneratorInput {
+            sensor: GelslimSensor::Gelslim,
+            size: [2, 2],
+            scale,
+            mean: [0.1, 0.0, -0.1],
+            std: [0.5, 1.0, 2.0],
+            resampling: Resampling::Bilinear,
+            rotation_deg,
+        }
+    }
+
+    #[test]
+    fn the_image_is_scaled_normalised_and_turned() {
+        let image = Grid::from_vec(2, 2, vec![[51.0, 0.0, 0.0], [0.0; 3], [0.0; 3], [0.0, 255.0, 0.0]]).unwrap();
+        let unit = prepare(&image, &input(InputScale::Unit, 0)).unwrap();
+        assert_eq!(unit.shape(), [3, 2, 2]);
+        assert!((unit.data()[0] - 0.2).abs() < 1e-6 && (unit.data()[1] + 0.2).abs() < 1e-6);
+        assert!((unit.data()[7] - 1.0).abs() < 1e-6 && (unit.data()[8] - 0.05).abs() < 1e-6);
+        let byte = prepare(&image, &input(InputScale::Byte, 180)).unwrap();
+        assert!((byte.data()[3] - 101.8).abs() < 1e-4 && (byte.data()[4] - 255.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn an_image_that_is_no_image_is_an_error() {
+        let bad = Grid::filled(3, 2, [0.0, f32::NAN, 0.0]);
+        assert!(matches!(prepare(&bad, &input(InputScale::Unit, 0)), Err(GenerateError::BadImage { bad: 6, .. })));
+        let empty = Grid::from_vec(0, 0, vec![]).unwrap();
+        assert!(prepare(&empty, &input(InputScale::Unit, 0)).is_err());
+    }
+}
