@@ -87,7 +87,8 @@ pub(super) fn load(bytes: &[u8]) -> Result<OnnxRuntimeSession, String> {
         OrtSession::builder(&environment)?
             .with_intra_threads(threads())?
             .with_intra_op_spinning(false)?
-            .with_log_level(ort::logging::LogLevel::Error)?
+            // Its errors come back as results; standard error is for our own words.
+            .with_log_level(ort::logging::LogLevel::Fatal)?
             .commit_from_memory(bytes)
     };
     Ok(OnnxRuntimeSession { session: build().map_err(|err| err.to_string())? })
