@@ -220,6 +220,9 @@ pub struct StageRecord {
     pub note: Option<String>,
 }
 
+/// Is told of each stage: its name, the image after it, and a note.
+type Recorder<'a> = dyn FnMut(&'static str, &Grid<f32>, Option<String>) + 'a;
+
 impl DepthChain {
     /// The chain with the shift of `mode`.
     ///
@@ -255,11 +258,7 @@ impl DepthChain {
         Ok((depth, ledger))
     }
 
-    fn walk(
-        &self,
-        raw: &RawPrediction,
-        record: &mut dyn FnMut(&'static str, &Grid<f32>, Option<String>),
-    ) -> Result<DepthMap, PostprocessError> {
+    fn walk(&self, raw: &RawPrediction, record: &mut Recorder<'_>) -> Result<DepthMap, PostprocessError> {
         let DepthRange { min_m, max_m } = self.range;
         if !self.range.is_valid() {
             return Err(PostprocessError::Range { min_m, max_m });

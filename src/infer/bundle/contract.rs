@@ -60,7 +60,8 @@ fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<Promise>, Vec<Promise>
             let [width, height] = input.size;
             Some((vec![float("imprint", [1, height, width])], vec![float("logits", [output.classes, height, width])]))
         }
-        (_, BundleSpec::Generator(GeneratorSpec { input, condition, latent, output, .. })) => {
+        (_, BundleSpec::Generator(spec)) => {
+            let GeneratorSpec { input, condition, latent, output, .. } = &**spec;
             let [width, height] = input.size;
             let latent = || float("latent", latent.shape);
             match role {

@@ -32,7 +32,7 @@ pub struct FileEntry {
 #[derive(Clone, Debug, PartialEq)]
 pub enum BundleSpec {
     /// GelSlim difference to Soft Bubble imprint.
-    Generator(GeneratorSpec),
+    Generator(Box<GeneratorSpec>),
     /// Imprint to contact mask.
     MaskUnet(MaskSpec),
 }
@@ -440,7 +440,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
             problems.add(format!("defaults: {err}"), "change the steps, the spacing or the schedule");
         }
     }
-    Some(BundleSpec::Generator(GeneratorSpec {
+    Some(BundleSpec::Generator(Box::new(GeneratorSpec {
         input: input?,
         condition: condition?,
         latent: latent?,
@@ -450,7 +450,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         shift,
         defaults: defaults?,
         timestep: TimestepType::Int64,
-    }))
+    })))
 }
 
 fn mask(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<BundleSpec> {
