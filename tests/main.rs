@@ -1,5 +1,7 @@
 //! The one integration binary (see ARCHITECTURE.md): each level of test is a module.
 
+#![allow(clippy::unwrap_used, clippy::print_stderr, reason = "a test may stop anywhere, and says what it left out")]
+
 #[allow(dead_code, reason = "not every feature set uses every helper")]
 mod support;
 
