@@ -1,0 +1,128 @@
+"""The training data: folders ("shards") of .npy files written by `examples/training_data.rs`, memory-mapped.
+
+gelslim.npy  (M,3,128,128) i16  difference image in 1/64 grey levels, resized bilinearly without antialias
+imprint.npy  (M,140,175)   i16  measured imprint in micrometres, raw orientation; -32768 = no measurement
+clean.npy    (M,140,175)   i16  the same without camera noise
+contact.npy  (M,140,175)   u8   1 where the membrane lies on the tool
+meta.npy     (M,8)         f32  grasp, finger, theta, x, y, tool (-1 = random), nominal sensor, unseen tool
+"""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+
+# Standardisation of the difference image on the 0..1 scale: the lab's published statistics of its GelSlim data.
+MEAN = (-0.0107, -0.0063, -0.0087)
+STD = (0.0687, 0.0428, 0.0576)
+# Range of the imprint that [-1, 1] stands for: the extremes of the lab's training data.
+RANGE_M = (-0.0188, 0.0264)
+# Range of the mask UNet's 8-bit input.
+MASK_RANGE_M = (-0.0116, 0.0225)
+
+
+class Shards:
+    """All shards under one folder as one list of samples. `refresh` picks up shards added meanwhile."""
+
+    def __init__(self, folder):
+        self.folder, self.names, self.parts = Path(folder), [], []
+        self.refresh()
+        if not self.parts:
+            raise SystemExit(f"no shards in {folder}: write some with the training_data example (see README.md)")
+
+    def refresh(self):
+        for path in sorted(self.folder.glob("*/done.json")):
+            if path.parent.name not in self.names:
+                self.names.append(path.parent.name)
+                self.parts.append({f.stem: np.load(f, mmap_mode="r") for f in path.parent.glob("*.npy")})
+        self.sizes = [len(p["meta"]) for p in self.parts]
+        self.starts = np.concatenate([[0], np.cumsum(self.sizes)]).astype(int)
+        self.meta = np.concatenate([p["meta"] for p in self.parts]) if self.parts else np.zeros((0, 8), np.float32)
+
+    def __len__(self):
+        return int(self.starts[-1])
+
+    def take(self, key, indices):
+        out = []
+        for i in indices:
+            part = int(np.searchsorted(self.starts, i, side="right")) - 1
+            out.append(self.parts[part][key][i - self.starts[part]])
+        return torch.from_numpy(np.stack(out))
+
+    def gelslim(self, indices):
+        """Standardised differences (N,3,128,128)."""
+        x = self.take("gelslim", indices).float() / (64 * 255)
+        return (x - torch.tensor(MEAN)[:, None, None]) / torch.tensor(STD)[:, None, None]
+
+    def metres(self, key, indices):
+        """`imprint` or `clean` in metres (N,1,140,175), raw orientation; missing pixels from the clean image."""
+        raw = self.take(key, indices)
+        if key == "imprint":
+            missing = raw == -32768
+            if missing.any():
+                raw = torch.where(missing, self.take("clean", indices), raw)
+        return raw.float()[:, None] * 1e-6
+
+    def contact(self, indices):
+        return self.take("contact", indices).long()
+
+    def record(self):
+        """What provenance says about the data: every shard's own description."""
+        return [json.loads((self.folder / n / "done.json").read_text()) for n in self.names]
+
+
+def to_model(metres):
+    """Imprint in metres, raw orientation, to the generator's image: rotated by 180 degrees, 128 x 128, [-1,1]."""
+    image = F.interpolate(torch.flip(metres, dims=(2, 3)), size=(128, 128), mode="bilinear", align_corners=False)
+    return ((image - RANGE_M[0]) / (RANGE_M[1] - RANGE_M[0]) * 2 - 1).clamp(-1, 1)
+
+
+def from_model(image):
+    """The inverse of `to_model`, up to resampling: (N,1,140,175) metres in the raw orientation."""
+    metres = (image.clamp(-1, 1) + 1) / 2 * (RANGE_M[1] - RANGE_M[0]) + RANGE_M[0]
+    return torch.flip(F.interpolate(metres, size=(140, 175), mode="bilinear", align_corners=False), dims=(2, 3))
+
+
+def to_mask_input(metres):
+    """Imprint in metres to the mask UNet's 8-bit input in [0,1]: saturating, truncated."""
+    unit = (metres - MASK_RANGE_M[0]) / (MASK_RANGE_M[1] - MASK_RANGE_M[0])
+    return torch.floor(unit.clamp(0, 1) * 255) / 255
+
+
+def dihedral(image, k):
+    """One of the 8 symmetries of the square, k in 0..8, the same for both images of a pair."""
+    image = torch.rot90(image, k % 4, dims=(-2, -1))
+    return torch.flip(image, dims=(-1,)) if k >= 4 else image
+
+
+def augment_gelslim(x, randomised, rng):
+    """Sensor variety for standardised differences (N,3,128,128): strong where `randomised` (N,) is true.
+
+    Mixed colours, gain, uneven light, blur and noise; and now and then the negative half cut off, as the lab's
+    own colour jitter does to the images that it feeds to its networks.
+    """
+    n = x.shape[0]
+    strong = randomised.float()[:, None, None, None]
+
+    def uniform(lo, hi, *shape):
+        return torch.from_numpy(rng.uniform(lo, hi, shape).astype(np.float32))
+
+    def normal(*shape):
+        return torch.from_numpy(rng.standard_normal(shape, dtype=np.float32))
+
+    mix = torch.eye(3) + strong[:, :, :, 0] * 0.2 * normal(n, 3, 3)
+    x = torch.einsum("nij,njhw->nihw", mix, x)
+    x = x * torch.exp(strong * 0.4 * normal(n, 3, 1, 1))
+    x = x + F.interpolate(strong * 0.15 * normal(n, 3, 3, 3), size=x.shape[-2:], mode="bicubic", align_corners=True)
+    blurred = F.avg_pool2d(F.pad(x, (1, 1, 1, 1), mode="replicate"), 3, stride=1)
+    x = torch.lerp(x, blurred, uniform(0, 1, n, 1, 1, 1) * (0.3 + 0.7 * strong))
+    x = x + uniform(0, 0.06, n, 1, 1, 1) * (1 + 3 * strong) * normal(*x.shape)
+    cut = torch.from_numpy(rng.random(n) < 0.3)[:, None, None, None] & (strong > 0)
+    return torch.where(cut, (x * 2.5).clamp(0, 1) / 2.5, x)
+
+
+def sha256(path):
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
