@@ -50,7 +50,7 @@ class Run:
         """One optimiser step; warm-up, then constant, then a cosine fall over the last 60 percent."""
         p = self.progress()
         fall = min(max((p - 0.4) / 0.6, 0), 1)
-        lr = self.rate * min(1, (self.step + 1) / 200) * (0.02 + 0.98 * (1 + np.cos(np.pi * fall)) / 2)
+        lr = float(self.rate * min(1, (self.step + 1) / 200) * (0.02 + 0.98 * (1 + np.cos(np.pi * fall)) / 2))
         for group in self.optimiser.param_groups:
             group["lr"] = lr
         self.optimiser.zero_grad()
@@ -59,8 +59,8 @@ class Run:
         self.optimiser.step()
         self.step += 1
         self.samples += count
-        for key, value in figures.items():
-            self.means[key] = 0.98 * self.means.get(key, float(value)) + 0.02 * float(value)
+        for key, value in ((k, float(v.detach())) for k, v in figures.items()):
+            self.means[key] = 0.98 * self.means.get(key, value) + 0.02 * value
         now = time.monotonic()
         if now - self.logged > 20:
             self.logged = now

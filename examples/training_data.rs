@@ -1,0 +1,171 @@
+//! Writes one shard of training data for the Python package in `training/`.
+//!
+//! `cargo run --release --no-default-features --example training_data -- OUT N SEED [train|unseen|seen]`
+//! writes `N` grasps, both fingers each, to the new folder `OUT`: `gelslim.npy`, `imprint.npy`, `clean.npy`,
+//! `contact.npy`, `meta.npy` (described in `training/data.py`) and, last of all, `done.json`.
+//! `train`: 60 % the nine seen tools, 40 % random tools, half of it with randomised sensors. `seen` and `unseen`:
+//! those tools with the nominal sensors, for validation. The three unseen tools are never in `train`.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use touch2touch::domain::grid::DepthMap;
+use touch2touch::domain::resample;
+use touch2touch::domain::sensor::{Finger, bubble};
+use touch2touch::domain::sim::{self, SimConfig};
+
+/// Side of the resized GelSlim image, pixels.
+const SIDE: usize = 128;
+/// Steps per grey level in which the difference image is stored.
+const STEPS_PER_LEVEL: f32 = 64.0;
+/// Grasps simulated at a time.
+const CHUNK: usize = 64;
+/// Numbers per sample in `meta.npy`.
+const META: usize = 8;
+
+/// Where the grasps of a shard come from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mix {
+    Train,
+    Seen,
+    Unseen,
+}
+
+/// One finger's part of a grasp, as it is stored.
+struct Record {
+    gelslim: Vec<i16>,
+    imprint: Vec<i16>,
+    clean: Vec<i16>,
+    contact: Vec<u8>,
+    meta: [f32; META],
+}
+
+/// A `.npy` file (version 1.0, little endian, C order) whose length is known beforehand.
+struct Npy(BufWriter<File>);
+
+impl Npy {
+    fn create(folder: &Path, name: &str, kind: &str, shape: &[usize]) -> Result<Self> {
+        let path = folder.join(name);
+        let mut file = BufWriter::new(File::create(&path).with_context(|| format!("cannot write {}", path.display()))?);
+        let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
+        let text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({},), }}", shape.join(", "));
+        let padded = (10 + text.len() + 1).next_multiple_of(64) - 10;
+        let length = u16::try_from(padded).context("header too long")?;
+        file.write_all(b"\x93NUMPY\x01\x00")?;
+        file.write_all(&length.to_le_bytes())?;
+        writeln!(file, "{text:<width$}", width = padded - 1)?;
+        Ok(Self(file))
+    }
+
+    fn i16s(&mut self, values: &[i16]) -> Result<()> {
+        values.iter().try_for_each(|v| self.0.write_all(&v.to_le_bytes()))?;
+        Ok(())
+    }
+}
+
+/// Metres to whole micrometres; no measurement becomes `i16::MIN`.
+fn micrometres(depth: &DepthMap) -> Vec<i16> {
+    depth.as_slice().iter().map(|z| if z.is_nan() { i16::MIN } else { (z * 1e6).round().clamp(-32767.0, 32767.0) as i16 }).collect()
+}
+
+/// Simulates grasp `index` of the shard; both fingers.
+fn grasp(index: u64, seed: u64, mix: Mix) -> Result<Vec<Record>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(index));
+    let pick = |rng: &mut ChaCha8Rng, seen: bool| {
+        let tools: Vec<usize> = (0..sim::tools().len()).filter(|&i| sim::tools()[i].seen == seen).collect();
+        tools[rng.random_range(0..tools.len())]
+    };
+    let random = mix == Mix::Train && rng.random_bool(0.4);
+    let number = if random { None } else { Some(pick(&mut rng, mix != Mix::Unseen)) };
+    let invented;
+    let tool = match number {
+        Some(i) => &sim::tools()[i],
+        None => {
+            invented = sim::random_tool(rng.random());
+            &invented
+        }
+    };
+    let nominal = mix != Mix::Train || rng.random_bool(0.5);
+    let config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
+    let grasp = sim::random_grasp(rng.random());
+    let sample = sim::simulate(tool, grasp, rng.random(), &config);
+    Finger::BOTH
+        .iter()
+        .map(|&finger| {
+            let touch = sample.finger(finger).context("the simulator left a finger out")?;
+            let gelslim = touch.gelslim.as_ref().context("no GelSlim image")?;
+            let imprint = touch.bubble.as_ref().context("no bubble image")?;
+            let truth = imprint.truth.as_ref().context("no truth")?;
+            ensure!(imprint.imprint.size() == [bubble::WIDTH, bubble::HEIGHT], "unexpected bubble size");
+            let small = resample::bilinear_rgb(&gelslim.difference, SIDE, SIDE);
+            let planes = (0..3).flat_map(|c| small.as_slice().iter().map(move |p| (p[c] * STEPS_PER_LEVEL).round() as i16));
+            let tool_number = number.map_or(-1.0, |i| i as f32);
+            Ok(Record {
+                gelslim: planes.collect(),
+                imprint: micrometres(&imprint.imprint),
+                clean: micrometres(&truth.imprint),
+                contact: truth.contact.as_slice().iter().map(|&c| u8::from(c)).collect(),
+                meta: [
+                    index as f32,
+                    finger.index() as f32,
+                    grasp.theta_rad as f32,
+                    grasp.x_m as f32,
+                    grasp.y_m as f32,
+                    tool_number,
+                    f32::from(u8::from(nominal)),
+                    f32::from(u8::from(mix == Mix::Unseen)),
+                ],
+            })
+        })
+        .collect()
+}
+
+fn main() -> Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    ensure!(matches!(arguments.len(), 3 | 4), "usage: training_data OUT N SEED [train|seen|unseen]");
+    let folder = Path::new(&arguments[0]);
+    let grasps: usize = arguments[1].parse().context("N must be a whole number")?;
+    let seed: u64 = arguments[2].parse().context("SEED must be a whole number")?;
+    let mix_name = arguments.get(3).map_or("train", String::as_str);
+    let mix = match mix_name {
+        "train" => Mix::Train,
+        "seen" => Mix::Seen,
+        "unseen" => Mix::Unseen,
+        other => anyhow::bail!("unknown mix {other:?}: use train, seen or unseen"),
+    };
+    ensure!(!folder.join("done.json").exists(), "{} is already written", folder.display());
+    std::fs::create_dir_all(folder)?;
+
+    let samples = 2 * grasps;
+    let image = [samples, bubble::HEIGHT, bubble::WIDTH];
+    let mut gelslim = Npy::create(folder, "gelslim.npy", "<i2", &[samples, 3, SIDE, SIDE])?;
+    let mut imprint = Npy::create(folder, "imprint.npy", "<i2", &image)?;
+    let mut clean = Npy::create(folder, "clean.npy", "<i2", &image)?;
+    let mut contact = Npy::create(folder, "contact.npy", "|u1", &image)?;
+    let mut meta = Npy::create(folder, "meta.npy", "<f4", &[samples, META])?;
+    let bar = indicatif::ProgressBar::new(grasps as u64);
+    for start in (0..grasps).step_by(CHUNK) {
+        let end = grasps.min(start + CHUNK);
+        let chunk: Vec<Vec<Record>> =
+            (start..end).into_par_iter().map(|i| grasp(i as u64, seed, mix)).collect::<Result<_>>()?;
+        for record in chunk.iter().flatten() {
+            gelslim.i16s(&record.gelslim)?;
+            imprint.i16s(&record.imprint)?;
+            clean.i16s(&record.clean)?;
+            contact.0.write_all(&record.contact)?;
+            record.meta.iter().try_for_each(|v| meta.0.write_all(&v.to_le_bytes()))?;
+        }
+        bar.inc((end - start) as u64);
+    }
+    for mut file in [gelslim, imprint, clean, contact, meta] {
+        file.0.flush()?;
+    }
+    let done = serde_json::json!({ "mix": mix_name, "grasps": grasps, "samples": samples, "seed": seed });
+    std::fs::write(folder.join("done.json"), done.to_string())?;
+    Ok(())
+}
