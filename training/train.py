@@ -50,7 +50,7 @@ class Run:
         """One optimiser step; warm-up, then constant, then a cosine fall over the last 60 percent."""
         p = self.progress()
         fall = min(max((p - 0.4) / 0.6, 0), 1)
-        lr = float(self.rate * min(1, (self.step + 1) / 200) * (0.02 + 0.98 * (1 + np.cos(np.pi * fall)) / 2))
+        lr = float(self.rate * min(1, (self.step + 1) / 100) * (0.02 + 0.98 * (1 + np.cos(np.pi * fall)) / 2))
         for group in self.optimiser.param_groups:
             group["lr"] = lr
         self.optimiser.zero_grad()
