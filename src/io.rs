@@ -4,7 +4,11 @@
 
 pub mod atomic;
 pub mod dataset;
+pub mod doctor;
+pub mod export_unet;
 pub mod images;
 pub mod masks;
+pub mod npz;
 pub mod pt;
+pub mod simulated;
 pub mod stl;

@@ -124,6 +124,26 @@ pub struct Loaded {
     pub sample: Sample,
     /// What is odd: values that are not numbers, missing keys that the sample can do without, halves that disagree.
     pub notes: Vec<Problem>,
+    /// Pixels of each finger's imprint that are no measurement; they are NaN in the sample.
+    pub invalid: [InvalidPixels; 2],
+}
+
+/// Why pixels of an imprint are no measurement.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct InvalidPixels {
+    /// NaN in the file.
+    pub nan: usize,
+    /// Infinite in the file.
+    pub infinite: usize,
+    /// At depth 0, which is how a depth camera says "nothing measured".
+    pub dropped: usize,
+}
+
+impl InvalidPixels {
+    /// All of them.
+    pub fn total(self) -> usize {
+        self.nan + self.infinite + self.dropped
+    }
 }
 
 /// An opened source of paired touches.

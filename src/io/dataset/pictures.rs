@@ -155,7 +155,7 @@ impl Pictures {
             touch.bubble = Some(BubbleTouch { imprint: imprint_from_tile(&tile), camera: None, truth: None });
         }
         let sample = Sample { fingers: [Some(touch), None], grasp_from_object: None, scale: Scale::Assumed };
-        Ok(Loaded { sample, notes })
+        Ok(Loaded { sample, notes, invalid: Default::default() })
     }
 }
 

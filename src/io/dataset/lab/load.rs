@@ -9,7 +9,7 @@ use crate::domain::frames::{PlanarPose, affine_from_xyz_quat};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, GelSlimTouch, Sample, Scale};
 use crate::domain::sensor::{Finger, Intrinsics, bubble, gelslim};
-use crate::io::dataset::{LoadError, Loaded, problem};
+use crate::io::dataset::{InvalidPixels, LoadError, Loaded, problem};
 use crate::io::pt::{PtDict, PtError, read_dict};
 
 const BUBBLE_SHAPE: [usize; 4] = [2, 1, bubble::HEIGHT, bubble::WIDTH];
@@ -22,11 +22,12 @@ const SAME_POSE: f64 = 1e-5;
 /// Loads one pair; either half may be absent.
 pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> Result<Loaded, LoadError> {
     let mut notes = Vec::new();
+    let mut invalid = [InvalidPixels::default(); 2];
     let mut fingers = [FingerTouch::default(), FingerTouch::default()];
     let mut poses: Vec<(&Path, [f64; 3])> = Vec::new();
     if let Some(path) = bubble_file {
         let dict = read_dict(path)?;
-        for (finger, touch) in fingers.iter_mut().zip(bubble_touches(&dict, &mut notes)?) {
+        for (finger, touch) in fingers.iter_mut().zip(bubble_touches(&dict, &mut notes, &mut invalid)?) {
             finger.bubble = Some(touch);
         }
         poses.extend(pose(&dict, &mut notes)?.map(|p| (path, p)));
@@ -52,7 +53,8 @@ pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> R
     }
     let grasp_from_object =
         poses.first().map(|(_, [theta, x, y])| PlanarPose::object_from_grasp_of_lab(*theta, *x, *y).inverse());
-    Ok(Loaded { sample: Sample { fingers: fingers.map(Some), grasp_from_object, scale: Scale::Measured }, notes })
+    let sample = Sample { fingers: fingers.map(Some), grasp_from_object, scale: Scale::Measured };
+    Ok(Loaded { sample, notes, invalid })
 }
 
 /// A value that the sample can do without: absent is a note, wrong is an error.
@@ -99,7 +101,11 @@ fn depth_map(values: &[f32]) -> DepthMap {
     Grid::from_vec(bubble::WIDTH, bubble::HEIGHT, values.to_vec()).expect("the shape was checked")
 }
 
-fn bubble_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[BubbleTouch; 2], PtError> {
+fn bubble_touches(
+    dict: &PtDict,
+    notes: &mut Vec<Problem>,
+    invalid: &mut [InvalidPixels; 2],
+) -> Result<[BubbleTouch; 2], PtError> {
     let imprint = dict.f32s("bubble_imprint", &[&BUBBLE_SHAPE])?;
     let without = "points cannot be lifted to the grasp frame";
     let reference = optional(dict, dict.f32s("bubble_depth_ref", &[&BUBBLE_SHAPE]), without, notes)?;
@@ -114,7 +120,16 @@ fn bubble_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[BubbleTouc
         let index = finger.index();
         let mut map = depth_map(halves(&imprint)[index]);
         let reference = reference.as_ref().map(|r| depth_map(halves(r)[index]));
-        invalid_to_nan(dict, finger, &mut map, reference.as_ref(), notes);
+        invalid[index] = invalid_to_nan(&mut map, reference.as_ref());
+        let bad = reference.as_ref().map_or(0, |r| r.as_slice().iter().filter(|v| !v.is_finite()).count());
+        if bad > 0 {
+            let percent = 100.0 * bad as f64 / map.len() as f64;
+            let what = format!(
+                "key \"bubble_depth_ref\", {} finger: {bad} pixels ({percent:.2} %) are NaN or infinite",
+                finger.name()
+            );
+            notes.push(problem(dict.file(), what, "these pixels are left out of every cloud"));
+        }
         let camera = match (reference, cameras[index]) {
             (Some(depth_reference), Some((intrinsics, grasp_from_camera))) => {
                 Some(BubbleCamera { depth_reference, intrinsics, grasp_from_camera })
@@ -131,42 +146,21 @@ fn bubble_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[BubbleTouc
 }
 
 /// Everything that is no measurement becomes NaN, and is counted.
-fn invalid_to_nan(
-    dict: &PtDict,
-    finger: Finger,
-    imprint: &mut DepthMap,
-    reference: Option<&DepthMap>,
-    notes: &mut Vec<Problem>,
-) {
-    let (mut nan, mut infinite, mut dropped) = (0usize, 0usize, 0usize);
+fn invalid_to_nan(imprint: &mut DepthMap, reference: Option<&DepthMap>) -> InvalidPixels {
+    let mut invalid = InvalidPixels::default();
     for (i, value) in imprint.as_mut_slice().iter_mut().enumerate() {
         if value.is_nan() {
-            nan += 1;
+            invalid.nan += 1;
         } else if value.is_infinite() {
-            infinite += 1;
-            *value = f32::NAN;
+            invalid.infinite += 1;
         } else if reference.is_some_and(|r| (r.as_slice()[i] - *value).abs() < NO_DEPTH_M) {
-            dropped += 1;
-            *value = f32::NAN;
+            invalid.dropped += 1;
+        } else {
+            continue;
         }
+        *value = f32::NAN;
     }
-    let percent = |n: usize| 100.0 * n as f64 / imprint.len() as f64;
-    let name = finger.name();
-    for (count, what) in [(nan, "NaN"), (infinite, "infinite"), (dropped, "at depth 0, which means not measured")] {
-        if count > 0 {
-            let what =
-                format!("key \"bubble_imprint\", {name} finger: {count} pixels ({:.2} %) are {what}", percent(count));
-            notes.push(problem(dict.file(), what, "these pixels are left out everywhere"));
-        }
-    }
-    let bad = reference.map_or(0, |r| r.as_slice().iter().filter(|v| !v.is_finite()).count());
-    if bad > 0 {
-        let what = format!(
-            "key \"bubble_depth_ref\", {name} finger: {bad} pixels ({:.2} %) are NaN or infinite",
-            percent(bad)
-        );
-        notes.push(problem(dict.file(), what, "these pixels are left out of every cloud"));
-    }
+    invalid
 }
 
 type Camera = (Intrinsics, DAffine3);

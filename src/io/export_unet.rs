@@ -1,0 +1,298 @@
+//! Masks for UNet training: `{train,val,test}/{imgs,masks}/<stem>.png`, as the lab's loader takes them.
+//!
+//! * image: 8-bit grey, `(imprint + 0.0116) / 0.0341 * 255`, cut to whole numbers, limited to 0..255;
+//! * mask: 8-bit grey, 0 and 255;
+//! * per image exactly one mask of the same stem and size, nothing else in the folders.
+//!
+//! Source: `utils/data_loading.py` lines 22-30, 111-126 and 253-296 of the lab's UNet repository, and
+//! `ICP_dataset_cal.py` lines 641-676 for the scale.
+
+mod check;
+mod split;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::Digest as _;
+
+use super::images::{self, PictureError};
+use crate::domain::dataset::Problem;
+use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::sensor::Finger;
+
+pub use check::{CheckReport, check_folder};
+
+/// The imprint that becomes 0, metres.
+pub const IMAGE_LO_M: f64 = -0.0116;
+/// The imprint that becomes 255, metres.
+pub const IMAGE_HI_M: f64 = 0.0225;
+/// Names of the parts, in the order of [`ExportReport::counts`].
+pub const PARTS: [&str; 3] = ["train", "val", "test"];
+/// The file that marks a folder as a previous export and lists what it wrote.
+pub const MANIFEST: &str = "touch2touch_export.json";
+
+/// Why nothing was exported. The folder is then as it was.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The disk refuses.
+    #[error("cannot {what} ({}): {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What was tried.
+        what: &'static str,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// A picture cannot be written or read again.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// The folder holds something else.
+    #[error("the folder is not empty and not a previous export: it holds {found} ({})", folder.display())]
+    NotOurs {
+        /// The folder.
+        folder: PathBuf,
+        /// The first foreign entry.
+        found: String,
+    },
+    /// Nothing to export.
+    #[error("there is no mask to export")]
+    Nothing,
+    /// A mask whose size is not the imprint's.
+    #[error("the mask of {stem} has {mask:?} pixels, its imprint {imprint:?}")]
+    Size {
+        /// The stem.
+        stem: String,
+        /// The mask's size.
+        mask: [usize; 2],
+        /// The imprint's size.
+        imprint: [usize; 2],
+    },
+    /// An imprint or mask that could not be fetched.
+    #[error("{name} cannot be exported: {reason}")]
+    Source {
+        /// The pair and finger.
+        name: String,
+        /// Why.
+        reason: String,
+    },
+    /// Shares that are not shares.
+    #[error("shares of validation {val} and test {test} must be at least 0 and below 1 together")]
+    Shares {
+        /// Validation.
+        val: f64,
+        /// Test.
+        test: f64,
+    },
+    /// What was written is not what the loader accepts or not what was meant.
+    #[error("the written folder failed its check: {}", problems.first().map_or("", |p| p.what.as_str()))]
+    Check {
+        /// All mismatches.
+        problems: Vec<Problem>,
+    },
+}
+
+/// One mask to export.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ExportEntry {
+    /// The pair's name; both fingers of a pair land in the same part.
+    pub pair: String,
+    /// The tool, where known: the loader filters by it as a part of the stem.
+    pub tool: Option<String>,
+    /// The finger.
+    pub finger: Finger,
+}
+
+/// How to divide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExportConfig {
+    /// Decides which pair lands where; the same seed and pairs give the same parts.
+    pub seed: u64,
+    /// Share of pairs for validation.
+    pub val: f64,
+    /// Share of pairs for test.
+    pub test: f64,
+    /// Tools whose pairs all go to test (unseen tools).
+    pub test_tools: Vec<String>,
+}
+
+impl Default for ExportConfig {
+    fn default() -> Self {
+        Self { seed: 0, val: 0.1, test: 0.1, test_tools: Vec::new() }
+    }
+}
+
+/// What was exported.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ExportReport {
+    /// Images in train, val and test.
+    pub counts: [usize; 3],
+    /// Pixels below or above the range of the image; they were limited to it.
+    pub out_of_range_px: usize,
+    /// Pixels without measurement; they were written as an imprint of 0.
+    pub unmeasured_px: usize,
+    /// Parts without any image: the lab's trainer refuses those.
+    pub empty_parts: Vec<&'static str>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Manifest {
+    format: String,
+    version: u32,
+    seed: u64,
+    /// Relative path to the SHA-256 of the file.
+    files: BTreeMap<String, String>,
+}
+
+const FORMAT: &str = "touch2touch-unet-export";
+
+/// Writes `entries` to `folder`; `load(i)` gives the imprint (metres, raw orientation) and mask of `entries[i]`.
+///
+/// Everything is written and checked in a new folder beside `folder` and put in its place only when it is right; a
+/// previous export there is replaced. Same entries, config and content: same bytes.
+///
+/// # Errors
+/// [`ExportError`]; then `folder` is as it was.
+pub fn export(
+    folder: &Path,
+    entries: &[ExportEntry],
+    config: &ExportConfig,
+    mut load: impl FnMut(usize) -> Result<(DepthMap, Mask), Box<dyn std::error::Error>>,
+) -> Result<ExportReport, ExportError> {
+    if entries.is_empty() {
+        return Err(ExportError::Nothing);
+    }
+    let folder = std::path::absolute(folder).map_err(|s| io(folder, "find the folder", s))?;
+    refuse_foreign(&folder)?;
+    let parts = split::parts(entries, config)?;
+    let stems = split::stems(entries);
+    let parent = folder.parent().unwrap_or(&folder).to_owned();
+    std::fs::create_dir_all(&parent).map_err(|s| io(&parent, "make the folder", s))?;
+    let staging = tempfile::Builder::new()
+        .prefix(".touch2touch-export-")
+        .tempdir_in(&parent)
+        .map_err(|s| io(&parent, "make a folder in", s))?;
+    let root = staging.path().join("new");
+    for part in PARTS {
+        for kind in ["imgs", "masks"] {
+            let path = root.join(part).join(kind);
+            std::fs::create_dir_all(&path).map_err(|s| io(&path, "make the folder", s))?;
+        }
+    }
+    let mut report = ExportReport::default();
+    let mut manifest = Manifest { format: FORMAT.into(), version: 1, seed: config.seed, files: BTreeMap::new() };
+    let mut mismatches = Vec::new();
+    for (i, (stem, &part)) in stems.iter().zip(&parts).enumerate() {
+        let (imprint, mask) = load(i).map_err(|err| ExportError::Source {
+            name: format!("{}, {} finger", entries[i].pair, entries[i].finger.name()),
+            reason: err.to_string(),
+        })?;
+        if imprint.size() != mask.size() {
+            return Err(ExportError::Size { stem: stem.clone(), mask: mask.size(), imprint: imprint.size() });
+        }
+        let image = image_from_imprint(&imprint, &mut report);
+        let mask = mask.map(|&v| if v { 255u8 } else { 0 });
+        report.counts[part] += 1;
+        for (kind, picture) in [("imgs", &image), ("masks", &mask)] {
+            let relative = format!("{}/{kind}/{stem}.png", PARTS[part]);
+            let path = root.join(&relative);
+            images::write_grey8(&path, picture)?;
+            if images::read_grey8(&path)? != *picture {
+                mismatches.push(Problem {
+                    file: folder.join(&relative),
+                    what: "the file reads back differently".into(),
+                    hint: "check the disk".into(),
+                });
+            }
+            let bytes = std::fs::read(&path).map_err(|s| io(&path, "read", s))?;
+            manifest.files.insert(relative, sha256(&bytes));
+        }
+    }
+    mismatches.extend(check_folder(&root).problems);
+    if !mismatches.is_empty() {
+        return Err(ExportError::Check { problems: mismatches });
+    }
+    let path = root.join(MANIFEST);
+    let text = serde_json::to_vec_pretty(&manifest).map_err(|err| io(&path, "write", err.into()))?;
+    super::atomic::write_bytes(&path, &text).map_err(|s| io(&path, "write", s))?;
+    // Once more, in case something appeared while the masks were computed.
+    refuse_foreign(&folder)?;
+    if folder.exists() {
+        let old = staging.path().join("old");
+        std::fs::rename(&folder, &old).map_err(|s| io(&folder, "move the previous export away from", s))?;
+        if let Err(source) = std::fs::rename(&root, &folder) {
+            std::fs::rename(&old, &folder).map_err(|s| io(&folder, "put the previous export back to", s))?;
+            return Err(io(&folder, "put the export to", source));
+        }
+    } else {
+        std::fs::rename(&root, &folder).map_err(|s| io(&folder, "put the export to", s))?;
+    }
+    report.empty_parts = PARTS.iter().zip(report.counts).filter(|(_, n)| *n == 0).map(|(p, _)| *p).collect();
+    Ok(report)
+}
+
+fn io(path: &Path, what: &'static str, source: std::io::Error) -> ExportError {
+    ExportError::Io { path: path.to_owned(), what, source }
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    sha2::Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// The loader's 8-bit image of an imprint, in 32-bit arithmetic as the lab's script has it.
+fn image_from_imprint(imprint: &DepthMap, report: &mut ExportReport) -> Grid<u8> {
+    let range = (IMAGE_HI_M - IMAGE_LO_M) as f32;
+    imprint.map(|&metres| {
+        let metres = if metres.is_finite() {
+            metres
+        } else {
+            report.unmeasured_px += 1;
+            0.0
+        };
+        let value = (metres - IMAGE_LO_M as f32) / range * 255.0;
+        if !(0.0..256.0).contains(&value) {
+            report.out_of_range_px += 1;
+        }
+        // Truncates like the lab's cast, but saturates where that would wrap around.
+        value as u8
+    })
+}
+
+/// An existing folder must be empty, or hold exactly what its manifest says.
+fn refuse_foreign(folder: &Path) -> Result<(), ExportError> {
+    let mut files = Vec::new();
+    match list(folder, folder, &mut files) {
+        Ok(()) => {}
+        Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(()),
+        Err(source) => return Err(io(folder, "list the folder", source)),
+    }
+    let known: BTreeMap<String, String> = std::fs::read(folder.join(MANIFEST))
+        .ok()
+        .and_then(|bytes| serde_json::from_slice::<Manifest>(&bytes).ok())
+        .filter(|manifest| manifest.format == FORMAT)
+        .map(|manifest| manifest.files)
+        .unwrap_or_default();
+    let is_manifest = |file: &str| file == MANIFEST && !known.is_empty();
+    match files.into_iter().find(|file| !known.contains_key(file) && !is_manifest(file)) {
+        Some(found) => Err(ExportError::NotOurs { folder: folder.to_owned(), found }),
+        None => Ok(()),
+    }
+}
+
+/// All files below `folder`, relative to `root`, with `/`. Links are files: they are never followed.
+fn list(root: &Path, folder: &Path, out: &mut Vec<String>) -> std::io::Result<()> {
+    let mut entries: Vec<_> = std::fs::read_dir(folder)?.collect::<Result<_, _>>()?;
+    entries.sort_by_key(std::fs::DirEntry::file_name);
+    for entry in entries {
+        let path = entry.path();
+        if entry.file_type()?.is_dir() {
+            list(root, &path, out)?;
+        } else {
+            let relative = path.strip_prefix(root).unwrap_or(&path);
+            let parts: Vec<String> = relative.iter().map(|p| p.to_string_lossy().into_owned()).collect();
+            out.push(parts.join("/"));
+        }
+    }
+    Ok(())
+}
