@@ -80,7 +80,7 @@ fn imprint(imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
         // Flying pixels are few; another unit shows in the typical value.
         let mut sizes: Vec<f64> = finite().map(f64::abs).collect();
         let at = sizes.len() * 9 / 10;
-        let (_, typical, _) = sizes.select_nth_unstable_by(at.min(sizes.len() - 1), f64::total_cmp);
+        let (_, typical, _) = sizes.select_nth_unstable_by(at, f64::total_cmp);
         let (what, hint) = if *typical > MAX_IMPRINT_M {
             ("not metres; millimetres?", "store imprints in metres")
         } else {
