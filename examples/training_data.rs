@@ -70,7 +70,11 @@ impl Npy {
 
 /// Metres to whole micrometres; no measurement becomes `i16::MIN`.
 fn micrometres(depth: &DepthMap) -> Vec<i16> {
-    depth.as_slice().iter().map(|z| if z.is_nan() { i16::MIN } else { (z * 1e6).round().clamp(-32767.0, 32767.0) as i16 }).collect()
+    depth
+        .as_slice()
+        .iter()
+        .map(|z| if z.is_nan() { i16::MIN } else { (z * 1e6).round().clamp(-32767.0, 32767.0) as i16 })
+        .collect()
 }
 
 /// Simulates grasp `index` of the shard; both fingers.
@@ -103,7 +107,8 @@ fn grasp(index: u64, seed: u64, mix: Mix) -> Result<Vec<Record>> {
             let truth = imprint.truth.as_ref().context("no truth")?;
             ensure!(imprint.imprint.size() == [bubble::WIDTH, bubble::HEIGHT], "unexpected bubble size");
             let small = resample::bilinear_rgb(&gelslim.difference, SIDE, SIDE);
-            let planes = (0..3).flat_map(|c| small.as_slice().iter().map(move |p| (p[c] * STEPS_PER_LEVEL).round() as i16));
+            let planes =
+                (0..3).flat_map(|c| small.as_slice().iter().map(move |p| (p[c] * STEPS_PER_LEVEL).round() as i16));
             let tool_number = number.map_or(-1.0, |i| i as f32);
             Ok(Record {
                 gelslim: planes.collect(),

@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use super::document::{PairLabels, Review};
 use super::error::TaskError;
-use super::keys::{DatasetSeq, ImprintSource, PairKey, PoseEngine, Recipe, Request, ShiftMode};
+use super::keys::{DatasetSeq, ImprintSource, PoseEngine, Recipe, Request, ShiftMode};
 use super::library::{BundleInfo, Place, Sort};
 use super::results::{Clouds, Comparison, PoseResult, Prediction};
 use super::services::{DataSource, ToolModel};
@@ -285,6 +285,10 @@ pub enum Command {
     TaskFailed(Ticket, TaskError),
     /// A result that a pane asked for could not be made.
     RequestFailed(Request, TaskError),
+    /// The labels of a pair are on the disk.
+    LabelsSaved(String),
+    /// The settings are on the disk.
+    SettingsSaved,
     /// A file could not be saved.
     SaveFailed(TaskError),
 }
@@ -328,8 +332,8 @@ pub enum Computed {
 /// A pair whose labels are to be written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelsToSave {
-    /// The pair.
-    pub key: PairKey,
+    /// The opening of the data set it is of.
+    pub seq: DatasetSeq,
     /// Its name.
     pub name: String,
     /// What to write.

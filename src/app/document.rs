@@ -1,6 +1,6 @@
 //! The document: labels, review states, accepted poses. Small, reversible, saved by itself.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -99,6 +99,8 @@ pub struct Document {
     pub stored: BTreeMap<String, Stored>,
     /// Review states that are not "todo", of all pairs: known at opening.
     pub reviews: BTreeMap<String, Review>,
+    /// Pairs whose last change is not on the disk yet.
+    pub unsaved: BTreeSet<String>,
     /// The stroke being drawn.
     pub stroke: Option<Stroke>,
     /// The last revision given out.
@@ -120,6 +122,8 @@ pub struct Stroke {
     pub at: [f32; 2],
     /// The hand mask before the stroke; `None` if there was none.
     pub(super) before: Option<HandMask>,
+    /// The pixels before the stroke, as large as the imprint.
+    pub(super) pixels: Arc<Mask>,
 }
 
 impl Document {

@@ -9,7 +9,7 @@ use super::document::PairLabels;
 use super::keys::{DatasetSeq, Recipe};
 use super::library::{BundleInfo, Place};
 use super::services::DataSource;
-use super::settings::{RuntimeChoice, Settings};
+use super::settings::Settings;
 use super::tasks::Ticket;
 use crate::domain::sample::Sample;
 
@@ -35,8 +35,6 @@ pub enum Effect {
         recipe: Recipe,
         /// The bundle.
         bundle: BundleInfo,
-        /// The runtime.
-        runtime: RuntimeChoice,
         /// The data.
         source: Arc<dyn DataSource>,
         /// The pair, if it is loaded.

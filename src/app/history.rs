@@ -3,20 +3,8 @@
 use super::document::{Document, HandMask, Review};
 use super::keys::ImprintSource;
 use crate::domain::frames::PlanarPose;
+use crate::domain::label::Patch;
 use crate::domain::sensor::Finger;
-
-/// A rectangle of mask pixels.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MaskPatch {
-    /// Left column.
-    pub x: usize,
-    /// Top row.
-    pub y: usize,
-    /// Columns.
-    pub width: usize,
-    /// The pixels, row by row; their number is a multiple of `width`.
-    pub pixels: Vec<bool>,
-}
 
 /// One reversible change of the document.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +16,7 @@ pub enum Edit {
         /// The finger.
         finger: Finger,
         /// The pixels.
-        patch: MaskPatch,
+        patch: Patch,
     },
     /// Replaces a whole corrected mask; `None` = the automatic source is in force.
     HandMask {
@@ -66,15 +54,8 @@ impl Edit {
                 let hand = doc.labels.get_mut(pair).and_then(|l| l.masks[finger.index()].as_mut());
                 // The edits of a gesture are swapped in order, so the mask is there and as large as it was.
                 let Some(hand) = hand else { return };
-                let mask = std::sync::Arc::make_mut(&mut hand.mask);
-                if patch.x + patch.width > mask.width()
-                    || patch.y + patch.pixels.len() / patch.width.max(1) > mask.height()
-                {
+                if patch.swap(std::sync::Arc::make_mut(&mut hand.mask)).is_err() {
                     return;
-                }
-                for (i, pixel) in patch.pixels.iter_mut().enumerate() {
-                    let at = (patch.x + i % patch.width, patch.y + i / patch.width);
-                    std::mem::swap(&mut mask[at], pixel);
                 }
                 hand.revision = revision;
             }
@@ -111,7 +92,7 @@ impl Edit {
     fn bytes(&self) -> usize {
         std::mem::size_of::<Self>()
             + match self {
-                Self::Patch { patch, .. } => patch.pixels.len(),
+                Self::Patch { patch, .. } => patch.bytes(),
                 Self::HandMask { mask, .. } => mask.as_ref().map_or(0, |m| m.mask.len()),
                 Self::Review { .. } | Self::Pose { .. } => 0,
             }
@@ -246,9 +227,15 @@ mod tests {
         hand
     }
 
+    /// The edit that sets 2 x 2 pixels from `(x, 1)` on.
+    fn edit(pair: &str, finger: Finger, x: usize) -> Edit {
+        let empty = Mask::filled(8, 4, false);
+        let full = Mask::from_fn(8, 4, |px, py| (x..x + 2).contains(&px) && (1..3).contains(&py));
+        Edit::Patch { pair: pair.into(), finger, patch: Patch::between(&empty, &full).unwrap() }
+    }
+
     fn patch(doc: &mut Document, history: &mut History, pair: &str, finger: Finger, x: usize) {
-        let mut edit =
-            Edit::Patch { pair: pair.into(), finger, patch: MaskPatch { x, y: 1, width: 2, pixels: vec![true; 4] } };
+        let mut edit = edit(pair, finger, x);
         edit.swap(doc);
         history.record(Gesture { name: "stroke", edits: vec![edit] });
     }
@@ -257,15 +244,11 @@ mod tests {
     fn swapping_twice_changes_nothing() {
         let mut doc = Document::default();
         let before = hand(&mut doc, "a", Finger::Right).mask;
-        let mut edit = Edit::Patch {
-            pair: "a".into(),
-            finger: Finger::Right,
-            patch: MaskPatch { x: 6, y: 2, width: 2, pixels: vec![true; 4] },
-        };
+        let mut edit = edit("a", Finger::Right, 6);
         let copy = edit.clone();
         edit.swap(&mut doc);
-        assert!(doc.hand_mask("a", Finger::Right).unwrap().mask[(7, 3)]);
-        assert!(!before[(7, 3)], "the mask that others hold is not changed under them");
+        assert!(doc.hand_mask("a", Finger::Right).unwrap().mask[(7, 2)]);
+        assert!(!before[(7, 2)], "the mask that others hold is not changed under them");
         edit.swap(&mut doc);
         assert_eq!(doc.hand_mask("a", Finger::Right).unwrap().mask, before);
         assert_eq!(edit, copy);

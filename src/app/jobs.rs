@@ -1,10 +1,35 @@
 //! What a job may do besides computing: see whether it should stop, and say how far it is.
 
+pub mod compute;
+pub mod prepare;
+
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::error::TaskError;
 use super::tasks::Progress;
+
+/// Where a job runs. Each lane has its own threads, so that none waits for another kind of work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
+pub enum Lane {
+    /// Reading and writing files: one thread, in order.
+    Files,
+    /// Computing.
+    Compute,
+    /// Running models: one thread, which keeps them loaded.
+    Models,
+}
+
+impl Lane {
+    /// The name of its threads.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Files => "files",
+            Self::Compute => "compute",
+            Self::Models => "models",
+        }
+    }
+}
 
 /// A flag that tells a job to stop. Clones share it.
 #[derive(Clone, Debug, Default)]

@@ -5,6 +5,10 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
+pub use crate::domain::diffusion::Sampler;
+pub use crate::domain::postprocess::ShiftMode;
+
+use super::settings::RuntimeChoice;
 use crate::domain::dataset::PairId;
 use crate::domain::sensor::Finger;
 
@@ -54,56 +58,12 @@ impl Bits {
     }
 }
 
-/// How the generator's output becomes metres.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum ShiftMode {
-    /// The lab's stored prediction, with its doubled range mapping.
-    Raw,
-    /// Matched to the training statistics, as in the paper.
-    PaperShift,
-    /// The range mapping undone exactly.
-    #[default]
-    ExactInverse,
-}
-
-impl ShiftMode {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Raw => "Raw",
-            Self::PaperShift => "Paper shift",
-            Self::ExactInverse => "Exact inverse",
-        }
-    }
-
-    /// What it does, for the tooltip.
-    pub fn tooltip(self) -> &'static str {
-        match self {
-            Self::Raw => {
-                "The prediction as the lab's generator stores it: its range is mapped twice, so depths are too large"
-            }
-            Self::PaperShift => "Mean and spread matched to the training statistics, as the paper's pixel shift does",
-            Self::ExactInverse => "The doubled range mapping undone exactly: metres",
-        }
-    }
-}
-
-/// The way from noise to an image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum Sampler {
-    /// Denoising diffusion implicit models; `eta` 0 is deterministic.
-    #[default]
-    Ddim,
-}
-
-impl Sampler {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ddim => "DDIM",
-        }
+/// What a range mapping does, for its tooltip.
+pub fn shift_tooltip(mode: ShiftMode) -> &'static str {
+    match mode {
+        ShiftMode::Raw => "As the lab's generator stores it: the range is mapped twice, so depths are too large",
+        ShiftMode::PaperShift => "Mean and spread matched to the training statistics, as the paper's pixel shift does",
+        ShiftMode::ExactInverse => "The doubled range mapping undone exactly: metres",
     }
 }
 
@@ -122,6 +82,8 @@ pub struct Recipe {
     pub sampler: Sampler,
     /// DDIM's noise share, 0..1.
     pub eta: Bits,
+    /// The model runtime: two of them round differently.
+    pub runtime: RuntimeChoice,
 }
 
 /// Which imprint of a touch.

@@ -7,10 +7,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::DVec3;
 
 use super::keys::{CloudKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, ShiftMode, TouchKey};
-use super::services::{RawPrediction, ToolModel};
+use super::services::{Generated, ToolModel};
+use crate::domain::align::AlignReport;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::sample::Sample;
+use crate::domain::sample::{Sample, Scale};
 use crate::domain::sensor::Finger;
 
 /// Values by recipe; the least recently used go first when the budget is exceeded.
@@ -108,8 +109,8 @@ impl<K: Ord + Clone, V> Cache<K, V> {
 pub struct Prediction {
     /// How it was made: the seed is in here.
     pub recipe: Recipe,
-    /// The generator's own output.
-    pub raw: RawPrediction,
+    /// The generator's own output, with the ways to metres.
+    pub output: Generated,
     /// Time it took, seconds.
     pub seconds: f64,
 }
@@ -123,8 +124,10 @@ pub struct Comparison {
     pub psnr_db: Option<f64>,
     /// Structural similarity as the lab computes it; `None` if it is not defined.
     pub ssim: Option<f64>,
-    /// Mean absolute error, metres.
+    /// Mean absolute error, metres; NaN without a pixel to compare.
     pub mae_m: f64,
+    /// Whether PSNR and SSIM are of metres, or (assumed scale) of images stretched to 0..1 each.
+    pub scale: Scale,
 }
 
 /// The surface points of both fingers in the grasp frame.
@@ -197,6 +200,8 @@ pub struct PoseResult {
     pub residuals_m: Vec<f64>,
     /// Time it took, milliseconds.
     pub ms: f64,
+    /// Everything the registration says about itself, recorded.
+    pub report: AlignReport,
 }
 
 /// All caches.

@@ -1,6 +1,6 @@
 //! What the model needs from files and models, as two small traits, so that tests can put their own behind it.
 //!
-//! The studio and the command line use [`DataSource`] and [`Services`] as implemented over `io` and `infer`.
+//! The studio and the command line use [`DataSource`] and [`Services`] as [`live`] implements them over `io` and `infer`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,15 +10,17 @@ use super::command::Opened;
 use super::document::PairLabels;
 use super::error::TaskError;
 use super::jobs::JobCx;
-use super::keys::Recipe;
+use super::keys::{Recipe, ShiftMode};
 use super::library::{BundleInfo, Place};
 use super::settings::{RuntimeChoice, Settings};
+use crate::domain::align::DistanceField;
 use crate::domain::dataset::{Index, PairId, Problem};
-use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
-use crate::domain::mesh::TriMesh;
+use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::mesh::{MeshDistance, TriMesh};
+use crate::domain::postprocess::{DepthChain, RawPrediction};
 use crate::domain::sample::Sample;
 
-/// An open data set: its index is in memory, its samples are read on demand, from any thread.
+/// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
     /// The name on screen.
     fn title(&self) -> &str;
@@ -28,23 +30,50 @@ pub trait DataSource: Send + Sync {
     fn index(&self) -> &Index;
     /// What is wrong with it, apart from what opened.
     fn problems(&self) -> &[Problem];
+
     /// Reads one pair.
     ///
     /// # Errors
     /// With the file and the reason if it cannot be read.
     fn load(&self, pair: PairId) -> Result<Sample, TaskError>;
+
     /// The CAD model of a tool, metres, object frame.
     ///
     /// # Errors
     /// If there is none, or it cannot be read.
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError>;
+
+    /// Reads the labels stored for a pair; empty if there are none.
+    ///
+    /// # Errors
+    /// If there are some and they cannot be read: then they must not be written either.
+    fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError>;
+
+    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError>;
+
+    /// Writes masks for UNet training; returns a line for the log. `changed` is newer than what is stored.
+    ///
+    /// # Errors
+    /// If not all could be written and read back.
+    fn export_masks(
+        &self,
+        changed: &BTreeMap<String, PairLabels>,
+        folder: &Path,
+        cx: &JobCx,
+    ) -> Result<String, TaskError>;
 }
 
-/// A generator's own output.
+/// A generator's own output, with the ways to metres.
 #[derive(Clone, Debug)]
-pub struct RawPrediction {
-    /// The decoder's output, scaled to 0..1 and in raw bubble orientation.
-    pub raw: Grid<f32>,
+pub struct Generated {
+    /// The decoder's picture.
+    pub raw: RawPrediction,
+    /// Per range mapping the steps to metres, or why it cannot be done.
+    pub chains: BTreeMap<ShiftMode, Result<DepthChain, String>>,
     /// The runtime that made it.
     pub runtime: String,
 }
@@ -56,6 +85,12 @@ pub struct ToolModel {
     pub name: String,
     /// The CAD model, metres, object frame.
     pub mesh: TriMesh,
+    /// Distance to the silhouette in the y-z plane.
+    pub field: DistanceField,
+    /// Distance to the surface in space, for masks from the CAD model.
+    pub distance: MeshDistance,
+    /// The lab's model points: uniform on the surface, `(y, z)` in metres.
+    pub points_yz: Vec<glam::DVec2>,
 }
 
 /// Files and models, as the lanes use them.
@@ -69,7 +104,8 @@ pub trait Services: Send + Sync {
     /// The bundles that ship with the program and those in `folders`; what is wrong with those that were refused.
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>);
 
-    /// Runs the generator. Called on one lane only; the model stays loaded between calls.
+    /// Runs the generator on a GelSlim difference image. The model stays loaded between calls; the runtime calls this
+    /// on one lane only.
     ///
     /// # Errors
     /// If the model cannot be loaded or run, or the job was told to stop.
@@ -77,10 +113,9 @@ pub trait Services: Send + Sync {
         &self,
         recipe: &Recipe,
         bundle: &BundleInfo,
-        runtime: RuntimeChoice,
         difference: &RgbGrid,
         cx: &JobCx,
-    ) -> Result<RawPrediction, TaskError>;
+    ) -> Result<Generated, TaskError>;
 
     /// Runs the mask model on an imprint in metres. Called on the same lane as [`Self::generate`].
     ///
@@ -89,31 +124,7 @@ pub trait Services: Send + Sync {
     fn mask_by_model(&self, bundle: &BundleInfo, runtime: RuntimeChoice, imprint: &DepthMap)
     -> Result<Mask, TaskError>;
 
-    /// Reads the labels stored for a pair; empty if there are none.
-    ///
-    /// # Errors
-    /// If there are some and they cannot be read: then they must not be written either.
-    fn load_labels(&self, source: &dyn DataSource, name: &str) -> Result<PairLabels, TaskError>;
-
-    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones.
-    ///
-    /// # Errors
-    /// If they cannot be written.
-    fn save_labels(&self, source: &dyn DataSource, name: &str, labels: &PairLabels) -> Result<(), TaskError>;
-
-    /// Writes masks for UNet training; returns a line for the log. `changed` is newer than what is stored.
-    ///
-    /// # Errors
-    /// If not all could be written and read back.
-    fn export_masks(
-        &self,
-        source: &dyn DataSource,
-        changed: &BTreeMap<String, PairLabels>,
-        folder: &Path,
-        cx: &JobCx,
-    ) -> Result<String, TaskError>;
-
-    /// The stored settings, and what was wrong with them if they were set aside.
+    /// The stored settings (defaults where there are none), and what was wrong if they were set aside.
     fn load_settings(&self) -> (Settings, Option<TaskError>);
 
     /// Writes the settings.

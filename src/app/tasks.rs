@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use super::error::{TaskError, TaskErrorKind};
-use super::keys::{Recipe, Request};
+use super::keys::{DatasetSeq, Recipe, Request};
 
 /// The name of a running job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -36,6 +36,8 @@ pub struct Task {
     pub progress: Progress,
     /// The prediction it makes, if it makes one.
     pub recipe: Option<Recipe>,
+    /// The data set it opens, if it opens one.
+    pub opening: Option<DatasetSeq>,
     /// Whether it was told to stop and has not stopped yet.
     pub cancelling: bool,
 }
@@ -71,7 +73,8 @@ impl Tasks {
     pub(super) fn start(&mut self, title: String, recipe: Option<Recipe>) -> Ticket {
         self.last_ticket += 1;
         let ticket = Ticket(self.last_ticket);
-        self.running.insert(ticket, Task { title, progress: Progress::default(), recipe, cancelling: false });
+        self.running
+            .insert(ticket, Task { title, progress: Progress::default(), recipe, opening: None, cancelling: false });
         ticket
     }
 }

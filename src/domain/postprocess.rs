@@ -64,7 +64,9 @@ pub enum Shift {
 }
 
 /// The user's choice between the three readings of a picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, strum::EnumIter,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum ShiftMode {
     /// What the released script saves: `(depth + max) / 2`.

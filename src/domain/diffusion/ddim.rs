@@ -22,7 +22,9 @@ pub enum Prediction {
 }
 
 /// How the noise is taken away.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, strum::EnumIter,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Sampler {
     /// Denoising diffusion implicit models; `eta` 0 is deterministic, 1 is ancestral sampling.

@@ -1,0 +1,252 @@
+//! What the runtime answers: results, progress, failures.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::super::command::{Command, Computed, Opened};
+use super::super::document::{Document, PairLabels, Stored};
+use super::super::effect::Effect;
+use super::super::error::{TaskError, TaskErrorKind};
+use super::super::keys::{DatasetSeq, ImprintKey, ImprintSource, PairKey, PoseKey, Request};
+use super::super::library::{OpenDataset, Place};
+use super::super::results::Prediction;
+use super::super::state::State;
+use super::super::tasks::{Level, Ticket};
+use super::{cancel_all, is_selected, masks, preferences, remember, reorder};
+use crate::domain::dataset::PairId;
+use crate::domain::grid::Grid;
+
+pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
+    match command {
+        Command::Opened(ticket, seq, place, opened) => {
+            state.tasks.running.remove(&ticket);
+            // A later opening was started meanwhile: this one is not wanted any more.
+            if seq == state.library.last_seq {
+                show(state, seq, place, opened, effects);
+            }
+        }
+        Command::Bundles(bundles, problems) => {
+            for problem in &problems {
+                state.log.error(problem);
+            }
+            state.library.bundles = bundles;
+            state.library.bundle_problems = problems;
+        }
+        Command::SettingsLoaded(settings, problem) => {
+            state.settings = settings.validated();
+            if let Some(problem) = problem {
+                state.log.push(Level::Warning, problem.what, Some(problem.why), problem.hint);
+            }
+            effects.push(Effect::FindBundles(state.settings.bundle_folders.clone()));
+        }
+        Command::Demanded(list) => state.tasks.demanded = list,
+        Command::Computed(request, computed) => {
+            let current = state.library.open.as_ref().map(|open| open.seq);
+            if request.dataset().is_none_or(|seq| Some(seq) == current) {
+                store(state, request, computed);
+            }
+        }
+        Command::Generated(ticket, prediction) => {
+            state.tasks.running.remove(&ticket);
+            generated(state, prediction);
+        }
+        Command::Progressed(ticket, progress) => {
+            if let Some(task) = state.tasks.running.get_mut(&ticket) {
+                task.progress = progress;
+            }
+        }
+        Command::Finished(ticket, line) => {
+            state.tasks.running.remove(&ticket);
+            if let Some(line) = line {
+                state.log.info(line);
+            }
+        }
+        Command::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
+        Command::RequestFailed(request, err) => failed_request(state, request, err),
+        Command::LabelsSaved(name) => {
+            state.document.unsaved.remove(&name);
+        }
+        Command::SaveFailed(err) => state.log.error(&err),
+        // Everything else was carried out before.
+        _ => {}
+    }
+}
+
+fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effects: &mut Vec<Effect>) {
+    masks::end_stroke(state, effects);
+    // Predictions under way are of the data set before.
+    cancel_all(state, effects);
+    let before = state.entry().map(|entry| entry.name.clone());
+    let same_place = state.library.open.as_ref().is_some_and(|open| open.place == place);
+    state.results.clear();
+    state.history.clear();
+    state.tasks.failed.clear();
+    state.document =
+        Document { reviews: opened.reviews, last_revision: state.document.last_revision, ..Document::default() };
+    state.library.opening = None;
+    let tools = opened.source.index().tools();
+    state.library.open = Some(OpenDataset { seq, place: place.clone(), source: opened.source.clone(), tools });
+    if !same_place {
+        state.library.filter.clear();
+        state.library.tool = None;
+        state.library.rows = 0..0;
+    }
+    reorder(state);
+    let kept = before.filter(|_| same_place).and_then(|name| {
+        let at = opened.source.index().pairs.iter().position(|entry| entry.name == name)?;
+        u32::try_from(at).ok().map(PairId)
+    });
+    state.selection.pair = kept.or_else(|| state.library.order.first().copied());
+    state.selection.hover = None;
+    state.selection.hover_point = None;
+    let (pairs, problems) = (opened.source.index().pairs.len(), opened.source.problems().len());
+    let (level, hint) = match problems {
+        0 => (Level::Info, None),
+        _ => (Level::Warning, Some("The list of problems says which files, and what to do.".to_owned())),
+    };
+    let text = match problems {
+        0 => format!("{}: {pairs} pairs", opened.source.title()),
+        n => format!("{}: {pairs} pairs, {n} problem{}", opened.source.title(), if n == 1 { "" } else { "s" }),
+    };
+    state.log.push(level, text, None, hint);
+    remember(state, &place, effects);
+}
+
+/// Stores a result under its own key. A kind that does not fit the request is a defect of a job and is left out.
+fn store(state: &mut State, request: Request, computed: Computed) {
+    let results = &mut state.results;
+    let bytes = |grid: &Grid<f32>| grid.len() * 4;
+    match (request, computed) {
+        (Request::Sample(key), Computed::Sample(sample)) => {
+            let size = sample.bytes();
+            results.samples.insert(key, sample, size);
+            if is_selected(state, key) {
+                preferences::follow_range(state);
+            }
+        }
+        (Request::Labels(key), Computed::Labels(labels)) => store_labels(state, key, *labels),
+        (Request::Thumbnail(key), Computed::Depth(depth)) => {
+            let size = bytes(&depth);
+            results.thumbnails.insert(key, depth, size);
+        }
+        (Request::Tool(_, name), Computed::Tool(tool)) => {
+            let mesh = tool.mesh.vertices.len() * 24 + tool.mesh.triangles.len() * 12;
+            // The registration's field and tree are of the mesh's order, at least a few MB.
+            results.tools.insert(name.to_string(), tool, 8 * mesh + (4 << 20));
+        }
+        (Request::Imprint(recipe, shift), Computed::Depth(depth)) => {
+            let size = bytes(&depth);
+            results.imprints.insert((recipe, shift), depth, size);
+        }
+        (Request::Comparison(recipe, shift), Computed::Comparison(comparison)) => {
+            let size = bytes(&comparison.error);
+            results.comparisons.insert((recipe, shift), comparison, size);
+        }
+        (Request::Mask(key), Computed::Mask(mask)) => {
+            let size = mask.len();
+            results.masks.insert(key, mask, size);
+        }
+        (Request::Cloud(key), Computed::Cloud(clouds)) => {
+            if let Some(at) = place_of(&key.parts) {
+                results.latest.entry(at).or_default().0 = Some(key.clone());
+            }
+            let size = clouds.bytes();
+            results.clouds.insert(key, clouds, size);
+        }
+        (Request::Pose(key), Computed::Pose(pose)) => {
+            if let Some(at) = place_of(&key.cloud.parts) {
+                results.latest.entry(at).or_default().1 = Some(PoseKey::clone(&key));
+            }
+            let size = std::mem::size_of_val(&*pose) + pose.residuals_m.len() * 24 + pose.iterations.len() * 128;
+            results.poses.insert(key, pose, size);
+        }
+        (request, _) => log::error!("the result of {request:?} is of another kind"),
+    }
+}
+
+/// The pair and imprint a cloud belongs to.
+fn place_of<M>(parts: &[Option<(ImprintKey, M)>; 2]) -> Option<(PairKey, ImprintSource)> {
+    let (imprint, _) = parts.iter().flatten().next()?;
+    let source = match imprint {
+        ImprintKey::Measured(_) => ImprintSource::Measured,
+        ImprintKey::Predicted(..) => ImprintSource::Predicted,
+    };
+    Some((imprint.touch().pair, source))
+}
+
+fn store_labels(state: &mut State, key: PairKey, mut labels: PairLabels) {
+    let Some(name) = state.library.entry(key.pair).map(|entry| entry.name.clone()) else { return };
+    let doc = &mut state.document;
+    if doc.stored.insert(name.clone(), Stored::Loaded) == Some(Stored::Loaded) {
+        // Read twice: what is here may be newer.
+        return;
+    }
+    for hand in labels.masks.iter_mut().flatten() {
+        hand.revision = doc.next_revision();
+    }
+    let review = labels.review;
+    doc.labels.insert(name.clone(), labels);
+    doc.set_review(&name, review);
+}
+
+fn generated(state: &mut State, prediction: Arc<Prediction>) {
+    let recipe = prediction.recipe.clone();
+    if state.library.open.as_ref().map(|open| open.seq) != Some(recipe.touch.pair.dataset) {
+        return;
+    }
+    let size = prediction.output.raw.channels.iter().map(|c| c.len() * 4).sum();
+    state.results.predictions.insert(recipe.clone(), prediction, size);
+    let made = state.results.made.entry(recipe.touch).or_default();
+    made.retain(|r| *r != recipe);
+    made.push(recipe.clone());
+    state.results.chosen.insert(recipe.touch, recipe);
+    // Old predictions may have left the cache to make room.
+    let results = &mut state.results;
+    let there: BTreeMap<_, Vec<_>> = std::mem::take(&mut results.made)
+        .into_iter()
+        .map(|(touch, list)| (touch, list.into_iter().filter(|r| results.predictions.contains(r)).collect()))
+        .collect();
+    results.made = there;
+    results.chosen.retain(|_, recipe| results.predictions.contains(recipe));
+}
+
+fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
+    let Some(task) = state.tasks.running.remove(&ticket) else { return };
+    let current = state.library.open.as_ref().map(|open| open.seq);
+    let outdated = task.recipe.as_ref().is_some_and(|r| Some(r.touch.pair.dataset) != current);
+    if outdated && err.is_cancelled() {
+        return;
+    }
+    if task.opening.is_some_and(|seq| seq != state.library.last_seq) {
+        // A later opening was started meanwhile.
+        return;
+    }
+    if task.opening.is_some() {
+        state.library.opening = None;
+        state.library.failure = Some(err.clone());
+    }
+    state.log.error(err);
+}
+
+fn failed_request(state: &mut State, request: Request, err: TaskError) {
+    let current = state.library.open.as_ref().map(|open| open.seq);
+    if request.dataset().is_some_and(|seq| Some(seq) != current) || err.is_cancelled() {
+        return;
+    }
+    // What a pane shows in place of the result is not said a second time, except what nobody would look for there.
+    let loud = match &request {
+        Request::Sample(key) => is_selected(state, *key),
+        Request::Labels(_) | Request::Tool(..) => true,
+        _ => false,
+    };
+    if loud || err.kind == TaskErrorKind::Panicked {
+        state.log.error(&err);
+    }
+    if let Request::Labels(key) = &request
+        && let Some(entry) = state.library.entry(key.pair)
+    {
+        let name = entry.name.clone();
+        state.document.stored.insert(name, Stored::Blocked(err.clone()));
+    }
+    state.tasks.failed.insert(request, err);
+}

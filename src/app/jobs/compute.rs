@@ -1,0 +1,269 @@
+//! Jobs as plain functions of values: the studio's lanes and the command line call the same ones.
+
+use std::time::Instant;
+
+use glam::DVec2;
+
+use super::super::error::TaskError;
+use super::super::keys::{MaskRecipe, PoseEngine, ShiftMode};
+use super::super::results::{Clouds, Comparison, FingerCloud, PoseResult, Prediction};
+use super::super::services::ToolModel;
+use crate::domain::align::lab_icp::LAB_MODEL_POINTS;
+use crate::domain::align::{AlignConfig, DistanceField, LabIcpConfig, align, lab_icp};
+use crate::domain::frames::PlanarPose;
+use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::mesh::{MeshDistance, TriMesh};
+use crate::domain::metrics::{self, SsimRange};
+use crate::domain::resample::bilinear;
+use crate::domain::sample::{BubbleCamera, BubbleTouch, Sample, Scale};
+use crate::domain::sensor::Finger;
+use crate::domain::{cloud, contact, units};
+
+/// The peak of the lab's PSNR, metres.
+pub const LAB_PEAK_M: f64 = 0.0225;
+/// Seed of the lab ICP's model points; the lab does not seed its own, so its results differ from run to run.
+const MODEL_POINTS_SEED: u64 = 0;
+/// Longest side of a thumbnail, pixels.
+const THUMBNAIL_PX: usize = 44;
+
+/// A prediction in metres, as large as the bubble image `size` (`[width, height]`).
+///
+/// # Errors
+/// If the bundle has no such range mapping, or its steps do not fit its output.
+pub fn imprint(prediction: &Prediction, shift: ShiftMode, size: [usize; 2]) -> Result<DepthMap, TaskError> {
+    let what = format!("Range mapping \"{}\"", shift.label());
+    let chain = match prediction.output.chains.get(&shift) {
+        Some(Ok(chain)) => chain,
+        Some(Err(why)) => {
+            return Err(TaskError::new(what, why).with_hint("Choose another range mapping, or another bundle."));
+        }
+        None => return Err(TaskError::new(what, "the bundle does not offer it")),
+    };
+    let depth = chain.run(&prediction.output.raw).map_err(|err| TaskError::from_error(&what, &err))?;
+    if depth.size() == size || size.contains(&0) { Ok(depth) } else { Ok(bilinear(&depth, size[0], size[1])) }
+}
+
+/// A prediction against the measurement. With an assumed scale both are stretched to 0..1 first.
+///
+/// # Errors
+/// If the sizes differ or no pixel is left to compare.
+pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Result<Comparison, TaskError> {
+    let fail = |err: metrics::MetricError| TaskError::from_error("Compare prediction and measurement", &err);
+    let mut sum = 0.0;
+    let mut count = 0usize;
+    let sizes_equal = predicted.size() == measured.size();
+    let error = Grid::from_fn(measured.width(), measured.height(), |x, y| {
+        let difference = if sizes_equal { predicted[(x, y)] - measured[(x, y)] } else { f32::NAN };
+        if difference.is_finite() {
+            sum += f64::from(difference.abs());
+            count += 1;
+        }
+        difference
+    });
+    let (psnr, ssim) = match scale {
+        Scale::Measured => (
+            metrics::psnr(predicted, measured, LAB_PEAK_M).map_err(fail)?,
+            metrics::ssim(predicted, measured, SsimRange::Explicit(LAB_PEAK_M)),
+        ),
+        Scale::Assumed => {
+            let (p, m) = (metrics::unit_range(predicted), metrics::unit_range(measured));
+            (metrics::psnr(&p, &m, 1.0).map_err(fail)?, metrics::ssim(&p, &m, SsimRange::Explicit(1.0)))
+        }
+    };
+    Ok(Comparison {
+        error,
+        psnr_db: psnr.db(),
+        ssim: ssim.ok().map(|s| s.mean),
+        mae_m: if count == 0 { f64::NAN } else { sum / count as f64 },
+        scale,
+    })
+}
+
+/// An automatic mask that needs no model.
+///
+/// `tool` and `truth` (`grasp_from_object`) are needed for [`MaskRecipe::Cad`], `bubble` for it and for
+/// [`MaskRecipe::Truth`].
+///
+/// # Errors
+/// If something the recipe needs is not there, or the sizes differ.
+pub fn mask(
+    recipe: &MaskRecipe,
+    imprint: &DepthMap,
+    bubble: Option<&BubbleTouch>,
+    tool: Option<&ToolModel>,
+    truth: Option<PlanarPose>,
+) -> Result<Mask, TaskError> {
+    const WHAT: &str = "Contact mask";
+    match recipe {
+        MaskRecipe::Threshold(min_m) => Ok(contact::threshold(imprint, min_m.get())),
+        MaskRecipe::TopPercent(percent) => {
+            Ok(contact::top_percent(imprint, f64::from(percent.get()), f32::NEG_INFINITY))
+        }
+        MaskRecipe::Cad(limit_m) => {
+            let camera = bubble
+                .and_then(|b| b.camera.as_ref())
+                .ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))?;
+            let tool = tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
+            let truth = truth.ok_or_else(|| TaskError::new(WHAT, "the true pose is not known"))?;
+            contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), f64::from(limit_m.get()))
+                .map_err(|err| TaskError::from_error(WHAT, &err))
+        }
+        MaskRecipe::Truth => {
+            let truth = bubble
+                .and_then(|b| b.truth.as_ref())
+                .ok_or_else(|| TaskError::new(WHAT, "only simulated data knows the true contact"))?;
+            Ok(truth.contact.clone())
+        }
+        MaskRecipe::Unet(_) => Err(TaskError::new(WHAT, "the mask model runs on another lane")),
+    }
+}
+
+/// The surface points of one finger, with the contact points marked. `None` for the mask marks none.
+///
+/// # Errors
+/// If the sizes differ or the camera's numbers cannot be right.
+pub fn finger_cloud(imprint: &DepthMap, camera: &BubbleCamera, mask: Option<&Mask>) -> Result<FingerCloud, TaskError> {
+    let lifted = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error("Point cloud", &err))?;
+    if let Some(mask) = mask.filter(|mask| mask.size() != imprint.size()) {
+        let why = format!("the mask has {:?} pixels, the imprint {:?}", mask.size(), imprint.size());
+        return Err(TaskError::new("Point cloud", why).with_hint("Remove the correction of this mask."));
+    }
+    let contact = lifted
+        .pixels
+        .iter()
+        .map(|&[x, y]| mask.is_some_and(|m| m.get(x.into(), y.into()).is_some_and(|&contact| contact)))
+        .collect();
+    Ok(FingerCloud { points: lifted.points, pixels: lifted.pixels, contact })
+}
+
+/// The surface points of both fingers of a sample: `parts` holds imprint and mask by [`Finger::index`]; a finger
+/// without a camera is left out.
+///
+/// # Errors
+/// As [`finger_cloud`].
+pub fn clouds(sample: &Sample, parts: [Option<(&DepthMap, Option<&Mask>)>; 2]) -> Result<Clouds, TaskError> {
+    let mut clouds = Clouds::default();
+    for finger in Finger::BOTH {
+        let camera = sample.finger(finger).and_then(|t| t.bubble.as_ref()).and_then(|b| b.camera.as_ref());
+        if let (Some((imprint, mask)), Some(camera)) = (parts[finger.index()], camera) {
+            clouds.fingers[finger.index()] = Some(finger_cloud(imprint, camera, mask)?);
+        }
+    }
+    Ok(clouds)
+}
+
+/// A tool with what the registration needs. Takes some tens of milliseconds.
+///
+/// # Errors
+/// If the mesh has no area or is not finite.
+pub fn tool_model(name: &str, mesh: TriMesh) -> Result<ToolModel, TaskError> {
+    let what = format!("CAD model of {name}");
+    let field = DistanceField::from_mesh(&mesh).map_err(|err| TaskError::from_error(&what, &err))?;
+    let distance = MeshDistance::new(&mesh).map_err(|err| TaskError::from_error(&what, &err))?;
+    let points_yz =
+        mesh.sample_surface(LAB_MODEL_POINTS, MODEL_POINTS_SEED).into_iter().map(|p| DVec2::new(p.y, p.z)).collect();
+    Ok(ToolModel { name: name.to_owned(), mesh, field, distance, points_yz })
+}
+
+/// The pose of the tool from contact points. `truth` is `grasp_from_object`, where known.
+///
+/// # Errors
+/// If there are too few points, or they are nowhere near the tool.
+pub fn pose(
+    clouds: &Clouds,
+    tool: &ToolModel,
+    engine: PoseEngine,
+    truth: Option<PlanarPose>,
+) -> Result<PoseResult, TaskError> {
+    let start = Instant::now();
+    let points: Vec<DVec2> = clouds.contact_points().into_iter().map(|p| DVec2::new(p.y, p.z)).collect();
+    let report = match engine {
+        PoseEngine::DistanceField => {
+            align(&points, &tool.field, &AlignConfig { record: true, ..AlignConfig::default() })
+        }
+        PoseEngine::LabIcp => {
+            lab_icp(&points, &tool.points_yz, &LabIcpConfig { record: true, ..LabIcpConfig::default() })
+        }
+    }
+    .map_err(|err| TaskError::from_error("Pose", &err))?;
+    let ms = start.elapsed().as_secs_f64() * 1e3;
+    let angle_rad = report.lab_angle_rad();
+    let truth_rad = truth.map(|t| t.inverse().theta_rad);
+    Ok(PoseResult {
+        grasp_from_object: report.grasp_from_object,
+        angle_rad,
+        truth_rad,
+        error_rad: truth_rad.map(|t| units::angle_error(angle_rad, t)),
+        rms_m: report.inlier_rms_m,
+        num_points: points.len(),
+        stop: report.stop.to_string(),
+        converged: report.converged,
+        iterations: report
+            .trace
+            .iter()
+            .filter(|step| step.run == report.winner)
+            .map(|step| step.grasp_from_object)
+            .collect(),
+        residuals_m: report.fits.iter().map(|fit| f64::from(fit.residual_m)).collect(),
+        ms,
+        report,
+    })
+}
+
+/// A small picture of the measured imprint of the right finger, else of the left, else nothing (an empty image).
+pub fn thumbnail(sample: &Sample) -> DepthMap {
+    let bubble = |finger: Finger| sample.finger(finger).and_then(|t| t.bubble.as_ref());
+    let Some(bubble) = Finger::BOTH.into_iter().find_map(bubble) else { return Grid::filled(0, 0, 0.0) };
+    let imprint = &bubble.imprint;
+    let longest = imprint.width().max(imprint.height());
+    if longest <= THUMBNAIL_PX {
+        return imprint.clone();
+    }
+    // The mean of the finite pixels of each block: no aliasing of the speckle, no holes where a few are missing.
+    let size = imprint.size().map(|n| (n * THUMBNAIL_PX).div_ceil(longest).max(1));
+    let block = |at: usize, out: usize, full: usize| at * full / out..((at + 1) * full / out).max(at * full / out + 1);
+    Grid::from_fn(size[0], size[1], |x, y| {
+        let (mut sum, mut count) = (0.0f32, 0u32);
+        for v in block(y, size[1], imprint.height()) {
+            for value in &imprint.row(v)[block(x, size[0], imprint.width())] {
+                if value.is_finite() {
+                    sum += value;
+                    count += 1;
+                }
+            }
+        }
+        if count == 0 { f32::NAN } else { sum / count as f32 }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thumbnail_keeps_means_and_survives_holes() {
+        let imprint = Grid::from_fn(175, 140, |x, y| if (x + y) % 2 == 0 { f32::NAN } else { 0.004 });
+        let bubble = BubbleTouch { imprint, camera: None, truth: None };
+        let touch = crate::domain::sample::FingerTouch { gelslim: None, bubble: Some(bubble) };
+        let sample = Sample { fingers: [None, Some(touch)], ..Sample::default() };
+        let small = thumbnail(&sample);
+        assert_eq!(small.size(), [44, 36]);
+        // The mean of equal numbers is that number up to rounding of a sum of at most 20.
+        assert!(small.as_slice().iter().all(|v| (v - 0.004).abs() < 1e-8));
+        assert!(thumbnail(&Sample::default()).is_empty());
+    }
+
+    #[test]
+    fn comparing_says_how_far_off() {
+        let a = Grid::from_fn(40, 30, |x, y| 1e-4 * (x * y % 17) as f32);
+        let b = a.map(|v| v + 0.001);
+        let comparison = compare(&b, &a, Scale::Measured).unwrap();
+        // A constant error of 1 mm: 20 log10(0.0225 / 0.001) = 27.04 dB.
+        assert!((comparison.psnr_db.unwrap() - 27.04).abs() < 0.01);
+        assert!((comparison.mae_m - 0.001).abs() < 1e-8);
+        // With an assumed scale an offset is invisible: the stretched images are equal up to rounding.
+        let assumed = compare(&b, &a, Scale::Assumed).unwrap();
+        assert!(assumed.psnr_db.is_none_or(|db| db > 80.0));
+        assert!(compare(&Grid::filled(3, 3, 0.0), &a, Scale::Measured).is_err());
+    }
+}

@@ -1,0 +1,215 @@
+//! From a request to a job: gathers the inputs from the state, so that the job needs the state no more.
+
+use std::sync::Arc;
+
+use super::super::command::Computed;
+use super::super::error::TaskError;
+use super::super::keys::{ImprintKey, MaskRecipe, MaskVersion, PairKey, Request, TouchKey};
+use super::super::services::SharedServices;
+use super::super::state::State;
+use super::{JobCx, Lane, compute};
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::sample::Sample;
+
+/// The body of a job.
+pub type Body<T> = Box<dyn FnOnce(&JobCx) -> Result<T, TaskError> + Send>;
+
+/// A job that computes what a pane asked for.
+pub struct RequestJob {
+    /// Where it runs.
+    pub lane: Lane,
+    /// What it does, for errors.
+    pub what: String,
+    /// How.
+    pub body: Body<Computed>,
+}
+
+/// An imprint wherever it lies.
+enum Imprint {
+    Measured(Arc<Sample>, TouchKey),
+    Predicted(Arc<DepthMap>),
+}
+
+impl Imprint {
+    fn get(&self) -> Option<&DepthMap> {
+        match self {
+            Self::Measured(sample, touch) => Some(&sample.finger(touch.finger)?.bubble.as_ref()?.imprint),
+            Self::Predicted(depth) => Some(depth),
+        }
+    }
+}
+
+fn imprint(state: &State, key: &ImprintKey) -> Option<Imprint> {
+    Some(match key {
+        ImprintKey::Measured(touch) => Imprint::Measured(state.results.samples.get(&touch.pair)?.clone(), *touch),
+        ImprintKey::Predicted(recipe, shift) => {
+            Imprint::Predicted(state.results.imprints.get(&(recipe.clone(), *shift))?.clone())
+        }
+    })
+}
+
+fn pair_name(state: &State, key: PairKey) -> Option<String> {
+    Some(state.library.entry(key.pair)?.name.clone())
+}
+
+/// The job of a request; `None` if an input is not there (any more).
+pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> Option<RequestJob> {
+    let open = state.library.open.as_ref()?;
+    if request.dataset().is_some_and(|seq| seq != open.seq) {
+        return None;
+    }
+    let source = open.source.clone();
+    let results = &state.results;
+    let job = |lane: Lane, what: String, body: Body<Computed>| Some(RequestJob { lane, what, body });
+    match request {
+        Request::Sample(key) => {
+            let pair = key.pair;
+            job(
+                Lane::Files,
+                format!("Load {}", pair_name(state, *key)?),
+                Box::new(move |_| Ok(Computed::Sample(Arc::new(source.load(pair)?)))),
+            )
+        }
+        Request::Labels(key) => {
+            let name = pair_name(state, *key)?;
+            let what = format!("Labels of {name}");
+            job(Lane::Files, what, Box::new(move |_| Ok(Computed::Labels(Box::new(source.load_labels(&name)?)))))
+        }
+        Request::Thumbnail(key) => {
+            let pair = key.pair;
+            let loaded = results.samples.get(key).cloned();
+            job(
+                Lane::Files,
+                format!("Picture of {}", pair_name(state, *key)?),
+                Box::new(move |_| {
+                    let sample = match loaded {
+                        Some(sample) => sample,
+                        None => Arc::new(source.load(pair)?),
+                    };
+                    Ok(Computed::Depth(Arc::new(compute::thumbnail(&sample))))
+                }),
+            )
+        }
+        Request::Tool(_, name) => {
+            let name = name.clone();
+            let what = format!("CAD model of {name}");
+            job(
+                Lane::Compute,
+                what,
+                Box::new(move |_| Ok(Computed::Tool(Arc::new(compute::tool_model(&name, source.tool_mesh(&name)?)?)))),
+            )
+        }
+        Request::Imprint(recipe, shift) => {
+            let prediction = results.predictions.get(recipe)?.clone();
+            let sample = results.samples.get(&recipe.touch.pair)?;
+            let bubble = sample.finger(recipe.touch.finger).and_then(|t| t.bubble.as_ref());
+            // Without a measurement the bundle's own size is kept.
+            let size = bubble.map_or([0, 0], |b| b.imprint.size());
+            let shift = *shift;
+            job(
+                Lane::Compute,
+                "Prediction in metres".into(),
+                Box::new(move |_| Ok(Computed::Depth(Arc::new(compute::imprint(&prediction, shift, size)?)))),
+            )
+        }
+        Request::Comparison(recipe, shift) => {
+            let predicted = results.imprints.get(&(recipe.clone(), *shift))?.clone();
+            let sample = results.samples.get(&recipe.touch.pair)?.clone();
+            let measured = Imprint::Measured(sample.clone(), recipe.touch);
+            job(
+                Lane::Compute,
+                "Compare prediction and measurement".into(),
+                Box::new(move |_| {
+                    let measured = measured.get().ok_or_else(gone)?;
+                    Ok(Computed::Comparison(Arc::new(compute::compare(&predicted, measured, sample.scale)?)))
+                }),
+            )
+        }
+        Request::Mask(key) => {
+            let imprint = imprint(state, &key.imprint)?;
+            let touch = key.imprint.touch();
+            let sample = results.samples.get(&touch.pair)?.clone();
+            if let MaskRecipe::Unet(id) = &key.recipe {
+                let (services, runtime) = (services.clone(), state.settings.runtime);
+                let bundle = state.library.bundle(id)?.clone();
+                return job(
+                    Lane::Models,
+                    "Contact mask by the mask model".into(),
+                    Box::new(move |_| {
+                        let imprint = imprint.get().ok_or_else(gone)?;
+                        Ok(Computed::Mask(Arc::new(services.mask_by_model(&bundle, runtime, imprint)?)))
+                    }),
+                );
+            }
+            let recipe = key.recipe.clone();
+            let tool = state.library.entry(touch.pair.pair).and_then(|entry| entry.tool.clone());
+            let tool = tool.and_then(|tool| results.tools.get(&tool).cloned());
+            job(
+                Lane::Compute,
+                "Contact mask".into(),
+                Box::new(move |_| {
+                    let bubble = sample.finger(touch.finger).and_then(|t| t.bubble.as_ref());
+                    let imprint = imprint.get().ok_or_else(gone)?;
+                    let mask = compute::mask(&recipe, imprint, bubble, tool.as_deref(), sample.grasp_from_object)?;
+                    Ok(Computed::Mask(Arc::new(mask)))
+                }),
+            )
+        }
+        Request::Cloud(key) => {
+            let mut parts: [Option<(Imprint, Option<Arc<Mask>>)>; 2] = [None, None];
+            let mut pair = None;
+            for (part, slot) in key.parts.iter().zip(&mut parts) {
+                let Some((imprint_key, version)) = part else { continue };
+                pair = Some(imprint_key.touch().pair);
+                let mask = match version {
+                    None => None,
+                    Some(version) => Some(mask_of(state, imprint_key, version)?),
+                };
+                *slot = Some((imprint(state, imprint_key)?, mask));
+            }
+            let sample = results.samples.get(&pair?)?.clone();
+            job(
+                Lane::Compute,
+                "Point cloud".into(),
+                Box::new(move |_| {
+                    let part = |at: usize| {
+                        parts[at].as_ref().and_then(|(imprint, mask)| Some((imprint.get()?, mask.as_deref())))
+                    };
+                    Ok(Computed::Cloud(Arc::new(compute::clouds(&sample, [part(0), part(1)])?)))
+                }),
+            )
+        }
+        Request::Pose(key) => {
+            let clouds = results.clouds.get(&key.cloud)?.clone();
+            let tool = results.tools.get(&key.tool.to_string())?.clone();
+            let pair = key.cloud.parts.iter().flatten().next()?.0.touch().pair;
+            let truth = results.samples.get(&pair)?.grasp_from_object;
+            let engine = key.engine;
+            job(
+                Lane::Compute,
+                "Pose".into(),
+                Box::new(move |_| Ok(Computed::Pose(Arc::new(compute::pose(&clouds, &tool, engine, truth)?)))),
+            )
+        }
+    }
+}
+
+/// The pixels of the mask in a cloud's recipe.
+fn mask_of(state: &State, imprint: &ImprintKey, version: &MaskVersion) -> Option<Arc<Mask>> {
+    match version {
+        MaskVersion::Auto(recipe) => {
+            let key = super::super::keys::MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
+            state.results.masks.get(&key).cloned()
+        }
+        MaskVersion::Hand(revision) => {
+            let touch = imprint.touch();
+            let hand = state.document.hand_mask(&pair_name(state, touch.pair)?, touch.finger)?;
+            (hand.revision == *revision).then(|| hand.mask.clone())
+        }
+    }
+}
+
+/// An input of a job that was there when it was prepared: a defect if it ever shows.
+fn gone() -> TaskError {
+    TaskError::new("Compute", "the measured imprint is not there")
+}

@@ -1,0 +1,145 @@
+//! [`Runtime`]: turns effects and wishes into jobs on lanes, and their answers into commands.
+
+mod lanes;
+mod perform;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use super::apply::apply;
+use super::command::{Command, UiRequest};
+use super::jobs::{Cancel, Lane};
+use super::keys::{DatasetSeq, Request};
+use super::library::Place;
+use super::services::SharedServices;
+use super::state::State;
+use super::tasks::{Progress, Ticket};
+use lanes::{Event, Lanes};
+
+/// Called from any thread when there is something for [`Runtime::tick`] to do.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// The name of a job: a newer one of the same name replaces one that waits.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum JobId {
+    /// Started by a person.
+    Task(Ticket),
+    /// Wanted by a pane.
+    Request(Request),
+    /// Writing the labels of a pair.
+    SaveLabels(DatasetSeq, String),
+    /// Writing the settings.
+    SaveSettings,
+    /// Looking for bundles.
+    Bundles,
+}
+
+/// Runs what `apply` wants done and what the panes want to show.
+pub struct Runtime {
+    services: SharedServices,
+    lanes: Lanes,
+    events: Receiver<Event>,
+    sender: Sender<Event>,
+    /// Progress by ticket, only the latest.
+    progress: Arc<std::sync::Mutex<BTreeMap<Ticket, Progress>>>,
+    wake: Wake,
+    cancels: BTreeMap<Ticket, Cancel>,
+}
+
+impl Runtime {
+    /// A runtime with its own threads; `wake` is called when there is news.
+    pub fn threads(services: SharedServices, wake: Wake) -> Self {
+        Self::new(services, wake, true)
+    }
+
+    /// A runtime without threads: jobs wait until [`Runtime::run_one`] or [`Runtime::settle`] runs them here.
+    pub fn inline(services: SharedServices) -> Self {
+        Self::new(services, Arc::new(|| {}), false)
+    }
+
+    fn new(services: SharedServices, wake: Wake, threaded: bool) -> Self {
+        let (sender, events) = channel();
+        let lanes = Lanes::new(threaded, &sender, &wake);
+        Self { services, lanes, events, sender, progress: Arc::default(), wake, cancels: BTreeMap::new() }
+    }
+
+    /// Reads the settings, looks for bundles and opens `place` (else what was open last, else the demo).
+    pub fn start(&mut self, state: &mut State, place: Option<Place>) -> Vec<UiRequest> {
+        let (settings, problem) = self.services.load_settings();
+        let place = place.or_else(|| settings.recent.first().cloned()).unwrap_or(Place::Demo);
+        self.tick(state, vec![Command::SettingsLoaded(Box::new(settings), problem), Command::Open(place)])
+    }
+
+    /// One round: answers of jobs, then `commands`, then what has to be done about them, then what is to be shown.
+    ///
+    /// Returns what only the window can do. Cheap when there is nothing to do.
+    pub fn tick(&mut self, state: &mut State, commands: Vec<Command>) -> Vec<UiRequest> {
+        let mut ui = Vec::new();
+        while let Ok(Event { id, command }) = self.events.try_recv() {
+            if let JobId::Task(ticket) = &id {
+                self.cancels.remove(ticket);
+                lock(&self.progress).remove(ticket);
+            }
+            self.run(state, command, &mut ui);
+            // Only now: until its result is in the state, a request counts as running and is not started again.
+            self.lanes.forget(&id);
+        }
+        let progress = std::mem::take(&mut *lock(&self.progress));
+        for (ticket, progress) in progress {
+            self.run(state, Command::Progressed(ticket, progress), &mut ui);
+        }
+        for command in commands {
+            self.run(state, command, &mut ui);
+        }
+        let wanted = state.wanted();
+        if wanted != state.tasks.demanded {
+            self.run(state, Command::Demanded(wanted), &mut ui);
+        }
+        let services = &self.services;
+        self.lanes.demand(&state.tasks.demanded, |request| super::jobs::prepare::prepare(state, services, request));
+        ui
+    }
+
+    /// Runs the first waiting job of a lane here and now; `false` if none waits. Only without threads.
+    pub fn run_one(&mut self, lane: Lane) -> bool {
+        self.lanes.run_one(lane)
+    }
+
+    /// Runs jobs here until nothing waits any more. Only without threads.
+    pub fn settle(&mut self, state: &mut State) -> Vec<UiRequest> {
+        use strum::IntoEnumIterator as _;
+        let mut ui = self.tick(state, Vec::new());
+        while Lane::iter().any(|lane| self.lanes.run_one(lane)) {
+            ui.extend(self.tick(state, Vec::new()));
+        }
+        ui
+    }
+
+    /// Jobs that wait on a lane.
+    pub fn waiting(&self, lane: Lane) -> usize {
+        self.lanes.waiting(lane)
+    }
+
+    fn run(&mut self, state: &mut State, command: Command, ui: &mut Vec<UiRequest>) {
+        log::trace!("{command:?}");
+        for effect in apply(state, command) {
+            self.perform(effect, ui);
+        }
+    }
+}
+
+impl Drop for Runtime {
+    /// Tells every job to stop, and waits for files that are being written.
+    fn drop(&mut self) {
+        for cancel in self.cancels.values() {
+            cancel.cancel();
+        }
+        self.lanes.close();
+    }
+}
+
+/// A lock that a caught panic did not make unusable.
+fn lock<T>(mutex: &std::sync::Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+}

@@ -1,0 +1,256 @@
+//! Queues and threads. A job that panics is caught here and becomes an ordinary failure.
+
+use std::collections::{BTreeSet, VecDeque};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Condvar, Mutex};
+use std::thread::JoinHandle;
+
+use strum::IntoEnumIterator as _;
+
+use super::super::command::Command;
+use super::super::error::TaskError;
+use super::super::jobs::prepare::RequestJob;
+use super::super::jobs::{JobCx, Lane};
+use super::super::keys::Request;
+use super::{JobId, Wake, lock};
+
+/// The end of a job.
+pub(super) struct Event {
+    pub(super) id: JobId,
+    pub(super) command: Command,
+}
+
+/// A waiting job.
+pub(super) struct Job {
+    pub(super) id: JobId,
+    pub(super) what: String,
+    pub(super) cx: JobCx,
+    /// Computes the answer.
+    pub(super) body: Box<dyn FnOnce(&JobCx) -> Result<Command, TaskError> + Send>,
+    /// The answer when there is none.
+    pub(super) failed: Box<dyn FnOnce(TaskError) -> Command + Send>,
+}
+
+#[derive(Default)]
+struct Queue {
+    /// Jobs that a person or a change of the document started: in order, none left out.
+    ordered: VecDeque<Job>,
+    /// Jobs that a pane wants: replaced as a whole when it wants something else.
+    demanded: VecDeque<Job>,
+    /// Requests taken from `demanded` whose answer was not handled yet.
+    started: BTreeSet<Request>,
+    closing: bool,
+}
+
+impl Queue {
+    fn pop(&mut self) -> Option<Job> {
+        if let Some(job) = self.ordered.pop_front() {
+            return Some(job);
+        }
+        if self.closing {
+            return None;
+        }
+        let job = self.demanded.pop_front()?;
+        if let JobId::Request(request) = &job.id {
+            self.started.insert(request.clone());
+        }
+        Some(job)
+    }
+}
+
+struct LaneState {
+    queue: Mutex<Queue>,
+    filled: Condvar,
+}
+
+pub(super) struct Lanes {
+    lanes: Vec<Arc<LaneState>>,
+    threads: Vec<(Lane, JoinHandle<()>)>,
+    sender: Sender<Event>,
+    /// What the queues were last filled from.
+    demanded: Vec<Request>,
+    threaded: bool,
+}
+
+/// Threads of each lane. Files go one after the other; models keep one loaded; computing uses what is left.
+fn threads_of(lane: Lane) -> usize {
+    match lane {
+        Lane::Files | Lane::Models => 1,
+        Lane::Compute => std::thread::available_parallelism().map_or(1, |n| n.get().saturating_sub(1).clamp(1, 4)),
+    }
+}
+
+impl Lanes {
+    pub(super) fn new(threaded: bool, sender: &Sender<Event>, wake: &Wake) -> Self {
+        let lanes: Vec<Arc<LaneState>> =
+            Lane::iter().map(|_| Arc::new(LaneState { queue: Mutex::default(), filled: Condvar::new() })).collect();
+        let mut threads = Vec::new();
+        for lane in Lane::iter().filter(|_| threaded) {
+            for _ in 0..threads_of(lane) {
+                let (state, sender, wake) = (lanes[lane as usize].clone(), sender.clone(), wake.clone());
+                let thread = std::thread::Builder::new()
+                    .name(lane.name().to_owned())
+                    .spawn(move || work(&state, &sender, &wake))
+                    .expect("the system gives a program a handful of threads");
+                threads.push((lane, thread));
+            }
+        }
+        Self { lanes, threads, sender: sender.clone(), demanded: Vec::new(), threaded }
+    }
+
+    /// Queues a job; one of the same name that waits is replaced and keeps its place.
+    pub(super) fn submit(&self, lane: Lane, job: Job) {
+        let state = &self.lanes[lane as usize];
+        let mut queue = lock(&state.queue);
+        match queue.ordered.iter_mut().find(|waiting| waiting.id == job.id) {
+            Some(waiting) => *waiting = job,
+            None => queue.ordered.push_back(job),
+        }
+        state.filled.notify_one();
+    }
+
+    /// Takes a waiting job off its queue.
+    pub(super) fn withdraw(&self, id: &JobId) -> Option<Job> {
+        self.lanes.iter().find_map(|state| {
+            let mut queue = lock(&state.queue);
+            let at = queue.ordered.iter().position(|job| job.id == *id)?;
+            queue.ordered.remove(at)
+        })
+    }
+
+    /// Makes `wanted`, in this order, what waits: what is not wanted any more is dropped, what runs goes on.
+    pub(super) fn demand(&mut self, wanted: &[Request], mut prepare: impl FnMut(&Request) -> Option<RequestJob>) {
+        let started: BTreeSet<Request> = self
+            .lanes
+            .iter()
+            .flat_map(|state| lock(&state.queue).started.iter().cloned().collect::<Vec<_>>())
+            .collect();
+        if wanted == self.demanded && started.iter().all(|r| wanted.contains(r)) && self.all_placed(wanted, &started) {
+            return;
+        }
+        let mut fresh: Vec<VecDeque<Job>> = self.lanes.iter().map(|_| VecDeque::new()).collect();
+        for request in wanted.iter().filter(|r| !started.contains(r)) {
+            let Some(RequestJob { lane, what, body }) = prepare(request) else { continue };
+            let (done, failed) = (request.clone(), request.clone());
+            fresh[lane as usize].push_back(Job {
+                id: JobId::Request(request.clone()),
+                what,
+                cx: JobCx::unwatched(),
+                body: Box::new(move |cx| Ok(Command::Computed(done, body(cx)?))),
+                failed: Box::new(move |err| Command::RequestFailed(failed, err)),
+            });
+        }
+        for (state, mut jobs) in self.lanes.iter().zip(fresh) {
+            let mut queue = lock(&state.queue);
+            // A thread may have started one since `started` was read.
+            jobs.retain(|job| !matches!(&job.id, JobId::Request(r) if queue.started.contains(r)));
+            queue.demanded = jobs;
+            state.filled.notify_all();
+        }
+        self.demanded = wanted.to_vec();
+    }
+
+    /// Whether everything wanted runs or waits already.
+    fn all_placed(&self, wanted: &[Request], started: &BTreeSet<Request>) -> bool {
+        let waiting: BTreeSet<Request> = self
+            .lanes
+            .iter()
+            .flat_map(|state| {
+                let queue = lock(&state.queue);
+                let ids = queue.demanded.iter().filter_map(|job| match &job.id {
+                    JobId::Request(request) => Some(request.clone()),
+                    _ => None,
+                });
+                ids.collect::<Vec<_>>()
+            })
+            .collect();
+        wanted.iter().all(|request| started.contains(request) || waiting.contains(request))
+    }
+
+    /// The answer of a job was handled.
+    pub(super) fn forget(&mut self, id: &JobId) {
+        if let JobId::Request(request) = id {
+            for state in &self.lanes {
+                lock(&state.queue).started.remove(request);
+            }
+        }
+    }
+
+    pub(super) fn run_one(&self, lane: Lane) -> bool {
+        if self.threaded {
+            return false;
+        }
+        let job = lock(&self.lanes[lane as usize].queue).pop();
+        match job {
+            Some(job) => {
+                send(&self.sender, execute(job));
+                true
+            }
+            None => false,
+        }
+    }
+
+    pub(super) fn waiting(&self, lane: Lane) -> usize {
+        let queue = lock(&self.lanes[lane as usize].queue);
+        queue.ordered.len() + queue.demanded.len()
+    }
+
+    /// Lets the threads end. Files that wait to be written are written first; nothing else is waited for.
+    pub(super) fn close(&mut self) {
+        for lane in Lane::iter() {
+            let state = &self.lanes[lane as usize];
+            let mut queue = lock(&state.queue);
+            queue.closing = true;
+            if lane != Lane::Files {
+                queue.ordered.clear();
+            }
+            state.filled.notify_all();
+        }
+        for (lane, thread) in self.threads.drain(..) {
+            if lane == Lane::Files && thread.join().is_err() {
+                log::error!("the files lane ended early");
+            }
+        }
+        // Without threads the files are written here.
+        while self.run_one(Lane::Files) {}
+    }
+}
+
+/// The loop of a lane's thread.
+fn work(state: &LaneState, sender: &Sender<Event>, wake: &Wake) {
+    loop {
+        let job = {
+            let mut queue = lock(&state.queue);
+            loop {
+                if let Some(job) = queue.pop() {
+                    break job;
+                }
+                if queue.closing {
+                    return;
+                }
+                queue = state.filled.wait(queue).unwrap_or_else(std::sync::PoisonError::into_inner);
+            }
+        };
+        send(sender, execute(job));
+        wake();
+    }
+}
+
+fn send(sender: &Sender<Event>, event: Event) {
+    // The runtime is gone: so is everybody who would care.
+    drop(sender.send(event));
+}
+
+fn execute(job: Job) -> Event {
+    let Job { id, what, cx, body, failed } = job;
+    let outcome = if cx.cancel.is_cancelled() {
+        Err(TaskError::cancelled(what))
+    } else {
+        match catch_unwind(AssertUnwindSafe(|| body(&cx))) {
+            Ok(outcome) => outcome,
+            Err(payload) => Err(TaskError::panicked(what, &*payload)),
+        }
+    };
+    Event { id, command: outcome.unwrap_or_else(failed) }
+}

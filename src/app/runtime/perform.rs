@@ -1,0 +1,142 @@
+//! From effects to jobs.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::super::command::{Command, UiRequest};
+use super::super::effect::Effect;
+use super::super::error::TaskError;
+use super::super::jobs::{Cancel, JobCx, Lane};
+use super::super::results::Prediction;
+use super::super::tasks::Ticket;
+use super::lanes::{Event, Job};
+use super::{JobId, Runtime, lock};
+use crate::domain::sample::Sample;
+
+/// The body of a job that answers with a command.
+type Body = Box<dyn FnOnce(&JobCx) -> Result<Command, TaskError> + Send>;
+
+impl Runtime {
+    pub(super) fn perform(&mut self, effect: Effect, ui: &mut Vec<UiRequest>) {
+        match effect {
+            Effect::Ui(request) => ui.push(request),
+            Effect::Open { ticket, seq, place } => {
+                let services = self.services.clone();
+                let what = format!("Open {place}");
+                let body =
+                    Box::new(move |_: &JobCx| Ok(Command::Opened(ticket, seq, place.clone(), services.open(&place)?)));
+                self.task(Lane::Files, ticket, what, body);
+            }
+            Effect::FindBundles(folders) => {
+                let services = self.services.clone();
+                // On the lane of the models: hashing them must not hold up the files.
+                self.unwatched(
+                    Lane::Models,
+                    JobId::Bundles,
+                    "Look for model bundles",
+                    Box::new(move |_| {
+                        let (bundles, problems) = services.find_bundles(&folders);
+                        Ok(Command::Bundles(bundles, problems))
+                    }),
+                );
+            }
+            Effect::Generate { ticket, recipe, bundle, source, sample } => {
+                let services = self.services.clone();
+                let what = format!("Generate with {}", bundle.name);
+                let body: Body = Box::new(move |cx| {
+                    let start = Instant::now();
+                    let sample = match sample {
+                        Some(sample) => sample,
+                        None => Arc::new(source.load(recipe.touch.pair.pair)?),
+                    };
+                    let difference = difference(&sample, &recipe)?;
+                    let output = services.generate(&recipe, &bundle, difference, cx)?;
+                    let seconds = start.elapsed().as_secs_f64();
+                    Ok(Command::Generated(ticket, Arc::new(Prediction { recipe, output, seconds })))
+                });
+                self.task(Lane::Models, ticket, what, body);
+            }
+            Effect::Cancel(ticket) => {
+                if let Some(cancel) = self.cancels.get(&ticket) {
+                    cancel.cancel();
+                }
+                // One that waits ends at once, not when its turn comes.
+                if let Some(job) = self.lanes.withdraw(&JobId::Task(ticket)) {
+                    let command = (job.failed)(TaskError::cancelled(job.what));
+                    drop(self.sender.send(Event { id: job.id, command }));
+                    (self.wake)();
+                }
+            }
+            Effect::SaveLabels(source, save) => {
+                let id = JobId::SaveLabels(save.seq, save.name.clone());
+                self.unwatched(
+                    Lane::Files,
+                    id,
+                    "Save the labels",
+                    Box::new(move |_| {
+                        source.save_labels(&save.name, &save.labels)?;
+                        Ok(Command::LabelsSaved(save.name))
+                    }),
+                );
+            }
+            Effect::SaveSettings(settings) => {
+                let services = self.services.clone();
+                self.unwatched(
+                    Lane::Files,
+                    JobId::SaveSettings,
+                    "Save the preferences",
+                    Box::new(move |_| {
+                        services.save_settings(&settings)?;
+                        Ok(Command::SettingsSaved)
+                    }),
+                );
+            }
+            Effect::ExportMasks { ticket, source, labels, folder } => {
+                let body = Box::new(move |cx: &JobCx| {
+                    Ok(Command::Finished(ticket, Some(source.export_masks(&labels, &folder, cx)?)))
+                });
+                self.task(Lane::Compute, ticket, "Export masks".into(), body);
+            }
+        }
+    }
+
+    /// Queues a job that a person started.
+    fn task(&mut self, lane: Lane, ticket: Ticket, what: String, body: Body) {
+        let cancel = Cancel::default();
+        self.cancels.insert(ticket, cancel.clone());
+        let (latest, wake) = (self.progress.clone(), self.wake.clone());
+        let sink = Arc::new(move |progress| {
+            // Only the first since the last round wakes: the rest is picked up with it.
+            if lock(&latest).insert(ticket, progress).is_none() {
+                wake();
+            }
+        });
+        self.lanes.submit(
+            lane,
+            Job {
+                id: JobId::Task(ticket),
+                what,
+                cx: JobCx::new(cancel, sink),
+                body,
+                failed: Box::new(move |err| Command::TaskFailed(ticket, err)),
+            },
+        );
+    }
+
+    /// Queues a job that shows no progress.
+    fn unwatched(&self, lane: Lane, id: JobId, what: &str, body: Body) {
+        let failed = Box::new(Command::SaveFailed);
+        self.lanes.submit(lane, Job { id, what: what.to_owned(), cx: JobCx::unwatched(), body, failed });
+    }
+}
+
+/// The GelSlim image that is the condition.
+fn difference<'a>(
+    sample: &'a Sample,
+    recipe: &super::super::keys::Recipe,
+) -> Result<&'a crate::domain::grid::RgbGrid, TaskError> {
+    let touch = sample.finger(recipe.touch.finger).and_then(|touch| touch.gelslim.as_ref());
+    touch.map(|gelslim| &gelslim.difference).ok_or_else(|| {
+        TaskError::new("Generate", format!("the {} finger has no GelSlim image", recipe.touch.finger.name()))
+    })
+}
