@@ -103,7 +103,8 @@ impl MaskModel {
 
 /// The imprint as the graph wants it, `[1, 1, height, width]`.
 ///
-/// In f32 and truncated, as the lab's `(x - min) / (max - min) * 255` cast to `uint8`.
+/// In f32 and truncated, as the lab's `(x - min) / (max - min) * 255` cast to `uint8`; with the lab's range the same as
+/// [`crate::domain::contact::lab_unet_input`], but for the manifest's range and size.
 fn prepare(imprint: &DepthMap, input: &MaskInput) -> Tensor {
     let [width, height] = input.size;
     let filled = imprint.map(|&v| if v.is_finite() { v } else { 0.0 });
@@ -126,6 +127,7 @@ fn prepare(imprint: &DepthMap, input: &MaskInput) -> Tensor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::contact::{ByteCast, lab_unet_input};
     use crate::infer::bundle::BubbleSensor;
 
     fn input(cast: Cast) -> MaskInput {
@@ -149,5 +151,13 @@ mod tests {
         near(levels(Cast::Saturate), [255.0, 86.0, 0.0]);
         near(levels(Cast::Wrap), [25.0, 86.0, 246.0]);
         near(levels(Cast::None), [255.0, 86.744_87, 0.0]);
+    }
+
+    #[test]
+    fn with_the_labs_range_it_is_the_labs_input() {
+        let imprint = Grid::from_fn(3, 1, |x, _| [0.004, 0.031, -0.0175][x]);
+        for (cast, lab) in [(Cast::Saturate, ByteCast::Saturate), (Cast::Wrap, ByteCast::Wrap)] {
+            assert_eq!(prepare(&imprint, &input(cast)).data(), lab_unet_input(&imprint, lab).image.as_slice());
+        }
     }
 }
