@@ -1,0 +1,281 @@
+//! The list of pairs: source, filter, sort, thumbnails, review states.
+
+use eframe::egui::{
+    self, Align2, Color32, CornerRadius, FontId, Rect, RichText, Role, ScrollArea, Sense, Stroke, TextureId, Ui,
+    WidgetInfo, pos2, vec2,
+};
+use strum::IntoEnumIterator as _;
+
+use super::cx::Cx;
+use super::dialogs::Purpose;
+use super::theme::{Palette, SMALL, caption};
+use super::widget::texture::{address, depth_image};
+use super::widget::empty;
+use crate::app::action::Action;
+use crate::app::command::Command;
+use crate::app::document::Review;
+use crate::app::library::{Place, Sort};
+use crate::domain::colormap::ColorMap;
+use crate::domain::dataset::PairId;
+
+/// Height of a row, points.
+const ROW: f32 = 40.0;
+/// Width of a thumbnail, points.
+const THUMB: f32 = 44.0;
+
+/// The colour of a review state.
+pub fn review_color(p: &Palette, review: Review) -> Color32 {
+    match review {
+        Review::Todo => p.weak,
+        Review::InProgress => p.caution,
+        Review::Flagged => p.wrong,
+        Review::Done => p.good,
+        Review::Skip => p.line,
+    }
+}
+
+/// The pane.
+pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+    super::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        source_menu(cx, ui);
+        filter_row(cx, ui);
+        ui.add_space(2.0);
+        list(cx, ui);
+    });
+}
+
+/// Title of what is open, with the menu of sources.
+fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let library = &cx.state.library;
+    let title = match (&library.opening, &library.open) {
+        (Some(place), _) => format!("Opening {place}…"),
+        (None, Some(open)) => open.source.title().to_owned(),
+        (None, None) => "Open…".to_owned(),
+    };
+    let width = ui.available_width();
+    let button = egui::Button::new(RichText::new(title).color(cx.p.strong)).truncate().min_size(vec2(width, 24.0));
+    let (response, _) = egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| {
+        ui.set_min_width(220.0);
+        if ui.button("Demo").on_hover_text("Simulated touches of 12 tools, made when they are looked at").clicked() {
+            cx.push(Command::Open(Place::Demo));
+        }
+        let folder = ui.add(egui::Button::new("Open folder…").shortcut_text("Ctrl+O"));
+        if folder.on_hover_text("A folder in the lab's layout, or a folder of image pairs").clicked() {
+            cx.act(Action::OpenFolder);
+        }
+        if ui.button("Open path…").on_hover_text("Type or paste a path").clicked() {
+            cx.local.dialogs.type_path(Purpose::Folder, "");
+        }
+        let reload = ui.add_enabled(cx.state.library.open.is_some(), egui::Button::new("Reload").shortcut_text("F5"));
+        if reload.on_hover_text(Action::Reload.tooltip()).clicked() {
+            cx.act(Action::Reload);
+        }
+        let recent: Vec<_> = cx.state.settings.recent.iter().filter(|r| **r != Place::Demo).cloned().collect();
+        if !recent.is_empty() {
+            ui.separator();
+            ui.label(caption("Recent", cx.p));
+            for place in recent {
+                let text = place.to_string();
+                let short = text.rsplit('/').next().unwrap_or(&text).to_owned();
+                if ui.button(short).on_hover_text(text).clicked() {
+                    cx.push(Command::Open(place));
+                }
+            }
+        }
+    });
+    response.on_hover_text("What is open. Click to open something else, or drop a folder on the window");
+}
+
+fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let sort_width = 74.0;
+        let edit = egui::TextEdit::singleline(&mut cx.local.filter)
+            .hint_text("Filter: rod  is:todo")
+            .desired_width(ui.available_width() - sort_width - 12.0);
+        let response = ui.add(edit).accessible_name("Filter samples");
+        if std::mem::take(&mut cx.local.focus_filter) {
+            response.request_focus();
+        }
+        if response.changed() {
+            cx.out.push(Command::SetFilter(cx.local.filter.clone()));
+        } else if !response.has_focus() && cx.local.filter != cx.state.library.filter {
+            cx.local.filter.clone_from(&cx.state.library.filter);
+        }
+        response.on_hover_text(
+            "Words of the name or tool. tool:rod narrows to tools; is:todo, is:in-progress, is:flagged, is:done and \
+             is:skip to review states (Ctrl+F)",
+        );
+        let sort = cx.state.library.sort;
+        let combo = egui::ComboBox::from_id_salt("sort").width(sort_width).selected_text(sort.name());
+        let response = combo.show_ui(ui, |ui| {
+            for s in Sort::iter() {
+                if ui.selectable_label(s == sort, s.name()).clicked() {
+                    cx.out.push(Command::SetSort(s));
+                }
+            }
+        });
+        response.response.accessible_name("Sort").on_hover_text("Order of the list");
+    });
+    if let Some(open) = &cx.state.library.open
+        && open.tools.len() > 1
+    {
+        let chosen = cx.state.library.tool.clone();
+        let text = chosen.clone().unwrap_or_else(|| format!("All {} tools", open.tools.len()));
+        let combo = egui::ComboBox::from_id_salt("tool").width(ui.available_width()).selected_text(text).truncate();
+        let response = combo.show_ui(ui, |ui| {
+            if ui.selectable_label(chosen.is_none(), "All tools").clicked() {
+                cx.out.push(Command::SetToolFilter(None));
+            }
+            for tool in &open.tools {
+                if ui.selectable_label(chosen.as_ref() == Some(tool), tool).clicked() {
+                    cx.out.push(Command::SetToolFilter(Some(tool.clone())));
+                }
+            }
+        });
+        response.response.accessible_name("Tool").on_hover_text("Only pairs of one tool");
+    }
+}
+
+fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let library = &cx.state.library;
+    let total = library.pairs().len();
+    let shown = library.order.len();
+    let done = library.open.as_ref().map_or(0, |_| cx.state.document.reviews.values().filter(|r| r.is_finished()).count());
+    ui.horizontal(|ui| {
+        let count = if shown == total { format!("{total} pairs") } else { format!("{shown} of {total} pairs") };
+        ui.label(caption(count, cx.p));
+        if done > 0 {
+            ui.label(RichText::new(format!("{done} done")).size(SMALL).color(cx.p.good));
+        }
+        let problems = library.open.as_ref().map_or(0, |o| o.source.problems().len());
+        if problems > 0 {
+            let text = RichText::new(format!("{problems} problems")).size(SMALL).color(cx.p.caution);
+            ui.label(text).on_hover_ui(|ui| {
+                if let Some(open) = &cx.state.library.open {
+                    for problem in open.source.problems().iter().take(12) {
+                        ui.label(format!("{}: {}", problem.file.display(), problem.what));
+                        ui.label(caption(problem.hint.as_str(), cx.p));
+                    }
+                }
+            });
+        }
+    });
+    if let Some(failure) = &library.failure {
+        ui.label(RichText::new(failure.to_string()).color(cx.p.wrong).size(SMALL));
+    }
+    if shown == 0 {
+        if library.opening.is_some() {
+            ui.label(caption("Reading the index…", cx.p));
+        } else if library.open.is_none() {
+            if empty::show(ui, "Nothing is open", "Drop a folder here", Some(("Open the demo", Action::OpenDemo.tooltip()))) {
+                cx.act(Action::OpenDemo);
+            }
+        } else if empty::show(ui, "Nothing passes the filter", "", Some(("Clear the filter", "Shows all pairs"))) {
+            cx.push(Command::SetFilter(String::new()));
+            cx.push(Command::SetToolFilter(None));
+        }
+        return;
+    }
+    let selected_row = cx.state.selection.pair.and_then(|p| library.row_of(p));
+    let spacing = 2.0;
+    ui.spacing_mut().item_spacing.y = spacing;
+    let mut area = ScrollArea::vertical().auto_shrink(false).id_salt("pairs");
+    // A step by key may leave the visible rows: follow it, once.
+    if selected_row != cx.local.scrolled_to {
+        cx.local.scrolled_to = selected_row;
+        if let Some(row) = selected_row {
+            let rows = &library.rows;
+            let height = ui.available_height();
+            if !(rows.start < row && row + 2 < rows.end) {
+                let offset = row as f32 * (ROW + spacing) - height * 0.5 + ROW * 0.5;
+                area = area.vertical_scroll_offset(offset.max(0.0));
+            }
+        }
+    }
+    let output = area.show_rows(ui, ROW, shown, |ui, range| {
+        for row in range.clone() {
+            if let Some(id) = cx.state.library.order.get(row).copied() {
+                row_ui(cx, ui, id, Some(row) == selected_row);
+            }
+        }
+        range
+    });
+    if output.inner != cx.state.library.rows {
+        cx.push(Command::ShowRows(output.inner));
+    }
+}
+
+fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
+    let Some(entry) = cx.state.library.entry(id) else { return };
+    let p = cx.p;
+    let review = cx.state.document.review(&entry.name);
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
+    response.widget_info(|| {
+        WidgetInfo::selected(Role::Button, true, selected, format!("{}, {}", entry.name, review.name()))
+    });
+    if ui.is_rect_visible(rect) {
+        let painter = ui.painter_at(rect);
+        let fill = if selected {
+            p.selected
+        } else if response.hovered() {
+            p.control[0]
+        } else {
+            Color32::TRANSPARENT
+        };
+        painter.rect_filled(rect, 4.0, fill);
+        if selected {
+            let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
+            painter.rect_filled(mark, CornerRadius { nw: 4, sw: 4, ne: 0, se: 0 }, p.accent);
+        }
+        let thumb = Rect::from_min_size(rect.min + vec2(6.0, 2.5), vec2(THUMB, ROW - 5.0));
+        match thumbnail(cx, ui, id) {
+            Some(texture) => {
+                let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+                painter.image(texture, thumb, uv, Color32::WHITE);
+            }
+            None => {
+                painter.rect_filled(thumb, 2.0, p.canvas);
+            }
+        }
+        let left = thumb.right() + 8.0;
+        let dot = pos2(rect.right() - 10.0, rect.center().y);
+        let color = review_color(p, review);
+        if review == Review::Todo {
+            painter.circle_stroke(dot, 3.5, Stroke::new(1.25, color));
+        } else {
+            painter.circle_filled(dot, 4.0, color);
+        }
+        let clip = Rect::from_min_max(pos2(left, rect.top()), pos2(rect.right() - 18.0, rect.bottom()));
+        let text = ui.painter_at(clip);
+        let name = entry.name.rsplit('/').next().unwrap_or(&entry.name);
+        text.text(pos2(left, rect.top() + 5.0), Align2::LEFT_TOP, name, FontId::proportional(13.0), if selected { p.strong } else { p.text });
+        let tool = entry.tool.as_deref().unwrap_or("no tool");
+        let tool = tool.strip_prefix("pattern_").unwrap_or(tool).replace('_', " ");
+        text.text(pos2(left, rect.bottom() - 5.0), Align2::LEFT_BOTTOM, tool, FontId::proportional(SMALL), p.weak);
+    }
+    let tip = format!("{}\n{}", entry.name, review.name());
+    if response.on_hover_text(tip).clicked() {
+        cx.push(Command::Select(id));
+    }
+}
+
+/// The picture of a pair's measured imprint, if it is there.
+fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
+    let open = cx.state.library.open.as_ref()?;
+    let key = open.key(id);
+    let depth = cx.state.results.thumbnails.get(&key)?;
+    let range = super::images::range_of(cx.state);
+    let bits = (range.lo.to_bits(), range.hi.to_bits());
+    let map = ColorMap::from(super::images::map_of(cx.state));
+    let picture = cx.local.textures.get(
+        ui.ctx(),
+        ("thumbnail", key),
+        (address(depth), bits, map),
+        false,
+        Some(depth.clone()),
+        || (depth_image(depth, map, range), None),
+    );
+    Some(picture.texture.id())
+}

@@ -1,0 +1,176 @@
+//! What every pane gets: the state to read, a list to put commands on, and what only the window knows.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use eframe::egui::{self, Response, Ui};
+use glam::DVec3;
+
+use super::dialogs::Dialogs;
+use super::palette::PaletteState;
+use super::scene_view::{Device, SceneView};
+use super::theme::Palette;
+use super::widget::image_canvas::ViewTransform;
+use super::widget::texture::Textures;
+use crate::app::action::Action;
+use crate::app::command::{Command, Pane};
+use crate::app::keys::{ImprintSource, PairKey};
+use crate::app::state::State;
+use crate::domain::mesh::TriMesh;
+use crate::domain::sensor::Finger;
+
+/// What a pane may use while it is drawn.
+pub struct Cx<'a> {
+    /// Everything the studio knows. Read only.
+    pub state: &'a State,
+    /// Executed before the next frame.
+    pub out: &'a mut Vec<Command>,
+    /// What only the window knows.
+    pub local: &'a mut Local,
+    /// The graphics device; `None` if the window has none that can draw 3D.
+    pub device: Result<&'a Device, &'a str>,
+    /// The colours of the theme.
+    pub p: &'static Palette,
+}
+
+impl Cx<'_> {
+    /// Puts a command on the list.
+    pub fn push(&mut self, command: Command) {
+        self.out.push(command);
+    }
+
+    /// Puts an action on the list, if it can do anything now.
+    pub fn act(&mut self, action: Action) {
+        if let Some(command) = action.command(self.state) {
+            self.out.push(command);
+        }
+    }
+
+    /// A button for an action: its tooltip has the shortcut, and it is greyed out when it can do nothing.
+    pub fn action_button(&mut self, ui: &mut Ui, action: Action, text: &str) -> Response {
+        let command = action.command(self.state);
+        let response = ui.add_enabled(command.is_some(), egui::Button::new(text)).accessible_name(action.name());
+        let response = response.on_hover_text(action.help()).on_disabled_hover_text(action.help());
+        if response.clicked()
+            && let Some(command) = command
+        {
+            self.out.push(command);
+        }
+        response
+    }
+}
+
+/// The stroke that the pointer is drawing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Painting {
+    /// The pane.
+    pub pane: Pane,
+    /// The finger.
+    pub finger: Finger,
+}
+
+/// Figures of a pair as they were when it was last on screen, for the table.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SeenPose {
+    /// Size of the angle's error, radians, by imprint source.
+    pub error_rad: [Option<f64>; 2],
+    /// The angle, radians, by imprint source.
+    pub angle_rad: [Option<f64>; 2],
+}
+
+/// Points as the renderer takes them, made once per cloud.
+pub struct SceneCloud {
+    /// Of this cloud: its address, held by `_cloud`.
+    pub address: usize,
+    /// Counts up with every new cloud.
+    pub revision: u64,
+    /// Per finger: positions and colours.
+    pub fingers: [Option<(Arc<[DVec3]>, Arc<[[u8; 3]]>)>; 2],
+    /// Whether the colours are those of the dark theme.
+    pub dark: bool,
+    /// Keeps the address from being used again.
+    pub _cloud: Arc<dyn std::any::Any + Send + Sync>,
+}
+
+/// What only the window knows: view positions, text being typed, textures.
+pub struct Local {
+    /// Pictures.
+    pub textures: Textures,
+    /// What part of GelSlim images is seen.
+    pub gel_view: ViewTransform,
+    /// What part of bubble images is seen.
+    pub bubble_view: ViewTransform,
+    /// The 3D views by [`ImprintSource`].
+    pub scenes: [SceneView; 2],
+    /// Points on the device, by [`ImprintSource`].
+    pub scene_clouds: [Option<SceneCloud>; 2],
+    /// CAD models as the renderer takes them.
+    pub meshes: BTreeMap<usize, (u64, Arc<TriMesh>)>,
+    /// Counts what was made for the renderer.
+    pub revision: u64,
+    /// Half the range of the error's colours, millimetres.
+    pub error_mm: f32,
+    /// The filter being typed.
+    pub filter: String,
+    /// Whether the filter wants the keyboard.
+    pub focus_filter: bool,
+    /// The row that the list was last scrolled to.
+    pub scrolled_to: Option<usize>,
+    /// Dialogs.
+    pub dialogs: Dialogs,
+    /// The command palette.
+    pub palette: PaletteState,
+    /// The pane that fills the window.
+    pub maximised: Option<Pane>,
+    /// The pane under the pointer.
+    pub hovered_pane: Option<Pane>,
+    /// The stroke being drawn.
+    pub painting: Option<Painting>,
+    /// The number under the pointer, for the status bar and the clipboard.
+    pub readout: Option<String>,
+    /// Poses seen, for the table.
+    pub seen: BTreeMap<PairKey, SeenPose>,
+    /// Column of the table that is sorted by, and whether downwards.
+    pub table_sort: (usize, bool),
+    /// What the panes wanted to know about visibility in this frame.
+    pub visible: std::collections::BTreeSet<Pane>,
+    /// The seed being typed.
+    pub seed_text: Option<String>,
+}
+
+impl Local {
+    /// A fresh window's.
+    pub fn new(native_dialogs: bool) -> Self {
+        Self {
+            textures: Textures::default(),
+            gel_view: ViewTransform::default(),
+            bubble_view: ViewTransform::default(),
+            scenes: [SceneView::default(), SceneView::default()],
+            scene_clouds: [None, None],
+            meshes: BTreeMap::new(),
+            revision: 0,
+            error_mm: 4.0,
+            filter: String::new(),
+            focus_filter: false,
+            scrolled_to: None,
+            dialogs: Dialogs::new(native_dialogs),
+            palette: PaletteState::default(),
+            maximised: None,
+            hovered_pane: None,
+            painting: None,
+            readout: None,
+            seen: BTreeMap::new(),
+            table_sort: (4, false),
+            visible: std::collections::BTreeSet::new(),
+            seed_text: None,
+        }
+    }
+}
+
+/// The colour of a side.
+pub fn side_color(p: &Palette, source: ImprintSource) -> egui::Color32 {
+    match source {
+        ImprintSource::Measured => p.truth,
+        ImprintSource::Predicted => p.prediction,
+    }
+}

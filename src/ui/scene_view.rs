@@ -1,0 +1,172 @@
+//! One 3D picture in a pane: its camera, its target on the graphics card, and what the pointer does to it.
+
+use std::sync::Arc;
+
+use eframe::egui::{self, PointerButton, Pos2, Rect, Response, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2, vec2};
+use eframe::egui_wgpu::RenderState;
+use glam::{DVec2, DVec3};
+
+use crate::gpu::pipelines::Pipelines;
+use crate::gpu::scene::{SceneData, SceneRenderer};
+use crate::gpu::target::Target;
+use crate::gpu::view::Camera;
+use crate::gpu::{Gpu, GpuError, wgpu};
+
+/// The graphics device as all 3D panes share it.
+pub struct Device {
+    gpu: Gpu,
+    pipelines: Arc<Pipelines>,
+    state: RenderState,
+}
+
+impl Device {
+    /// Takes the window's device.
+    ///
+    /// # Errors
+    /// What keeps the shaders from being built: shown in place of the 3D views.
+    pub fn new(state: &RenderState) -> Result<Self, GpuError> {
+        let gpu = Gpu::new(&state.adapter, state.device.clone(), state.queue.clone());
+        let pipelines = Arc::new(Pipelines::new(&gpu)?);
+        Ok(Self { gpu, pipelines, state: state.clone() })
+    }
+
+    /// Name and driver of the adapter.
+    pub fn adapter(&self) -> &str {
+        &self.gpu.adapter
+    }
+}
+
+/// One view.
+#[derive(Default)]
+pub struct SceneView {
+    /// Where it looks from.
+    pub camera: Camera,
+    /// Whether the camera was placed by a fit or by a person.
+    pub placed: bool,
+    drawn: Option<Drawn>,
+    error: Option<String>,
+}
+
+struct Drawn {
+    target: Target,
+    renderer: SceneRenderer,
+    texture: TextureId,
+    generation: u64,
+}
+
+/// What happened in a view.
+pub struct SceneOutput {
+    /// The pane's response.
+    pub response: Response,
+    /// The picture's size, physical pixels.
+    pub size: [u32; 2],
+    /// The pointer in physical pixels of the picture.
+    pub pointer: Option<DVec2>,
+    /// Whether the camera was moved by the pointer.
+    pub moved: bool,
+    /// Whether a fit was asked for (double-click).
+    pub fit: bool,
+    rect: Rect,
+}
+
+impl SceneOutput {
+    /// Where a point of the world appears on the screen.
+    pub fn on_screen(&self, camera: &Camera, p_in_world: DVec3) -> Option<Pos2> {
+        let (px, _) = camera.project(p_in_world, self.size)?;
+        let scale = vec2(self.rect.width() / self.size[0].max(1) as f32, self.rect.height() / self.size[1].max(1) as f32);
+        Some(self.rect.min + vec2(px.x as f32, px.y as f32) * scale)
+    }
+}
+
+impl SceneView {
+    /// Takes the space left in `ui` and moves the camera by what the pointer does. Call [`Self::draw`] next, with
+    /// the scene that belongs to the new camera.
+    pub fn interact(&mut self, ui: &mut Ui, label: &str) -> SceneOutput {
+        let space = ui.available_size().max(Vec2::splat(16.0));
+        let (rect, response) = ui.allocate_exact_size(space, Sense::click_and_drag());
+        response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, label));
+        let ppp = ui.pixels_per_point();
+        let size = [rect.width(), rect.height()].map(|s| (s * ppp).round().max(1.0) as u32);
+        let mut moved = false;
+        let delta = response.drag_delta() * ppp;
+        let delta = DVec2::new(f64::from(delta.x), f64::from(delta.y));
+        if delta != DVec2::ZERO {
+            if response.dragged_by(PointerButton::Primary) {
+                self.camera.orbit(delta);
+                moved = true;
+            } else if response.dragged() {
+                self.camera.pan(delta, size);
+                moved = true;
+            }
+        }
+        let pointer = response.hover_pos().map(|pos| (pos - rect.min) * ppp);
+        let pointer = pointer.map(|p| DVec2::new(f64::from(p.x), f64::from(p.y)));
+        if response.contains_pointer() {
+            let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
+            let factor = f64::from(pinch) * (f64::from(scroll) * 0.005).exp();
+            if factor != 1.0 {
+                self.camera.zoom(factor, pointer, size);
+                moved = true;
+            }
+        }
+        self.placed |= moved;
+        let fit = response.double_clicked();
+        SceneOutput { response, size, pointer, moved, fit, rect }
+    }
+
+    /// Brings the picture up to date and paints it. Nothing is drawn on the device when nothing changed.
+    pub fn draw(&mut self, ui: &Ui, device: &Device, output: &SceneOutput, scene: &SceneData) {
+        match self.try_draw(device, output, scene) {
+            Ok(texture) => {
+                let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+                ui.painter().image(texture, output.rect, uv, egui::Color32::WHITE);
+                self.error = None;
+            }
+            Err(error) => {
+                // Logged once per cause: the same view fails in every frame.
+                let text = error.to_string();
+                if self.error.as_ref() != Some(&text) {
+                    log::error!("3D view: {text}");
+                }
+                ui.painter().text(
+                    output.rect.center(),
+                    egui::Align2::CENTER_CENTER,
+                    format!("This view cannot be drawn.\n{text}"),
+                    egui::FontId::proportional(12.0),
+                    ui.visuals().error_fg_color,
+                );
+                self.error = Some(text);
+            }
+        }
+    }
+
+    fn try_draw(&mut self, device: &Device, output: &SceneOutput, scene: &SceneData) -> Result<TextureId, GpuError> {
+        let gpu = &device.gpu;
+        let drawn = match &mut self.drawn {
+            Some(drawn) => drawn,
+            None => {
+                let target = Target::new(gpu, output.size)?;
+                let renderer = SceneRenderer::new(gpu, device.pipelines.clone())?;
+                let texture = device.state.renderer.write().register_native_texture(
+                    &gpu.device,
+                    target.view(),
+                    wgpu::FilterMode::Linear,
+                );
+                let generation = target.generation();
+                self.drawn.insert(Drawn { target, renderer, texture, generation })
+            }
+        };
+        drawn.target.resize(gpu, output.size)?;
+        if drawn.target.generation() != drawn.generation {
+            drawn.generation = drawn.target.generation();
+            device.state.renderer.write().update_egui_texture_from_wgpu_texture(
+                &gpu.device,
+                drawn.target.view(),
+                wgpu::FilterMode::Linear,
+                drawn.texture,
+            );
+        }
+        drawn.renderer.render(gpu, scene, &self.camera, &drawn.target)?;
+        Ok(drawn.texture)
+    }
+}
