@@ -53,6 +53,8 @@ pub enum Pane {
     Masks,
     /// The figures of the selected pair.
     Metrics,
+    /// The figures of all pairs so far.
+    Table,
     /// What happened.
     Log,
     /// Preferences.

@@ -180,13 +180,9 @@ impl ColourRange {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum ColourMap {
-    /// Perceptually uniform, dark blue to yellow.
+    /// Perceptually uniform, dark blue to yellow, readable by colour-blind eyes.
     #[default]
     Viridis,
-    /// Perceptually uniform, for colour-blind eyes.
-    Cividis,
-    /// Perceptually uniform, black to white by way of red.
-    Magma,
     /// Grey.
     Grey,
 }
@@ -196,8 +192,6 @@ impl ColourMap {
     pub fn name(self) -> &'static str {
         match self {
             Self::Viridis => "Viridis",
-            Self::Cividis => "Cividis",
-            Self::Magma => "Magma",
             Self::Grey => "Grey",
         }
     }

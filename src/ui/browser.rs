@@ -9,13 +9,12 @@ use strum::IntoEnumIterator as _;
 use super::cx::Cx;
 use super::dialogs::Purpose;
 use super::theme::{Palette, SMALL, caption};
-use super::widget::texture::{address, depth_image};
+use super::widget::texture::depth_image;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::document::Review;
 use crate::app::library::{Place, Sort};
-use crate::domain::colormap::ColorMap;
 use crate::domain::dataset::PairId;
 
 /// Height of a row, points.
@@ -265,17 +264,12 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
 fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
     let open = cx.state.library.open.as_ref()?;
     let key = open.key(id);
-    let depth = cx.state.results.thumbnails.get(&key)?;
+    let depth = cx.state.thumbnail(id)?;
     let range = super::images::range_of(cx.state);
     let bits = (range.lo.to_bits(), range.hi.to_bits());
-    let map = ColorMap::from(super::images::map_of(cx.state));
-    let picture = cx.local.textures.get(
-        ui.ctx(),
-        ("thumbnail", key),
-        (address(depth), bits, map),
-        false,
-        Some(depth.clone()),
-        || (depth_image(depth, map, range), None),
-    );
+    let map = super::images::map_of(cx.state);
+    let picture = cx.local.textures.get(ui.ctx(), ("thumbnail", key), (bits, map), false, || {
+        (depth_image(depth, map, range), None)
+    });
     Some(picture.texture.id())
 }

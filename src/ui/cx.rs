@@ -1,6 +1,6 @@
 //! What every pane gets: the state to read, a list to put commands on, and what only the window knows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use eframe::egui::{self, Response, Ui};
@@ -8,15 +8,17 @@ use glam::DVec3;
 
 use super::dialogs::Dialogs;
 use super::palette::PaletteState;
+use super::saved::Saved;
 use super::scene_view::{Device, SceneView};
 use super::theme::Palette;
 use super::widget::image_canvas::ViewTransform;
-use super::widget::texture::Textures;
+use super::widget::texture::{Memo, Textures};
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
-use crate::app::keys::{ImprintSource, PairKey};
+use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource, PairKey};
 use crate::app::state::State;
 use crate::domain::mesh::TriMesh;
+use crate::domain::postprocess::Stats;
 use crate::domain::sensor::Finger;
 
 /// What a pane may use while it is drawn.
@@ -80,22 +82,34 @@ pub struct SeenPose {
 
 /// Points as the renderer takes them, made once per cloud.
 pub struct SceneCloud {
-    /// Of this cloud: its address, held by `_cloud`.
-    pub address: usize,
+    /// The cloud.
+    pub key: CloudKey,
     /// Counts up with every new cloud.
     pub revision: u64,
     /// Per finger: positions and colours.
     pub fingers: [Option<(Arc<[DVec3]>, Arc<[[u8; 3]]>)>; 2],
     /// Whether the colours are those of the dark theme.
     pub dark: bool,
-    /// Keeps the address from being used again.
-    pub _cloud: Arc<dyn std::any::Any + Send + Sync>,
+}
+
+/// A CAD model as the renderer takes it.
+pub struct SceneMesh {
+    /// The data set and the tool.
+    pub key: (DatasetSeq, String),
+    /// Counts up with every new model.
+    pub revision: u64,
+    /// The model.
+    pub mesh: Arc<TriMesh>,
 }
 
 /// What only the window knows: view positions, text being typed, textures.
 pub struct Local {
     /// Pictures.
     pub textures: Textures,
+    /// Outlines of masks.
+    pub outlines: Memo<Vec<[[f32; 2]; 2]>>,
+    /// Figures of images.
+    pub stats: Memo<Stats>,
     /// What part of GelSlim images is seen.
     pub gel_view: ViewTransform,
     /// What part of bubble images is seen.
@@ -104,8 +118,8 @@ pub struct Local {
     pub scenes: [SceneView; 2],
     /// Points on the device, by [`ImprintSource`].
     pub scene_clouds: [Option<SceneCloud>; 2],
-    /// CAD models as the renderer takes them.
-    pub meshes: BTreeMap<usize, (u64, Arc<TriMesh>)>,
+    /// The CAD model as the renderer takes them.
+    pub mesh: Option<SceneMesh>,
     /// Counts what was made for the renderer.
     pub revision: u64,
     /// Half the range of the error's colours, millimetres.
@@ -128,14 +142,26 @@ pub struct Local {
     pub painting: Option<Painting>,
     /// The number under the pointer, for the status bar and the clipboard.
     pub readout: Option<String>,
+    /// The read-out of the frame before.
+    pub readout_before: Option<String>,
+    /// The read-out that the status bar shows.
+    pub readout_shown: Option<String>,
+    /// Time of the last frame, milliseconds.
+    pub frame_ms: f32,
+    /// Hidden panes of the workspace.
+    pub hidden: BTreeSet<Pane>,
+    /// A pane to be shown or hidden.
+    pub toggle_pane: Option<Pane>,
     /// Poses seen, for the table.
     pub seen: BTreeMap<PairKey, SeenPose>,
     /// Column of the table that is sorted by, and whether downwards.
     pub table_sort: (usize, bool),
-    /// What the panes wanted to know about visibility in this frame.
-    pub visible: std::collections::BTreeSet<Pane>,
-    /// The seed being typed.
-    pub seed_text: Option<String>,
+    /// The panes of the last frame.
+    pub visible: BTreeSet<Pane>,
+    /// The panes of this frame, so far.
+    pub visible_next: BTreeSet<Pane>,
+    /// When labels were last written.
+    pub saved: Saved,
 }
 
 impl Local {
@@ -143,11 +169,13 @@ impl Local {
     pub fn new(native_dialogs: bool) -> Self {
         Self {
             textures: Textures::default(),
+            outlines: Memo::default(),
+            stats: Memo::default(),
             gel_view: ViewTransform::default(),
             bubble_view: ViewTransform::default(),
             scenes: [SceneView::default(), SceneView::default()],
             scene_clouds: [None, None],
-            meshes: BTreeMap::new(),
+            mesh: None,
             revision: 0,
             error_mm: 4.0,
             filter: String::new(),
@@ -159,10 +187,16 @@ impl Local {
             hovered_pane: None,
             painting: None,
             readout: None,
+            readout_before: None,
+            readout_shown: None,
+            frame_ms: 0.0,
+            hidden: BTreeSet::new(),
+            toggle_pane: None,
             seen: BTreeMap::new(),
             table_sort: (4, false),
-            visible: std::collections::BTreeSet::new(),
-            seed_text: None,
+            visible: BTreeSet::new(),
+            visible_next: BTreeSet::new(),
+            saved: Saved::default(),
         }
     }
 }

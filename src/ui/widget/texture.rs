@@ -1,9 +1,7 @@
 //! Pictures on the graphics card, made again only when what they show changed.
 
-use std::any::Any;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::sync::Arc;
 
 use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions};
 
@@ -43,8 +41,6 @@ pub struct Picture {
     pub histogram: Option<Histogram>,
     key: u64,
     used: u64,
-    /// Holds what the key's address points to, so that no other picture can take that address.
-    _source: Option<Arc<dyn Any + Send + Sync>>,
 }
 
 /// All pictures, one per slot.
@@ -56,11 +52,6 @@ pub struct Textures {
     pub uploads: u64,
 }
 
-/// The identity of a shared value: its address, which cannot be reused while it is held.
-pub fn address<T: ?Sized>(value: &Arc<T>) -> usize {
-    Arc::as_ptr(value).cast::<u8>() as usize
-}
-
 impl Textures {
     /// Starts a frame: pictures that were not shown for a while are dropped.
     pub fn begin_frame(&mut self) {
@@ -69,16 +60,13 @@ impl Textures {
         self.slots.retain(|_, picture| picture.used + 120 > frame);
     }
 
-    /// The picture in `slot`; made with `make` if `key` (what it shows) or `nearest` changed.
-    ///
-    /// `source` is held as long as the picture, so that an address in `key` stays its own.
+    /// The picture in `slot`; made with `make` if `key` (the recipe of what it shows) or `nearest` changed.
     pub fn get(
         &mut self,
         ctx: &Context,
         slot: impl Hash,
         key: impl Hash,
         nearest: bool,
-        source: Option<Arc<dyn Any + Send + Sync>>,
         make: impl FnOnce() -> (ColorImage, Option<Histogram>),
     ) -> &Picture {
         let slot = hash(slot);
@@ -91,7 +79,7 @@ impl Textures {
                 *uploads += 1;
                 let (image, histogram) = make();
                 let texture = ctx.load_texture("picture", image, options);
-                entry.insert(Picture { texture, histogram, key, used: frame, _source: source })
+                entry.insert(Picture { texture, histogram, key, used: frame })
             }
             std::collections::btree_map::Entry::Occupied(entry) => {
                 let picture = entry.into_mut();
@@ -101,13 +89,49 @@ impl Textures {
                     picture.texture.set(image, options);
                     picture.histogram = histogram;
                     picture.key = key;
-                    picture._source = source;
                 }
                 picture
             }
         };
         picture.used = frame;
         picture
+    }
+
+    /// The picture in `slot` as it is: the one before, while the next is being made.
+    pub fn last(&mut self, slot: impl Hash) -> Option<&Picture> {
+        let frame = self.frame;
+        let picture = self.slots.get_mut(&hash(slot))?;
+        picture.used = frame;
+        Some(picture)
+    }
+}
+
+/// Things derived from what is shown, made again only when that changed.
+#[derive(Debug)]
+pub struct Memo<V> {
+    slots: BTreeMap<u64, (u64, V)>,
+}
+
+impl<V> Default for Memo<V> {
+    fn default() -> Self {
+        Self { slots: BTreeMap::new() }
+    }
+}
+
+impl<V> Memo<V> {
+    /// The thing in `slot`; made with `make` if `key` changed.
+    pub fn get(&mut self, slot: impl Hash, key: impl Hash, make: impl FnOnce() -> V) -> &V {
+        let (slot, key) = (hash(slot), hash(key));
+        match self.slots.entry(slot) {
+            std::collections::btree_map::Entry::Vacant(entry) => &entry.insert((key, make())).1,
+            std::collections::btree_map::Entry::Occupied(entry) => {
+                let held = entry.into_mut();
+                if held.0 != key {
+                    *held = (key, make());
+                }
+                &held.1
+            }
+        }
     }
 }
 
@@ -195,11 +219,11 @@ mod tests {
         let make = || (ColorImage::filled([2, 2], Color32::RED), None);
         for _ in 0..3 {
             textures.begin_frame();
-            textures.get(&ctx, "a", 1, true, None, make);
+            textures.get(&ctx, "a", 1, true, make);
         }
         assert_eq!(textures.uploads, 1);
-        textures.get(&ctx, "a", 2, true, None, make);
-        textures.get(&ctx, "b", 2, true, None, make);
+        textures.get(&ctx, "a", 2, true, make);
+        textures.get(&ctx, "b", 2, true, make);
         assert_eq!(textures.uploads, 3);
     }
 

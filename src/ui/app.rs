@@ -1,0 +1,427 @@
+//! The window: one frame from input to commands.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+use eframe::egui::{self, ThemePreference, ViewportCommand};
+use egui_tiles::Tree;
+use strum::IntoEnumIterator as _;
+
+use super::cx::{Cx, Local, SeenPose};
+use super::dialogs::Purpose;
+use super::pane::Docking;
+use super::scene_view::Device;
+use super::theme::{DARK, LIGHT};
+use super::widget::image_canvas::ViewTransform;
+use super::{bars, layout, log as log_pane, palette, pane, scene, shortcuts, theme};
+use crate::app::command::{Command, Pane, UiRequest};
+use crate::app::keys::ImprintSource;
+use crate::app::library::Place;
+use crate::app::runtime::Runtime;
+use crate::app::services::SharedServices;
+use crate::app::settings::{Theme, Workspace};
+use crate::app::state::State;
+
+/// How the studio is started.
+pub struct Options {
+    /// Files and models.
+    pub services: SharedServices,
+    /// What to open; `None` opens what was open last, else the demo.
+    pub open: Option<PathBuf>,
+    /// Jobs run between frames on the window's own thread, one per frame, instead of on lanes of their own: the same
+    /// input then gives the same frames (tests).
+    pub inline: bool,
+    /// Whether the system's file dialogs are tried before the path box.
+    pub native_dialogs: bool,
+    /// Where screenshots are written; `None` = the working directory.
+    pub screenshots: Option<PathBuf>,
+}
+
+impl Options {
+    /// The usual ones.
+    pub fn new(services: SharedServices, open: Option<PathBuf>) -> Self {
+        Self { services, open, inline: false, native_dialogs: true, screenshots: None }
+    }
+}
+
+/// The studio.
+pub struct StudioApp {
+    state: State,
+    runtime: Runtime,
+    inbox: Vec<Command>,
+    local: Local,
+    trees: BTreeMap<Workspace, Tree<Pane>>,
+    device: Result<Device, String>,
+    inline: bool,
+    first_prediction: bool,
+    applied_theme: Option<Theme>,
+    applied_zoom: f32,
+    layouts_loaded: bool,
+    folder: Option<PathBuf>,
+    services: SharedServices,
+}
+
+impl StudioApp {
+    /// Gives the window its look, takes its graphics device and starts reading.
+    pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
+        theme::install(&cc.egui_ctx);
+        let device = match &cc.wgpu_render_state {
+            Some(state) => Device::new(state).map_err(|e| e.to_string()),
+            None => Err("The window was opened without a graphics device that can draw 3D.".to_owned()),
+        };
+        if let Err(why) = &device {
+            log::error!("No 3D views: {why}");
+        }
+        let ctx = cc.egui_ctx.clone();
+        let mut runtime = if options.inline {
+            Runtime::inline(options.services.clone())
+        } else {
+            Runtime::threads(options.services.clone(), Arc::new(move || ctx.request_repaint()))
+        };
+        let mut state = State::default();
+        let place = options.open.map(Place::Path);
+        let requests = runtime.start(&mut state, place);
+        let inbox = requests.into_iter().map(Command::Ui).collect();
+        Self {
+            state,
+            runtime,
+            inbox,
+            local: Local::new(options.native_dialogs),
+            trees: BTreeMap::new(),
+            device,
+            inline: options.inline,
+            first_prediction: false,
+            applied_theme: None,
+            applied_zoom: 1.0,
+            layouts_loaded: false,
+            folder: options.screenshots,
+            services: options.services,
+        }
+    }
+
+    /// What the studio knows. For tests and the screenshot tool.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Executes a command before the next frame. For tests and the screenshot tool.
+    pub fn push(&mut self, command: Command) {
+        self.inbox.push(command);
+    }
+
+    /// Pictures sent to the graphics card so far.
+    pub fn uploads(&self) -> u64 {
+        self.local.textures.uploads
+    }
+
+    /// Whether nothing runs, nothing waits and nothing is to be executed.
+    pub fn is_idle(&self) -> bool {
+        self.inbox.is_empty() && self.state.tasks.is_idle()
+    }
+
+    /// The panes of the workspace in front are arranged validly. For tests.
+    pub fn layout_is_valid(&self) -> bool {
+        self.trees.iter().all(|(workspace, tree)| layout::is_valid(tree, *workspace))
+    }
+
+    /// One round of the runtime.
+    fn tick(&mut self, ctx: &egui::Context) {
+        let mut commands = std::mem::take(&mut self.inbox);
+        // A text for the clipboard and the like is the window's business, all else the model's.
+        let mut requests = Vec::new();
+        commands.retain(|c| match c {
+            Command::Ui(request) => {
+                requests.push(request.clone());
+                false
+            }
+            _ => true,
+        });
+        if commands.iter().any(|c| matches!(c, Command::Undo | Command::Redo | Command::SetWorkspace(_))) {
+            // The pen is not to be followed into another state.
+            self.local.painting = None;
+        }
+        let switched = commands.iter().find_map(|c| match c {
+            Command::SetWorkspace(w) if *w != self.state.settings.workspace => Some(*w),
+            _ => None,
+        });
+        if let Some(workspace) = switched {
+            commands.push(Command::ShowBothFingers(workspace == Workspace::Label));
+        }
+        requests.extend(self.runtime.tick(&mut self.state, commands));
+        if self.inline {
+            let more = crate::app::jobs::Lane::iter().any(|lane| self.runtime.run_one(lane));
+            if more {
+                ctx.request_repaint();
+            }
+        }
+        for request in requests {
+            self.perform(ctx, request);
+        }
+        self.local.saved.observe(&self.state.document.unsaved);
+        self.first_prediction();
+        self.remember_poses();
+        let settings = &self.state.settings;
+        if self.applied_theme != Some(settings.theme) {
+            self.applied_theme = Some(settings.theme);
+            ctx.set_theme(match settings.theme {
+                Theme::Dark => ThemePreference::Dark,
+                Theme::Light => ThemePreference::Light,
+            });
+        }
+        // Ctrl + and Ctrl - change the toolkit's zoom: keep it; a zoom from the settings is applied once.
+        if (self.applied_zoom - settings.ui_zoom).abs() > 1e-4 {
+            self.applied_zoom = settings.ui_zoom;
+            ctx.set_zoom_factor(settings.ui_zoom);
+        } else if (ctx.zoom_factor() - self.applied_zoom).abs() > 1e-4 {
+            self.applied_zoom = ctx.zoom_factor();
+            self.inbox.push(Command::SetUiZoom(self.applied_zoom));
+        }
+    }
+
+    /// On the first start a prediction is made unasked, so that there is something to see.
+    fn first_prediction(&mut self) {
+        if self.first_prediction || self.state.library.open.is_none() || self.state.settings.hint_dismissed {
+            return;
+        }
+        let demo = self.state.library.open.as_ref().is_some_and(|o| o.place == Place::Demo);
+        if !demo || self.state.library.opening.is_some() {
+            self.first_prediction = !demo;
+            return;
+        }
+        if self.state.can_generate().is_ok() && self.state.sample().ready().is_some() {
+            self.first_prediction = true;
+            if self.state.chosen(self.state.selection.finger).is_none() {
+                self.inbox.push(Command::Generate);
+            }
+        }
+    }
+
+    /// Keeps the pose errors of the pair on screen for the table.
+    fn remember_poses(&mut self) {
+        let Some(key) = self.state.pair_key() else { return };
+        let mut seen = self.local.seen.get(&key).copied().unwrap_or_default();
+        for source in ImprintSource::iter() {
+            if let Some(pose) = self.state.pose(source).ready() {
+                seen.error_rad[source as usize] = pose.error_rad;
+                seen.angle_rad[source as usize] = Some(pose.angle_rad);
+            }
+        }
+        if seen != SeenPose::default() {
+            self.local.seen.insert(key, seen);
+        }
+    }
+
+    /// What only the window can do.
+    fn perform(&mut self, ctx: &egui::Context, request: UiRequest) {
+        match request {
+            UiRequest::PickFolder => self.local.dialogs.open(Purpose::Folder, ctx),
+            UiRequest::PickFile => self.local.dialogs.open(Purpose::File, ctx),
+            UiRequest::PickExportFolder => self.local.dialogs.open(Purpose::Export, ctx),
+            UiRequest::Camera(preset) => {
+                // The view under the pointer turns; linked cameras turn together.
+                let only = match (self.local.hovered_pane, self.state.settings.cameras_linked) {
+                    (Some(Pane::SceneMeasured), false) => Some(ImprintSource::Measured),
+                    (Some(Pane::ScenePredicted), false) => Some(ImprintSource::Predicted),
+                    _ => None,
+                };
+                for source in ImprintSource::iter().filter(|s| only.is_none_or(|o| o == *s)) {
+                    self.local.scenes[source as usize].camera.look_from(scene::preset(preset));
+                }
+            }
+            UiRequest::Fit => match self.local.hovered_pane {
+                Some(Pane::SceneMeasured | Pane::ScenePredicted) => {
+                    for view in &mut self.local.scenes {
+                        view.placed = false;
+                    }
+                }
+                Some(Pane::GelRaw | Pane::GelReference | Pane::GelDifference) => {
+                    self.local.gel_view = ViewTransform::default();
+                }
+                Some(Pane::Measured | Pane::Predicted | Pane::Error) => {
+                    self.local.bubble_view = ViewTransform::default();
+                }
+                _ => {
+                    self.local.gel_view = ViewTransform::default();
+                    self.local.bubble_view = ViewTransform::default();
+                    for view in &mut self.local.scenes {
+                        view.placed = false;
+                    }
+                }
+            },
+            UiRequest::Screenshot => {
+                ctx.send_viewport_cmd(ViewportCommand::Screenshot(egui::UserData::default()));
+            }
+            UiRequest::ToggleFullscreen => {
+                let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
+                ctx.send_viewport_cmd(ViewportCommand::Fullscreen(!full));
+            }
+            UiRequest::ToggleMaximised => {
+                self.local.maximised = match self.local.maximised {
+                    Some(_) => None,
+                    None => self.local.hovered_pane.or(Some(Pane::Measured)),
+                };
+            }
+            UiRequest::ResetWorkspace => {
+                let workspace = self.state.settings.workspace;
+                self.local.maximised = None;
+                self.trees.insert(workspace, layout::default_tree(workspace));
+                self.store_layout(workspace);
+            }
+            UiRequest::CopyHovered => {
+                if let Some(text) = &self.local.readout {
+                    ctx.copy_text(text.clone());
+                }
+            }
+            UiRequest::FocusFilter => self.local.focus_filter = true,
+        }
+        ctx.request_repaint();
+    }
+
+    fn store_layout(&mut self, workspace: Workspace) {
+        if let Some(text) = self.trees.get(&workspace).and_then(layout::to_text) {
+            self.inbox.push(Command::SetLayout(workspace, text));
+        }
+    }
+
+    /// Folders and files dropped on the window, and a screenshot that arrived.
+    fn outside(&mut self, ctx: &egui::Context) {
+        let dropped: Vec<PathBuf> =
+            ctx.input(|i| i.raw.dropped_files.iter().filter_map(|f| f.path.clone()).collect());
+        if let Some(path) = dropped.into_iter().next() {
+            self.inbox.push(Command::Open(Place::Path(path)));
+        }
+        let shots: Vec<Arc<egui::ColorImage>> = ctx.input(|i| {
+            let images = i.events.iter().filter_map(|e| match e {
+                egui::Event::Screenshot { image, .. } => Some(image.clone()),
+                _ => None,
+            });
+            images.collect()
+        });
+        for image in shots {
+            self.inbox.push(super::screenshot::save(self.folder.as_deref(), &image));
+        }
+    }
+}
+
+impl eframe::App for StudioApp {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.tick(ctx);
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, _frame: &mut eframe::Frame) {
+        let started = Instant::now();
+        let ctx = ui.ctx().clone();
+        self.outside(&ctx);
+        self.local.textures.begin_frame();
+        self.local.visible_next = BTreeSet::new();
+        self.local.readout = None;
+        let hovered_before = self.local.hovered_pane.take();
+        let workspace = self.state.settings.workspace;
+        // The settings are read on a lane: trees are made once they are there, and again when they were reset.
+        if !self.layouts_loaded && !self.state.settings.layouts.is_empty() {
+            self.layouts_loaded = true;
+            self.trees.clear();
+        }
+        let stored = self.state.settings.layouts.get(workspace.name());
+        let mut tree = self.trees.remove(&workspace).unwrap_or_else(|| layout::restore(stored, workspace));
+        self.local.hidden = layout::panes_of(workspace)
+            .iter()
+            .copied()
+            .filter(|p| tree.tiles.find_pane(p).is_some_and(|id| !tree.is_visible(id)))
+            .collect();
+        let mut out = Vec::new();
+        let palette_colors = if ui.visuals().dark_mode { &DARK } else { &LIGHT };
+        let mut edited = false;
+        {
+            let mut cx = Cx {
+                state: &self.state,
+                out: &mut out,
+                local: &mut self.local,
+                device: self.device.as_ref().map_err(String::as_str),
+                p: palette_colors,
+            };
+            for action in shortcuts::pressed(&ctx) {
+                if action == crate::app::action::Action::CancelJobs && cx.local.maximised.take().is_some() {
+                    continue;
+                }
+                cx.act(action);
+            }
+            bars::top(&mut cx, ui);
+            // Drawn before the panes, so it shows the read-out of the frame before: at rest they are the same.
+            let readout = std::mem::take(&mut cx.local.readout_before);
+            cx.local.readout = readout;
+            bars::bottom(&mut cx, ui);
+            cx.local.readout = None;
+            let frame = egui::Frame::new().fill(cx.p.frame);
+            egui::CentralPanel::default().frame(frame).show(ui, |ui| match cx.local.maximised {
+                Some(p) => pane::show_maximised(&mut cx, ui, p),
+                None => {
+                    let mut docking = Docking { cx: &mut cx, edited: false };
+                    tree.ui(&mut docking, ui);
+                    edited = docking.edited;
+                }
+            });
+            bars::hint(&mut cx, &ctx);
+            log_pane::notices(&mut cx, &ctx);
+            palette::show(&mut cx, &ctx);
+            shortcuts::sheet(&mut cx, &ctx);
+            bars::drop_overlay(&cx, &ctx);
+            if let Some((purpose, path)) = cx.local.dialogs.show(&ctx) {
+                cx.push(match purpose {
+                    Purpose::Folder | Purpose::File => Command::Open(Place::Path(path)),
+                    Purpose::Export => Command::ExportMasks(path),
+                });
+            }
+        }
+        if let Some(p) = self.local.toggle_pane.take()
+            && let Some(id) = tree.tiles.find_pane(&p)
+        {
+            let shown = tree.is_visible(id);
+            tree.set_visible(id, !shown);
+            edited = true;
+        }
+        self.trees.insert(workspace, tree);
+        if edited {
+            self.store_layout(workspace);
+        }
+        self.after_panes(&ctx, hovered_before, &mut out);
+        self.inbox.append(&mut out);
+        if !self.inbox.is_empty() {
+            ctx.request_repaint();
+        }
+        self.local.frame_ms = started.elapsed().as_secs_f32() * 1e3;
+    }
+
+    fn on_exit(&mut self) {
+        let commands = std::mem::take(&mut self.inbox);
+        self.runtime.tick(&mut self.state, commands);
+        self.runtime.tick(&mut self.state, vec![Command::EndStroke, Command::Save]);
+        // Dropping the runtime waits for what is being written.
+        self.runtime = Runtime::inline(self.services.clone());
+    }
+}
+
+impl StudioApp {
+    /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more.
+    fn after_panes(&mut self, ctx: &egui::Context, hovered_before: Option<Pane>, out: &mut Vec<Command>) {
+        self.local.visible = std::mem::take(&mut self.local.visible_next);
+        if self.local.visible != self.state.selection.panes {
+            out.push(Command::ShowPanes(self.local.visible.clone()));
+        }
+        if self.local.hovered_pane.is_none() && hovered_before.is_some() && ctx.input(|i| i.pointer.hover_pos().is_none()) {
+            out.push(Command::HoverPixel(None));
+        }
+        if self.local.readout != self.local.readout_shown {
+            // The status bar was drawn before the pane under the pointer: once more, with the number in it.
+            self.local.readout_shown.clone_from(&self.local.readout);
+            ctx.request_repaint();
+        }
+        self.local.readout_before.clone_from(&self.local.readout);
+        if self.local.painting.is_some() && !ctx.input(|i| i.pointer.any_down()) {
+            self.local.painting = None;
+            out.push(Command::EndStroke);
+        }
+    }
+}

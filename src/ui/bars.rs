@@ -1,0 +1,232 @@
+//! The bar at the top (workspaces, search, theme, help) and the one at the bottom (finger, read-out, jobs).
+
+use eframe::egui::{self, Align, Layout, Panel, RichText, Sense, Stroke, Ui, pos2, vec2};
+use strum::IntoEnumIterator as _;
+
+use super::cx::Cx;
+use super::dialogs::Purpose;
+use super::theme::{SMALL, caption, medium};
+use super::widget::progress;
+use crate::app::action::Action;
+use crate::app::command::Command;
+use crate::app::library::Place;
+use crate::app::settings::{Theme, Workspace};
+use crate::domain::sensor::Finger;
+
+/// The bar at the top.
+pub fn top(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let frame = egui::Frame::new().fill(cx.p.frame).inner_margin(egui::Margin::symmetric(12, 4));
+    Panel::top("top").frame(frame).exact_size(36.0).resizable(false).show(ui, |ui| {
+        ui.horizontal_centered(|ui| {
+            ui.label(RichText::new("Touch2Touch").family(medium()).size(15.0).color(cx.p.strong));
+            ui.add_space(8.0);
+            open_menu(cx, ui);
+            ui.add_space(12.0);
+            for workspace in Workspace::iter() {
+                tab(cx, ui, workspace);
+            }
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                ui.spacing_mut().item_spacing.x = 4.0;
+                cx.action_button(ui, Action::ShortcutSheet, "?");
+                let dark = cx.state.settings.theme == Theme::Dark;
+                cx.action_button(ui, Action::SwitchTheme, if dark { "Light" } else { "Dark" });
+                view_menu(cx, ui);
+                let width = 190.0;
+                let text = RichText::new("Find anything").color(cx.p.weak);
+                let button = egui::Button::new(text).right_text(caption("Ctrl+P", cx.p)).min_size(vec2(width, 24.0));
+                let response = ui.add(button).accessible_name("Command palette");
+                if response.on_hover_text(Action::Palette.help()).clicked() {
+                    cx.push(Command::SetPalette(true));
+                }
+            });
+        });
+    });
+}
+
+fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let (response, _) = egui::containers::menu::MenuButton::new("Open").ui(ui, |ui| {
+        if ui.button("Demo").on_hover_text(Action::OpenDemo.tooltip()).clicked() {
+            cx.push(Command::Open(Place::Demo));
+        }
+        let button = ui.add(egui::Button::new("Folder…").shortcut_text("Ctrl+O"));
+        if button.on_hover_text(Action::OpenFolder.tooltip()).clicked() {
+            cx.act(Action::OpenFolder);
+        }
+        if ui.button("Path…").on_hover_text("Type or paste a path").clicked() {
+            cx.local.dialogs.type_path(Purpose::Folder, "");
+        }
+        ui.separator();
+        for action in [Action::ExportMasks, Action::Save, Action::Reload] {
+            let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
+            let button = egui::Button::new(action.name()).shortcut_text(keys);
+            let response = ui.add_enabled(action.command(cx.state).is_some(), button);
+            if response.on_hover_text(action.tooltip()).clicked() {
+                cx.act(action);
+            }
+        }
+    });
+    response.on_hover_text("Open a data set, export masks");
+}
+
+/// Shows and hides panes of the workspace.
+fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let (response, _) = egui::containers::menu::MenuButton::new("View").ui(ui, |ui| {
+        ui.set_min_width(200.0);
+        ui.label(caption("Panes of this workspace", cx.p));
+        for pane in super::layout::panes_of(cx.state.settings.workspace) {
+            let mut shown = !cx.local.hidden.contains(pane);
+            if ui.checkbox(&mut shown, super::pane::title(*pane)).on_hover_text("Show or hide this pane").changed() {
+                cx.local.toggle_pane = Some(*pane);
+            }
+        }
+        ui.separator();
+        for action in [Action::BothFingers, Action::Footprint, Action::MaskVisible, Action::LinkCameras] {
+            cx.action_button(ui, action, action.name());
+        }
+        ui.separator();
+        for action in [Action::ResetWorkspace, Action::Fullscreen] {
+            cx.action_button(ui, action, action.name());
+        }
+    });
+    response.on_hover_text("What is shown");
+}
+
+/// A workspace's tab.
+fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
+    let on = cx.state.settings.workspace == workspace;
+    let color = if on { cx.p.strong } else { cx.p.weak };
+    let text = RichText::new(workspace.name()).family(medium()).color(color);
+    let response = ui.add(egui::Button::new(text).frame(false).min_size(vec2(64.0, 28.0)));
+    let response = response.accessible_name(workspace.name());
+    if on {
+        let r = response.rect;
+        ui.painter().hline(r.left() + 4.0..=r.right() - 4.0, r.bottom() + 1.0, Stroke::new(2.0, cx.p.accent));
+    }
+    let tip = match workspace {
+        Workspace::Inspect => Action::InspectWorkspace,
+        Workspace::Align => Action::AlignWorkspace,
+        Workspace::Label => Action::LabelWorkspace,
+        Workspace::Evaluate => Action::EvaluateWorkspace,
+    };
+    if response.on_hover_text(tip.tooltip()).clicked() {
+        cx.push(Command::SetWorkspace(workspace));
+    }
+}
+
+/// The bar at the bottom.
+pub fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let frame = egui::Frame::new().fill(cx.p.frame).inner_margin(egui::Margin::symmetric(12, 2));
+    Panel::bottom("bottom").frame(frame).exact_size(28.0).resizable(false).show(ui, |ui| {
+        ui.horizontal_centered(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            fingers(cx, ui);
+            ui.add_space(12.0);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                engine(cx, ui);
+                jobs(cx, ui);
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                    let text = cx.local.readout.clone().unwrap_or_default();
+                    let label = egui::Label::new(RichText::new(text).size(12.0).color(cx.p.text)).truncate();
+                    ui.add(label);
+                });
+            });
+        });
+    });
+}
+
+fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
+    for finger in Finger::BOTH {
+        let on = cx.state.selection.finger == finger;
+        let name = match finger {
+            Finger::Right => "Right",
+            Finger::Left => "Left",
+        };
+        let button = ui.add(egui::Button::selectable(on, RichText::new(name).size(12.0)).min_size(vec2(44.0, 20.0)));
+        let button = button.accessible_name(format!("{name} finger"));
+        if button.on_hover_text(format!("Show the {} finger (U switches)", finger.name())).clicked() {
+            cx.push(Command::SelectFinger(finger));
+        }
+    }
+    let both = cx.state.selection.both_fingers;
+    let button = ui.add(egui::Button::selectable(both, RichText::new("Both").size(12.0)).min_size(vec2(44.0, 20.0)));
+    let button = button.accessible_name("Both fingers");
+    if button.on_hover_text(Action::BothFingers.help()).clicked() {
+        cx.push(Command::ShowBothFingers(!both));
+    }
+}
+
+/// What runs, with its progress, and a way to stop it.
+fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let tasks = &cx.state.tasks;
+    let more = tasks.running.len().saturating_sub(1);
+    if let Some((ticket, task)) = tasks.running.iter().next() {
+        let (ticket, cancelling) = (*ticket, task.cancelling);
+        let cancel = ui.add_enabled(!cancelling, egui::Button::new(RichText::new("Cancel").size(SMALL)));
+        let cancel = cancel.accessible_name(format!("Cancel: {}", task.title));
+        if cancel.on_hover_text("Stop this job (Esc)").clicked() {
+            cx.push(Command::Cancel(ticket));
+        }
+        let text = if cancelling { "stopping…".to_owned() } else { task.progress.text.clone() };
+        progress::bar(ui, 150.0, task.progress.fraction(), &text);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        ui.label(RichText::new(format!("{}{more}", task.title)).size(12.0).color(cx.p.text));
+    } else if !tasks.demanded.is_empty() {
+        // A dot, not a spinner: a spinner would draw frames as long as it turns.
+        let (rect, response) = ui.allocate_exact_size(vec2(8.0, 8.0), Sense::hover());
+        ui.painter().circle_filled(pos2(rect.center().x, rect.center().y), 3.5, cx.p.accent);
+        response.on_hover_text("Computing what the panes show");
+        ui.label(caption("computing", cx.p));
+    }
+}
+
+/// The runtime that made what is shown, and in debug builds how long a frame takes.
+fn engine(cx: &Cx<'_>, ui: &mut Ui) {
+    if cfg!(debug_assertions) && cx.local.frame_ms > 0.0 {
+        ui.label(caption(format!("{:.1} ms", cx.local.frame_ms), cx.p)).on_hover_text("Time of the last frame (debug)");
+        ui.add_space(8.0);
+    }
+    let made = cx.state.chosen(cx.state.selection.finger).and_then(|r| cx.state.results.predictions.get(r));
+    let text = match made {
+        Some(prediction) => prediction.raw.runtime.clone(),
+        None => cx.state.settings.runtime.name().to_owned(),
+    };
+    ui.label(caption(text, cx.p)).on_hover_text("The runtime that runs the models");
+    ui.add_space(8.0);
+}
+
+/// Three lines on the first start; gone for good when dismissed.
+pub fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
+    if cx.state.settings.hint_dismissed || cx.state.library.open.is_none() {
+        return;
+    }
+    let area = egui::Area::new(egui::Id::new("hint")).anchor(egui::Align2::CENTER_BOTTOM, vec2(0.0, -44.0));
+    area.show(ctx, |ui| {
+        egui::Frame::popup(ui.style()).fill(cx.p.panel).inner_margin(12).show(ui, |ui| {
+            ui.set_max_width(520.0);
+            ui.horizontal(|ui| {
+                ui.vertical(|ui| {
+                    ui.label(RichText::new("Simulated touches are open; the first prediction is being made.").color(cx.p.strong));
+                    ui.label("D and A step through the pairs, Ctrl+G predicts the one on screen.");
+                    ui.label("Ctrl+P finds everything else. Drop a folder here to open your own data.");
+                });
+                ui.add_space(8.0);
+                if ui.button("Got it").on_hover_text("Do not show this again").clicked() {
+                    cx.push(Command::DismissHint);
+                }
+            });
+        });
+    });
+}
+
+/// What a folder dragged over the window would do.
+pub fn drop_overlay(cx: &Cx<'_>, ctx: &egui::Context) {
+    if ctx.input(|i| i.raw.hovered_files.is_empty()) {
+        return;
+    }
+    let painter = ctx.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::new("drop")));
+    let rect = ctx.content_rect();
+    painter.rect_filled(rect, 0.0, cx.p.canvas.gamma_multiply(0.85));
+    painter.rect_stroke(rect.shrink(24.0), 12.0, Stroke::new(2.0, cx.p.accent), egui::StrokeKind::Inside);
+    let font = egui::FontId::new(20.0, medium());
+    painter.text(rect.center(), egui::Align2::CENTER_CENTER, "Drop to open this folder", font, cx.p.strong);
+}

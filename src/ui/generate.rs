@@ -1,0 +1,215 @@
+//! The generator: bundle, steps, seed, range mapping, run, and the results so far.
+
+use eframe::egui::{self, RichText, ScrollArea, Ui, vec2};
+use strum::IntoEnumIterator as _;
+
+use super::cx::Cx;
+use super::theme::{SMALL, caption, section, value};
+use super::widget::progress;
+use crate::app::action::Action;
+use crate::app::command::Command;
+use crate::app::keys::{Recipe, Sampler, ShiftMode};
+use crate::app::library::BundleKind;
+use crate::app::settings::{GenerateSettings, STEPS};
+use crate::domain::sensor::Finger;
+
+/// Width of the captions at the left.
+const LABEL: f32 = 60.0;
+
+/// A caption at the left of its control.
+fn row(ui: &mut Ui, cx: &Cx<'_>, name: &str, add: impl FnOnce(&mut Ui)) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.add_sized(vec2(LABEL, 20.0), egui::Label::new(RichText::new(name).color(cx.p.weak)).truncate().halign(egui::Align::Min));
+        add(ui);
+    });
+}
+
+/// The pane.
+pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+    super::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        ScrollArea::vertical().id_salt("generate").show(ui, |ui| {
+            settings(cx, ui);
+            run(cx, ui);
+            ui.add_space(4.0);
+            mapping(cx, ui);
+            ui.add_space(4.0);
+            results(cx, ui);
+        });
+    });
+}
+
+fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let old = cx.state.settings.generate.clone();
+    let mut new = old.clone();
+    row(ui, cx, "Model", |ui| {
+        let bundles: Vec<_> =
+            cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator).collect();
+        let current = cx.state.bundle(BundleKind::Generator).map_or("none found", |b| b.name.as_str());
+        let combo = egui::ComboBox::from_id_salt("bundle").width(ui.available_width() - 8.0).selected_text(current).truncate();
+        let response = combo.show_ui(ui, |ui| {
+            for bundle in bundles {
+                let chosen = bundle.name == current;
+                let option = ui.selectable_label(chosen, &bundle.name);
+                if option.on_hover_text(bundle.folder.display().to_string()).clicked() {
+                    new.bundle = Some(bundle.name.clone());
+                }
+            }
+        });
+        response.response.accessible_name("Model").on_hover_text("The model bundle that generates");
+    });
+    for problem in &cx.state.library.bundle_problems {
+        ui.label(RichText::new(problem.to_string()).size(SMALL).color(cx.p.wrong));
+    }
+    row(ui, cx, "Sampler", |ui| {
+        let combo = egui::ComboBox::from_id_salt("sampler").width(72.0).selected_text(new.sampler.name());
+        let response = combo.show_ui(ui, |ui| {
+            for sampler in Sampler::iter() {
+                ui.selectable_value(&mut new.sampler, sampler, sampler.name());
+            }
+        });
+        response.response.accessible_name("Sampler").on_hover_text("The way from noise to an image");
+        ui.label(RichText::new("eta").color(cx.p.weak));
+        let drag = egui::DragValue::new(&mut new.eta).speed(0.01).range(0.0..=1.0).fixed_decimals(2);
+        reset(ui.add(drag).accessible_name("Eta"), "DDIM's share of fresh noise, 0 to 1; 0 is deterministic", "0.00", || {
+            new.eta = GenerateSettings::default().eta;
+        });
+    });
+    row(ui, cx, "Steps", |ui| {
+        let drag = egui::DragValue::new(&mut new.steps).speed(0.2).range(STEPS);
+        let tip = "Denoising steps: more take longer and add detail";
+        reset(ui.add(drag).accessible_name("Steps"), tip, "20", || new.steps = GenerateSettings::default().steps);
+        let both = ui.checkbox(&mut new.both_fingers, "both fingers");
+        both.on_hover_text("Generate for both fingers: the pose needs both. Off: only the active finger");
+    });
+    row(ui, cx, "Seed", |ui| {
+        let drag = egui::DragValue::new(&mut new.seed).speed(1.0);
+        reset(ui.add(drag).accessible_name("Seed"), "Seed of the noise: the same seed gives the same prediction", "42", || {
+            new.seed = GenerateSettings::default().seed;
+        });
+        let lock = ui.add(egui::Button::selectable(new.seed_locked, "Lock")).accessible_name("Lock the seed");
+        if lock.on_hover_text(Action::LockSeed.help()).clicked() {
+            new.seed_locked = !new.seed_locked;
+        }
+        cx.action_button(ui, Action::GenerateNewSeed, "New");
+    });
+    if new != old {
+        cx.push(Command::SetGenerate(new));
+    }
+}
+
+/// Tooltip with the default; a double-click resets.
+fn reset(response: egui::Response, tip: &str, default: &str, mut set: impl FnMut()) {
+    if response.double_clicked() {
+        set();
+    }
+    response.on_hover_text(format!("{tip}. Default {default}; double-click resets"));
+}
+
+fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.add_space(2.0);
+    let running = cx.state.tasks.running.iter().find(|(_, t)| t.recipe.is_some());
+    let width = ui.available_width();
+    match running {
+        Some((ticket, task)) => {
+            let (ticket, fraction, text) = (*ticket, task.progress.fraction(), task.progress.text.clone());
+            let text = if text.is_empty() { "starting".to_owned() } else { text };
+            ui.horizontal(|ui| {
+                progress::bar(ui, width - 76.0, fraction, &text);
+                let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
+                if cancel.on_hover_text("Stop generating; what is shown stays (Esc)").clicked() {
+                    cx.push(Command::Cancel(ticket));
+                }
+            });
+        }
+        None => {
+            let can = cx.state.can_generate();
+            let text = RichText::new("Generate").family(super::theme::medium()).color(cx.p.on_accent);
+            let button = egui::Button::new(text).fill(cx.p.accent).min_size(vec2(width, 28.0));
+            let response = ui.add_enabled(can.is_ok(), button).accessible_name("Generate");
+            let response = response.on_hover_text(Action::Generate.help());
+            let why = can.err().map_or("", |absent| absent.text());
+            if response.on_disabled_hover_text(why).clicked() {
+                cx.act(Action::Generate);
+            }
+            if !why.is_empty() {
+                ui.label(RichText::new(why).size(SMALL).color(cx.p.caution));
+            }
+        }
+    }
+}
+
+fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.label(section("Range mapping", cx.p));
+    let current = cx.state.settings.shift;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        for mode in ShiftMode::iter() {
+            let radio = ui.radio(mode == current, mode.name());
+            if radio.on_hover_text(mode.tooltip()).clicked() {
+                cx.push(Command::SetShift(mode));
+            }
+        }
+    });
+}
+
+fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let finger = cx.state.selection.finger;
+    let Some(touch) = cx.state.touch_key(finger) else { return };
+    let made: Vec<Recipe> = cx.state.results.made.get(&touch).cloned().unwrap_or_default();
+    ui.label(section(&format!("Results, {} finger", finger.name()), cx.p));
+    if made.is_empty() {
+        ui.label(caption("None yet for this touch.", cx.p));
+        return;
+    }
+    let chosen = cx.state.chosen(finger).cloned();
+    let shift = cx.state.settings.shift;
+    for recipe in made.iter().rev() {
+        let selected = chosen.as_ref() == Some(recipe);
+        let psnr = cx
+            .state
+            .results
+            .comparisons
+            .get(&(recipe.clone(), shift))
+            .and_then(|c| c.psnr_db)
+            .map_or(String::new(), |v| format!("{v:.1} dB"));
+        let seconds = cx.state.results.predictions.get(recipe).map_or(String::new(), |p| format!("{:.1} s", p.seconds));
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let text = format!("seed {}", recipe.seed);
+            let label = ui.add(egui::Button::selectable(selected, text).min_size(vec2(84.0, 20.0)));
+            if label.on_hover_text("Show this prediction").clicked() {
+                choose(cx, recipe);
+            }
+            ui.label(caption(format!("{} steps", recipe.steps), cx.p));
+            ui.label(value(psnr, cx.p).size(SMALL));
+            ui.label(caption(seconds, cx.p));
+            let reuse = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).min_size(vec2(30.0, 18.0)));
+            let reuse = reuse.accessible_name(format!("Use seed {}", recipe.seed));
+            if reuse.on_hover_text("Take the seed, steps and eta of this result for the next run").clicked() {
+                cx.push(Command::SetGenerate(GenerateSettings {
+                    steps: recipe.steps,
+                    seed: recipe.seed,
+                    seed_locked: true,
+                    sampler: recipe.sampler,
+                    eta: recipe.eta.get(),
+                    ..cx.state.settings.generate.clone()
+                }));
+            }
+        });
+    }
+}
+
+/// Shows a prediction, and that of the other finger made with the same settings, if there is one.
+fn choose(cx: &mut Cx<'_>, recipe: &Recipe) {
+    cx.push(Command::Choose(recipe.clone()));
+    for finger in Finger::BOTH {
+        let Some(touch) = cx.state.touch_key(finger) else { continue };
+        let other = Recipe { touch, ..recipe.clone() };
+        if other != *recipe && cx.state.results.predictions.contains(&other) {
+            cx.push(Command::Choose(other));
+        }
+    }
+}
+

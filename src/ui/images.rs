@@ -1,0 +1,517 @@
+//! The image panes: GelSlim, measured and predicted imprint, error. Linked pan, zoom and cross-hair.
+
+use eframe::egui::{Align2, Color32, PointerButton, Rect, TextureId, Ui, UiBuilder, pos2, vec2};
+
+use super::cx::{Cx, Painting, side_color};
+use super::theme::Palette;
+use super::widget::colorbar::{self, Asked, Colorbar};
+use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, shows_squares};
+use super::widget::texture::{Histogram, depth_image, difference_gain, mask_image, outline, rgb_image};
+use super::widget::{brush_cursor, empty};
+use crate::app::command::{Command, Hover, Pane};
+use crate::app::error::TaskError;
+use crate::app::keys::{ImprintSource, MaskVersion, ShiftMode};
+use crate::app::settings::{ColourMap, ColourRange, MaskTool};
+use crate::app::state::{Absent, Lookup, State};
+use crate::domain::colormap::{ColorMap, Range};
+use crate::domain::grid::{DepthMap, RgbGrid};
+use crate::domain::sample::Scale;
+use crate::domain::sensor::{Finger, gelslim_footprint_in_bubble};
+use crate::domain::units;
+
+/// The colours of the mask and of contact points, everywhere: apart from every colour of the maps.
+pub const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
+
+/// The shared range of imprints, metres.
+pub fn range_of(state: &State) -> Range {
+    Range { lo: state.settings.range.min_m, hi: state.settings.range.max_m }
+}
+
+/// The colour map of imprints.
+pub fn map_of(state: &State) -> ColorMap {
+    match state.settings.colour_map {
+        ColourMap::Viridis => ColorMap::Viridis,
+        ColourMap::Grey => ColorMap::Gray,
+    }
+}
+
+/// What every millimetre of this sample must be labelled with; empty where lengths are measured.
+pub fn scale_note(state: &State) -> &'static str {
+    match state.sample().ready().map(|s| s.scale) {
+        Some(Scale::Assumed) => "assumed scale",
+        _ => "",
+    }
+}
+
+/// Where a bubble pixel appears in the GelSlim image of `size` pixels: the GelSlim sees the dashed rectangle,
+/// rotated by 180 degrees.
+fn gel_from_bubble(finger: Finger, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
+    let [cx, cy, w, h] = gelslim_footprint_in_bubble(finger).map(|v| v as f32);
+    let share = [(px[0] - cx) / w + 0.5, (px[1] - cy) / h + 0.5];
+    [(1.0 - share[0]) * size[0] as f32 - 0.5, (1.0 - share[1]) * size[1] as f32 - 0.5]
+}
+
+/// The opposite of [`gel_from_bubble`].
+fn bubble_from_gel(finger: Finger, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
+    let [cx, cy, w, h] = gelslim_footprint_in_bubble(finger).map(|v| v as f32);
+    let share = [1.0 - (px[0] + 0.5) / size[0].max(1) as f32, 1.0 - (px[1] + 0.5) / size[1].max(1) as f32];
+    [(share[0] - 0.5) * w + cx, (share[1] - 0.5) * h + cy]
+}
+
+/// The pane of one kind of image, for every finger on screen.
+pub fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+    let bar = matches!(pane, Pane::Measured | Pane::Predicted | Pane::Error);
+    let full = ui.available_rect_before_wrap();
+    ui.advance_cursor_after_rect(full);
+    let bottom = if bar { full.bottom() - colorbar::HEIGHT } else { full.bottom() };
+    let area = Rect::from_min_max(full.min, pos2(full.right(), bottom.max(full.top() + 16.0)));
+    // In the order right, left, whichever is active: images must not swap places when the finger is switched.
+    let fingers: Vec<Finger> =
+        Finger::BOTH.into_iter().filter(|f| cx.state.selection.fingers().contains(f)).collect();
+    let beside = area.width() >= area.height();
+    let n = fingers.len() as f32;
+    let mut histogram = None;
+    for (i, finger) in fingers.iter().enumerate() {
+        let i = i as f32;
+        let rect = if beside {
+            let w = area.width() / n;
+            Rect::from_min_size(area.min + vec2(w * i, 0.0), vec2(w - if n > 1.0 { 1.0 } else { 0.0 }, area.height()))
+        } else {
+            let h = area.height() / n;
+            Rect::from_min_size(area.min + vec2(0.0, h * i), vec2(area.width(), h - if n > 1.0 { 1.0 } else { 0.0 }))
+        };
+        let active = n > 1.0 && *finger == cx.state.selection.finger;
+        let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt((pane, *finger)));
+        child.set_clip_rect(rect.intersect(ui.clip_rect()));
+        let found = finger_image(cx, &mut child, pane, *finger);
+        if histogram.is_none() || active {
+            histogram = found.or(histogram);
+        }
+        if active {
+            ui.painter().hline(rect.x_range(), rect.top() + 1.0, (2.0, cx.p.accent));
+        }
+    }
+    if bar {
+        let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
+        ui.painter().rect_filled(rect, 0.0, cx.p.panel);
+        let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt((pane, "bar")));
+        color_bar(cx, &mut child, pane, histogram.as_ref());
+    }
+}
+
+fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histogram>) {
+    let note = scale_note(cx.state);
+    if pane == Pane::Error {
+        let bar = Colorbar {
+            label: "Error range",
+            map: ColorMap::Diverging,
+            default: Range::symmetric(4.0),
+            symmetric: true,
+            histogram,
+            locked: None,
+            note,
+        };
+        match bar.show(ui, Range::symmetric(cx.local.error_mm)) {
+            Some(Asked::Range(range)) => cx.local.error_mm = range.hi.clamp(0.05, 100.0),
+            Some(Asked::Auto) => {
+                if let Some(h) = histogram {
+                    cx.local.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
+                }
+            }
+            Some(Asked::Lock(_)) | None => {}
+        }
+        return;
+    }
+    let range = cx.state.settings.range;
+    let default = ColourRange::default();
+    let bar = Colorbar {
+        label: "Depth range",
+        map: map_of(cx.state),
+        default: Range { lo: default.min_m * 1e3, hi: default.max_m * 1e3 },
+        symmetric: false,
+        histogram,
+        locked: Some(range.locked),
+        note,
+    };
+    match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {
+        Some(Asked::Range(r)) => {
+            cx.push(Command::SetRange(ColourRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..range }));
+        }
+        Some(Asked::Auto) => cx.push(Command::RangeFromShown),
+        Some(Asked::Lock(locked)) => cx.push(Command::SetRange(ColourRange { locked, ..range })),
+        None => {}
+    }
+}
+
+/// One picture. Returns its histogram, where it has values.
+fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger) -> Option<Histogram> {
+    let state = cx.state;
+    match pane {
+        Pane::GelRaw | Pane::GelReference | Pane::GelDifference => {
+            let image: Lookup<'_, RgbGrid> = match pane {
+                Pane::GelDifference => state.gelslim(finger).and_then(Absent::NoGelSlim, |g| Some(&g.difference)),
+                Pane::GelRaw => {
+                    state.gelslim(finger).and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.raw))
+                }
+                _ => state.gelslim(finger).and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.reference)),
+            };
+            gel_image(cx, ui, pane, finger, image);
+            None
+        }
+        Pane::Measured => {
+            depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Measured, finger))
+        }
+        Pane::Predicted => {
+            depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger))
+        }
+        _ => {
+            let error = state.comparison(finger).and_then(Absent::NoPrediction, |c| Some(&c.error));
+            depth_pane(cx, ui, pane, finger, error)
+        }
+    }
+}
+
+/// What stands where there is no picture: the one before, dimmed, while the next is on its way; else a sentence.
+fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, Finger), lookup: Lookup<'_, T>, size: [usize; 2]) {
+    match lookup {
+        Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
+            let rect = ui.available_rect_before_wrap();
+            ui.painter().rect_filled(rect, 0.0, cx.p.canvas);
+            if let Some(picture) = cx.local.textures.last(slot) {
+                let gel = matches!(slot.0, Pane::GelRaw | Pane::GelReference | Pane::GelDifference);
+                let view = if gel { cx.local.gel_view } else { cx.local.bubble_view };
+                let map = CanvasMap::new(rect, size, view, gel);
+                let uv = if gel {
+                    Rect::from_min_max(pos2(1.0, 1.0), pos2(0.0, 0.0))
+                } else {
+                    Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0))
+                };
+                ui.painter_at(rect).image(picture.texture.id(), map.image_rect, uv, Color32::from_gray(110));
+            }
+            ui.painter_at(rect).text(
+                rect.center(),
+                Align2::CENTER_CENTER,
+                "Loading…",
+                eframe::egui::FontId::proportional(12.0),
+                cx.p.weak,
+            );
+        }
+        Lookup::Failed(err) => failed(cx, ui, err),
+        Lookup::Absent(absent) => absent_text(cx, ui, absent),
+    }
+}
+
+/// A failure in words, with the way to try again.
+pub fn failed(cx: &mut Cx<'_>, ui: &mut Ui, err: &TaskError) {
+    let why = match &err.hint {
+        Some(hint) => format!("{}\n{hint}", err.why),
+        None => err.why.clone(),
+    };
+    if empty::show(ui, &format!("{} failed", err.what), &why, Some(("Try again", "Computes it again (Ctrl+R)"))) {
+        cx.push(Command::Retry);
+    }
+}
+
+/// What is missing, and the action that brings it.
+pub fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
+    use crate::app::action::Action;
+    // A prediction on its way shows how far it is, where it will appear.
+    if absent == Absent::NoPrediction
+        && let Some((_, task)) = cx.state.tasks.running.iter().find(|(_, t)| t.recipe.is_some())
+    {
+        let (fraction, text) = (task.progress.fraction(), task.progress.text.clone());
+        let rect = ui.available_rect_before_wrap();
+        ui.painter().rect_filled(rect, 0.0, cx.p.canvas);
+        let width = (rect.width() - 32.0).clamp(40.0, 220.0);
+        let inner = Rect::from_center_size(rect.center(), vec2(width, 40.0));
+        ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
+            ui.label(super::theme::caption("Generating", cx.p));
+            super::widget::progress::bar(ui, width, fraction, &text);
+        });
+        ui.advance_cursor_after_rect(rect);
+        return;
+    }
+    let what = absent.text();
+    let button = absent.action().filter(|a| a.command(cx.state).is_some());
+    let (why, what) = match absent {
+        Absent::NoPrediction if button.is_none() => (
+            match cx.state.can_generate() {
+                Err(reason) => reason.text(),
+                Ok(()) => "",
+            },
+            what,
+        ),
+        Absent::NoGenerator => ("Put a model bundle into assets/models, or choose one in Settings.", what),
+        _ => ("", what),
+    };
+    let text = button.map(|a: Action| match a.shortcut() {
+        Some(shortcut) => (format!("{} ({shortcut})", a.name()), a),
+        None => (a.name().to_owned(), a),
+    });
+    let shown = text.as_ref().map(|(text, a)| (text.as_str(), a.tooltip()));
+    if empty::show(ui, what, why, shown)
+        && let Some((_, action)) = text
+    {
+        cx.act(action);
+    }
+}
+
+fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger, lookup: Lookup<'_, RgbGrid>) {
+    let Some(image) = lookup.shown() else {
+        return placeholder(cx, ui, (pane, finger), lookup, [427, 320]);
+    };
+    let Some(touch) = cx.state.touch_key(finger) else { return };
+    let mut view = cx.local.gel_view;
+    let label = format!("{} {}", super::pane::title(pane), finger.name());
+    let canvas = ImageCanvas { label: &label, size: image.size(), rotated: true, primary: Primary::Pan, background: cx.p.canvas };
+    let output = canvas.show(ui, &mut view);
+    cx.local.gel_view = view;
+    let squares = shows_squares(&output.map, ui.pixels_per_point());
+    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), (touch, pane), squares, || {
+        let picture = if pane == Pane::GelDifference {
+            rgb_image(image, difference_gain(image), 128.0)
+        } else {
+            rgb_image(image, 1.0, 0.0)
+        };
+        (picture, None)
+    });
+    output.paint(picture.texture.id(), Color32::WHITE);
+    if let Some(px) = output.hovered {
+        let value = output.map.pixel(px).and_then(|(x, y)| image.get(x, y));
+        if let (Some(v), Some((x, y))) = (value, output.map.pixel(px)) {
+            cx.local.readout = Some(format!(
+                "{} {} ({x}, {y})   R {:.1}  G {:.1}  B {:.1} of 255",
+                super::pane::title(pane),
+                finger.name(),
+                v[0],
+                v[1],
+                v[2]
+            ));
+        }
+        hover(cx, finger, bubble_from_gel(finger, px, image.size()));
+    }
+    if let Some(at) = cx.state.selection.hover.filter(|h| h.finger == finger) {
+        let px = gel_from_bubble(finger, at.at_px, image.size());
+        if output.map.contains(px) {
+            output.crosshair(px, Color32::WHITE);
+        }
+    }
+    output.caption(Align2::LEFT_TOP, &finger_text(cx.state, finger), cx.p.strong_on_image());
+}
+
+impl Palette {
+    /// Text over pictures: always light, on a dark shade.
+    pub const fn strong_on_image(&self) -> Color32 {
+        Color32::from_gray(235)
+    }
+}
+
+/// `right` where the pane could be either finger's.
+fn finger_text(state: &State, finger: Finger) -> String {
+    let mut text = format!("{} finger", finger.name());
+    if let Some(first) = text.get_mut(0..1) {
+        first.make_ascii_uppercase();
+    }
+    if state.selection.both_fingers && finger == state.selection.finger {
+        text.push_str(", active");
+    }
+    text
+}
+
+/// Tells the other panes where the pointer is.
+fn hover(cx: &mut Cx<'_>, finger: Finger, at_px: [f32; 2]) {
+    let hover = Some(Hover { finger, at_px });
+    if cx.state.selection.hover != hover {
+        cx.push(Command::HoverPixel(hover));
+    }
+}
+
+fn depth_pane(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    pane: Pane,
+    finger: Finger,
+    lookup: Lookup<'_, DepthMap>,
+) -> Option<Histogram> {
+    let Some(depth) = lookup.shown() else {
+        placeholder(cx, ui, (pane, finger), lookup, [175, 140]);
+        return None;
+    };
+    let stale = matches!(lookup, Lookup::Stale(_));
+    let source = if pane == Pane::Predicted { ImprintSource::Predicted } else { ImprintSource::Measured };
+    // The recipe of what is shown: the picture is made again when it changes, and only then.
+    let recipe = match pane {
+        Pane::Error => cx.state.imprint_key(ImprintSource::Predicted, finger).ok()?,
+        _ => cx.state.imprint_key(source, finger).ok()?,
+    };
+    let paintable = pane != Pane::Error
+        && cx.local.visible.contains(&Pane::Masks)
+        && cx.state.settings.mask.tool != MaskTool::Pan
+        && cx.state.document.is_editable(cx.state.pair_name());
+    let primary = if paintable { Primary::Caller } else { Primary::Pan };
+    let mut view = cx.local.bubble_view;
+    let label = format!("{} {}", super::pane::title(pane), finger.name());
+    let canvas = ImageCanvas { label: &label, size: depth.size(), rotated: false, primary, background: cx.p.canvas };
+    let output = canvas.show(ui, &mut view);
+    cx.local.bubble_view = view;
+    let squares = shows_squares(&output.map, ui.pixels_per_point());
+    let (map, range) = match pane {
+        Pane::Error => (ColorMap::Diverging, Range::symmetric(cx.local.error_mm * 1e-3)),
+        _ => (map_of(cx.state), range_of(cx.state)),
+    };
+    let key = (&recipe, map, range.lo.to_bits(), range.hi.to_bits());
+    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), key, squares, || {
+        (depth_image(depth, map, range), Histogram::of(depth.as_slice()))
+    });
+    let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
+    output.paint(texture, if stale { Color32::from_gray(130) } else { Color32::WHITE });
+    if pane != Pane::Error {
+        paint_mask(cx, ui, &output, source, finger);
+    }
+    if cx.state.settings.footprint_visible {
+        output.dashed_rect(gelslim_footprint_in_bubble(finger), Color32::from_gray(235));
+    }
+    if let Some(px) = output.hovered {
+        readout(cx, &output, pane, finger, depth, px);
+        hover(cx, finger, px);
+    }
+    if let Some(at) = cx.state.selection.hover.filter(|h| h.finger == finger)
+        && !(paintable && output.hovered.is_some())
+    {
+        output.crosshair(at.at_px, Color32::WHITE);
+    }
+    if paintable {
+        paint_stroke(cx, ui, &output, pane, source, finger);
+    }
+    captions(cx, &output, pane, finger);
+    histogram
+}
+
+fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
+    let text = finger_text(cx.state, finger);
+    output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
+    let state = cx.state;
+    let right = match pane {
+        Pane::Predicted => state.chosen(finger).map_or(String::new(), |recipe| {
+            format!("seed {} · {} steps · {}", recipe.seed, recipe.steps, state.settings.shift.name().to_lowercase())
+        }),
+        Pane::Error => state.comparison(finger).ready().map_or(String::new(), |c| {
+            format!("mean |error| {}", units::text_mm(c.mae_m))
+        }),
+        _ => String::new(),
+    };
+    let color = match (pane, state.settings.shift) {
+        (Pane::Predicted, ShiftMode::Raw) => super::theme::DARK.caution,
+        _ => cx.p.strong_on_image(),
+    };
+    output.caption(Align2::RIGHT_TOP, &right, color);
+}
+
+/// The value under the pointer, in millimetres and in the unit that is stored.
+fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger, depth: &DepthMap, px: [f32; 2]) {
+    let Some((x, y)) = output.map.pixel(px) else { return };
+    let Some(v) = depth.get(x, y).copied() else { return };
+    let name = super::pane::title(pane);
+    let note = scale_note(cx.state);
+    let note = if note.is_empty() { String::new() } else { format!(" ({note})") };
+    cx.local.readout = Some(if v.is_finite() {
+        format!("{name} {} ({x}, {y})   {}{note}   {v:.6} m", finger.name(), units::text_mm(f64::from(v)))
+    } else {
+        format!("{name} {} ({x}, {y})   no measurement", finger.name())
+    });
+}
+
+/// The mask in force as a veil with an outline, or the outline alone.
+fn paint_mask(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: ImprintSource, finger: Finger) {
+    let settings = &cx.state.settings;
+    if !settings.mask_visible || ui.input(|i| i.key_down(eframe::egui::Key::X)) && !ui.ctx().egui_wants_keyboard_input() {
+        return;
+    }
+    let Ok(in_force) = cx.state.mask_in_force(source, finger) else { return };
+    let key: (&MaskVersion, _) = (&in_force.version, cx.state.imprint_key(source, finger).ok());
+    if !settings.mask_outline {
+        let mask = in_force.mask;
+        let slot = ("mask", source, finger);
+        let picture = cx.local.textures.get(ui.ctx(), slot, &key, true, || (mask_image(mask, Color32::WHITE), None));
+        let texture: TextureId = picture.texture.id();
+        output.paint(texture, CONTACT.gamma_multiply(settings.mask_opacity));
+    }
+    let mask = in_force.mask;
+    let segments = cx.local.outlines.get(&("mask", source, finger), &key, || outline(mask));
+    output.segments(segments, Color32::from_black_alpha(110), 2.5);
+    output.segments(segments, CONTACT, 1.25);
+}
+
+/// Walks every pointer event of the frame: at a low frame rate one frame holds many moves, and a stroke must follow
+/// all of them.
+fn paint_stroke(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, pane: Pane, source: ImprintSource, finger: Finger) {
+    use eframe::egui::Event;
+    let here = Painting { pane, finger };
+    let tool = cx.state.settings.mask.tool;
+    let events = ui.input(|i| i.events.clone());
+    let on_top = output.response.contains_pointer() || output.response.is_pointer_button_down_on();
+    for event in events {
+        match event {
+            Event::PointerButton { pos, button, pressed: true, modifiers }
+                if matches!(button, PointerButton::Primary | PointerButton::Secondary)
+                    && on_top
+                    && !output.panning
+                    && cx.local.painting.is_none()
+                    && output.painter.clip_rect().contains(pos) =>
+            {
+                let erase = button == PointerButton::Secondary || modifiers.ctrl || modifiers.command;
+                cx.local.painting = Some(here);
+                if cx.state.selection.finger != finger {
+                    cx.push(Command::SelectFinger(finger));
+                }
+                let at_px = output.map.to_image(pos);
+                cx.push(Command::BeginStroke { finger, source, at_px, erase });
+            }
+            Event::PointerMoved(pos) if cx.local.painting == Some(here) => {
+                cx.push(Command::StrokeTo(output.map.to_image(pos)));
+            }
+            Event::PointerButton { pressed: false, .. } | Event::PointerGone if cx.local.painting == Some(here) => {
+                cx.local.painting = None;
+                cx.push(Command::EndStroke);
+            }
+            _ => {}
+        }
+    }
+    if let Some(pos) = output.response.hover_pos() {
+        let scroll = ui.input(|i| if i.modifiers.shift { i.smooth_scroll_delta() } else { vec2(0.0, 0.0) });
+        let amount = scroll.x + scroll.y;
+        let radius = cx.state.settings.mask.radius_px;
+        if amount != 0.0 {
+            cx.push(Command::SetBrushRadius(radius * (amount * 0.005).exp()));
+        }
+        let ctrl = ui.input(|i| i.modifiers.ctrl || i.pointer.secondary_down());
+        let erase = (tool == MaskTool::Eraser) != ctrl;
+        brush_cursor::paint(output, output.map.to_image(pos), radius, erase, Color32::WHITE);
+        ui.ctx().set_cursor_icon(eframe::egui::CursorIcon::None);
+    }
+}
+
+/// The small square in the colour of a side, beside the pane's title.
+pub fn side_mark(ui: &mut Ui, p: &Palette, source: ImprintSource) {
+    let (rect, _) = ui.allocate_exact_size(vec2(8.0, 8.0), eframe::egui::Sense::hover());
+    ui.painter().rect_filled(rect, 2.0, side_color(p, source));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cross_hair_finds_its_way_between_the_sensors() {
+        for finger in Finger::BOTH {
+            let [cx, cy, w, h] = gelslim_footprint_in_bubble(finger).map(|v| v as f32);
+            let middle = gel_from_bubble(finger, [cx, cy], [427, 320]);
+            assert!((middle[0] - 213.0).abs() < 1e-3 && (middle[1] - 159.5).abs() < 1e-3);
+            // The GelSlim is rotated: its first pixel is the last corner of the rectangle.
+            let corner = gel_from_bubble(finger, [cx + w * 0.5, cy + h * 0.5], [427, 320]);
+            assert!(corner[0].abs() < 0.51 && corner[1].abs() < 0.51, "{corner:?}");
+            let back = bubble_from_gel(finger, gel_from_bubble(finger, [50.0, 60.0], [427, 320]), [427, 320]);
+            assert!((back[0] - 50.0).abs() < 1e-3 && (back[1] - 60.0).abs() < 1e-3);
+        }
+    }
+}

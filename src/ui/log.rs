@@ -1,0 +1,75 @@
+//! What happened: the log pane, and the notices that appear once.
+
+use eframe::egui::{self, Align2, Color32, RichText, ScrollArea, Ui, vec2};
+
+use super::cx::Cx;
+use super::theme::{Palette, SMALL, caption};
+use crate::app::command::Command;
+use crate::app::tasks::{Entry, Level};
+
+/// Notices on screen at once.
+const MOST: usize = 3;
+
+fn color(p: &Palette, level: Level) -> Color32 {
+    match level {
+        Level::Info => p.text,
+        Level::Warning => p.caution,
+        Level::Error => p.wrong,
+    }
+}
+
+fn entry_ui(p: &Palette, ui: &mut Ui, entry: &Entry) {
+    let count = if entry.count > 1 { format!(" ({} times)", entry.count) } else { String::new() };
+    ui.add(egui::Label::new(RichText::new(format!("{}{count}", entry.text)).color(color(p, entry.level))).wrap());
+    if let Some(hint) = &entry.hint {
+        ui.add(egui::Label::new(RichText::new(hint).size(12.0).color(p.text)).wrap());
+    }
+    if let Some(detail) = &entry.detail {
+        egui::CollapsingHeader::new(RichText::new("Details").size(SMALL).color(p.weak))
+            .id_salt(("details", entry.number))
+            .show(ui, |ui| ui.add(egui::Label::new(caption(detail.as_str(), p)).wrap()));
+    }
+}
+
+/// The pane.
+pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+    super::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        if cx.state.log.entries.is_empty() {
+            ui.label(caption("Nothing happened yet.", cx.p));
+        }
+        ScrollArea::vertical().stick_to_bottom(true).id_salt("log").show(ui, |ui| {
+            for entry in &cx.state.log.entries {
+                entry_ui(cx.p, ui, entry);
+            }
+        });
+    });
+}
+
+/// Warnings and errors that were not seen yet, over the lower right corner. They never block anything.
+pub fn notices(cx: &mut Cx<'_>, ctx: &egui::Context) {
+    let unseen: Vec<Entry> =
+        cx.state.log.unseen().filter(|e| e.level >= Level::Warning).cloned().collect();
+    if unseen.is_empty() {
+        return;
+    }
+    let hidden = unseen.len().saturating_sub(MOST);
+    let last = unseen.iter().map(|e| e.number).max().unwrap_or(0);
+    egui::Area::new(egui::Id::new("notices")).anchor(Align2::RIGHT_BOTTOM, vec2(-12.0, -40.0)).show(ctx, |ui| {
+        egui::Frame::popup(ui.style()).fill(cx.p.panel).inner_margin(12).show(ui, |ui| {
+            ui.set_width(340.0);
+            for entry in unseen.iter().rev().take(MOST) {
+                entry_ui(cx.p, ui, entry);
+                ui.add_space(4.0);
+            }
+            ui.horizontal(|ui| {
+                if ui.button("Dismiss").on_hover_text("They stay in the log").clicked() {
+                    cx.push(Command::LogSeen(last));
+                }
+                if hidden > 0 {
+                    ui.label(caption(format!("and {hidden} more in the log"), cx.p));
+                }
+            });
+        });
+    });
+}

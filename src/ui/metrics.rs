@@ -1,0 +1,202 @@
+//! The figures of the selected pair: image metrics, the ledger of the prediction, the pose.
+
+use eframe::egui::{Align, Color32, Grid, Layout, RichText, ScrollArea, Ui};
+
+use super::cx::{Cx, side_color};
+use super::images;
+use super::scene;
+use super::theme::{SMALL, caption, section, value};
+use crate::app::action::Action;
+use crate::app::command::Command;
+use crate::app::keys::{ImprintSource, PoseEngine};
+use crate::app::state::{Absent, Lookup};
+use crate::domain::postprocess::Stats;
+use crate::domain::sensor::Finger;
+use crate::domain::units;
+use strum::IntoEnumIterator as _;
+
+/// The pane.
+pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+    super::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        ScrollArea::vertical().id_salt("metrics").show(ui, |ui| {
+            pair(cx, ui);
+            pose(cx, ui);
+            comparison(cx, ui);
+            ledger(cx, ui);
+        });
+    });
+}
+
+fn pair(cx: &Cx<'_>, ui: &mut Ui) {
+    let Some(entry) = cx.state.entry() else { return };
+    ui.label(RichText::new(&entry.name).family(super::theme::medium()).color(cx.p.strong));
+    let tool = entry.tool.as_deref().unwrap_or("tool unknown");
+    let note = images::scale_note(cx.state);
+    ui.horizontal(|ui| {
+        ui.label(caption(tool, cx.p));
+        if !note.is_empty() {
+            ui.label(RichText::new(note).size(SMALL).color(cx.p.caution))
+                .on_hover_text("The source lost its scale: every length of this pair is an assumption");
+        }
+    });
+}
+
+fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.add_space(4.0);
+    ui.horizontal(|ui| {
+        ui.label(section("Pose", cx.p));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            let engine = cx.state.settings.pose_engine;
+            let combo = eframe::egui::ComboBox::from_id_salt("engine").width(104.0).selected_text(engine.name());
+            let response = combo.show_ui(ui, |ui| {
+                for e in PoseEngine::iter() {
+                    if ui.selectable_label(e == engine, e.name()).on_hover_text(e.tooltip()).clicked() {
+                        cx.out.push(Command::SetPoseEngine(e));
+                    }
+                }
+            });
+            response.response.accessible_name("Registration").on_hover_text(engine.tooltip());
+        });
+    });
+    for source in [ImprintSource::Measured, ImprintSource::Predicted] {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 6.0;
+            images::side_mark(ui, cx.p, source);
+            ui.label(source.name());
+            match cx.state.pose(source) {
+                Lookup::Ready(pose) | Lookup::Stale(pose) => {
+                    let (text, color) = scene::angle_text(cx.p, pose);
+                    ui.label(RichText::new(text).color(color));
+                }
+                Lookup::Waiting => {
+                    ui.label(caption("…", cx.p));
+                }
+                Lookup::Failed(err) => {
+                    ui.label(RichText::new("failed").color(cx.p.wrong)).on_hover_text(err.to_string());
+                }
+                Lookup::Absent(absent) => {
+                    ui.label(caption(absent_short(absent), cx.p)).on_hover_text(absent.text());
+                }
+            }
+        });
+        if let Some(pose) = cx.state.pose(source).shown() {
+            let p = pose.grasp_from_object;
+            let text = format!("y {:.2} mm   z {:.2} mm", units::mm(p.y_m), units::mm(p.z_m));
+            ui.label(value(text, cx.p).size(SMALL)).on_hover_text("Place of the object's origin in the grasp frame");
+            ui.label(caption(scene::pose_details(pose), cx.p));
+            let action = match source {
+                ImprintSource::Measured => Action::AcceptMeasuredPose,
+                ImprintSource::Predicted => Action::AcceptPredictedPose,
+            };
+            let labels = cx.state.document.pair(cx.state.pair_name());
+            let accepted = labels.and_then(|l| l.accepted(source)) == Some(p);
+            let text = if accepted { "Accepted (withdraw)" } else { "Accept this pose" };
+            cx.action_button(ui, action, text);
+        }
+    }
+}
+
+fn absent_short(absent: Absent) -> &'static str {
+    match absent {
+        Absent::NoPrediction => "no prediction yet",
+        Absent::NoCamera => "no depth camera",
+        Absent::NoTool => "tool unknown",
+        Absent::NoContact => "too few contact points",
+        Absent::NoTruth => "true pose unknown",
+        _ => "not available",
+    }
+}
+
+fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.add_space(4.0);
+    ui.label(section("Prediction against truth", cx.p)).on_hover_text(
+        "PSNR and SSIM as the lab computes them: both images scaled to 0..1 one by one (min-max), data range 1",
+    );
+    let fingers = Finger::BOTH.into_iter().filter(|f| cx.state.selection.fingers().contains(f));
+    for finger in fingers {
+        match cx.state.comparison(finger) {
+            Lookup::Ready(c) | Lookup::Stale(c) => {
+                Grid::new(("comparison", finger)).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
+                    let number = |v: Option<f64>, decimals: usize, unit: &str| match v {
+                        Some(v) => format!("{v:.decimals$}{unit}"),
+                        None => "not defined".to_owned(),
+                    };
+                    line(cx, ui, "PSNR (min-max 0..1)", number(c.psnr_db, 1, " dB"), None);
+                    line(cx, ui, "SSIM (min-max 0..1)", number(c.ssim, 3, ""), None);
+                    line(cx, ui, "Mean |error|", units::text_mm(c.mae_m), None);
+                });
+            }
+            Lookup::Waiting => {
+                ui.label(caption("…", cx.p));
+            }
+            Lookup::Failed(err) => {
+                ui.label(RichText::new(err.to_string()).size(SMALL).color(cx.p.wrong));
+            }
+            Lookup::Absent(absent) => {
+                ui.label(caption(absent.text(), cx.p));
+            }
+        }
+    }
+}
+
+/// A name at the left, a number at the right.
+fn line(cx: &Cx<'_>, ui: &mut Ui, name: &str, number: String, color: Option<Color32>) {
+    ui.label(RichText::new(name).size(12.0).color(cx.p.weak));
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        ui.label(value(number, cx.p).color(color.unwrap_or(cx.p.strong)));
+    });
+    ui.end_row();
+}
+
+/// The stages that a prediction went through, with the figures of each.
+fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let finger = cx.state.selection.finger;
+    let shift = cx.state.settings.shift;
+    let mut rows: Vec<(&str, Option<Color32>, Stats, bool)> = Vec::new();
+    if let Some(recipe) = cx.state.chosen(finger).cloned() {
+        if let Some(prediction) = cx.state.results.predictions.get(&recipe) {
+            let stats = *cx.local.stats.get("raw", &recipe, || Stats::of(&prediction.raw.raw));
+            rows.push(("Decoder, 0..1", None, stats, false));
+        }
+        if let Lookup::Ready(imprint) = cx.state.imprint(ImprintSource::Predicted, finger) {
+            let stats = *cx.local.stats.get("predicted", (&recipe, shift), || Stats::of(imprint));
+            rows.push((shift.name(), Some(side_color(cx.p, ImprintSource::Predicted)), stats, true));
+        }
+        if let Lookup::Ready(c) = cx.state.comparison(finger) {
+            let stats = *cx.local.stats.get("error", (&recipe, shift), || Stats::of(&c.error));
+            rows.push(("Error", None, stats, true));
+        }
+    }
+    if let (Lookup::Ready(imprint), Some(touch)) =
+        (cx.state.imprint(ImprintSource::Measured, finger), cx.state.touch_key(finger))
+    {
+        let stats = *cx.local.stats.get("measured", touch, || Stats::of(imprint));
+        let at = rows.len().min(2);
+        rows.insert(at, ("Measured", Some(side_color(cx.p, ImprintSource::Measured)), stats, true));
+    }
+    if rows.is_empty() {
+        return;
+    }
+    ui.add_space(4.0);
+    ui.label(section(&format!("Ledger, {} finger", finger.name()), cx.p))
+        .on_hover_text("What each stage of the depth chain left behind: smallest, mean, deviation, largest");
+    Grid::new("ledger").num_columns(5).spacing([8.0, 2.0]).min_col_width(24.0).show(ui, |ui| {
+        for head in ["mm", "min", "mean", "std", "max"] {
+            ui.with_layout(if head == "mm" { Layout::left_to_right(Align::Center) } else { Layout::right_to_left(Align::Center) }, |ui| {
+                ui.label(caption(head, cx.p));
+            });
+        }
+        ui.end_row();
+        for (name, color, stats, metres) in rows {
+            ui.label(RichText::new(name).size(SMALL).color(color.unwrap_or(cx.p.text)));
+            for v in [stats.min, stats.mean, stats.std, stats.max] {
+                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                    let v = if metres { units::mm(v) } else { v };
+                    ui.label(value(if v.is_finite() { format!("{v:.2}") } else { "–".to_owned() }, cx.p).size(SMALL));
+                });
+            }
+            ui.end_row();
+        }
+    });
+}

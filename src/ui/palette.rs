@@ -1,0 +1,158 @@
+//! The command palette: finds actions, samples and tools.
+
+use eframe::egui::{self, Align2, FontId, Key, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use strum::IntoEnumIterator as _;
+
+use super::cx::Cx;
+use super::fuzzy::score;
+use super::theme::SMALL;
+use crate::app::action::Action;
+use crate::app::command::Command;
+use crate::domain::dataset::PairId;
+
+/// Entries shown at most: nobody reads further, and a list of 32,000 pairs stays quick.
+const MOST: usize = 60;
+/// Height of an entry, points.
+const ROW: f32 = 28.0;
+
+/// Something that can be chosen.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Entry {
+    Action(Action),
+    Pair(PairId, String),
+    Tool(String),
+}
+
+/// What is being typed.
+#[derive(Debug, Default)]
+pub struct PaletteState {
+    query: String,
+    selected: usize,
+    /// The entries for a query, made again when it changes.
+    found: Option<(String, Vec<Entry>)>,
+    open: bool,
+}
+
+/// The palette, if it is open.
+pub fn show(cx: &mut Cx<'_>, ctx: &egui::Context) {
+    if !cx.state.selection.palette {
+        cx.local.palette.open = false;
+        return;
+    }
+    if !std::mem::replace(&mut cx.local.palette.open, true) {
+        cx.local.palette = PaletteState { open: true, ..PaletteState::default() };
+    }
+    search(cx);
+    let area = egui::Modal::default_area(egui::Id::new("palette")).anchor(Align2::CENTER_TOP, vec2(0.0, 72.0));
+    let mut chosen = None;
+    let modal = egui::Modal::new(egui::Id::new("palette")).area(area).show(ctx, |ui| {
+        ui.set_width(520.0);
+        let count = cx.local.palette.found.as_ref().map_or(0, |f| f.1.len());
+        let (down, up, enter) = ui.input_mut(|i| {
+            (
+                i.count_and_consume_key(egui::Modifiers::NONE, Key::ArrowDown),
+                i.count_and_consume_key(egui::Modifiers::NONE, Key::ArrowUp),
+                i.consume_key(egui::Modifiers::NONE, Key::Enter),
+            )
+        });
+        let edit = egui::TextEdit::singleline(&mut cx.local.palette.query)
+            .hint_text("Find an action, a sample or a tool")
+            .font(FontId::proportional(15.0))
+            .desired_width(520.0);
+        let response = ui.add(edit).accessible_name("Find anything");
+        response.request_focus();
+        if response.changed() {
+            cx.local.palette.selected = 0;
+        }
+        let selected = (cx.local.palette.selected + down).saturating_sub(up).min(count.saturating_sub(1));
+        let moved = selected != cx.local.palette.selected;
+        cx.local.palette.selected = selected;
+        ui.add_space(4.0);
+        let entries = cx.local.palette.found.as_ref().map(|f| f.1.clone()).unwrap_or_default();
+        ScrollArea::vertical().max_height(ROW * 12.0).show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 0.0;
+            for (i, entry) in entries.iter().enumerate() {
+                let response = entry_ui(cx, ui, entry, i == selected);
+                if i == selected && moved {
+                    response.scroll_to_me(None);
+                }
+                if response.clicked() || (enter && i == selected) {
+                    chosen = Some(entry.clone());
+                }
+            }
+            if entries.is_empty() {
+                ui.label(super::theme::caption("Nothing fits", cx.p));
+            }
+        });
+    });
+    if let Some(entry) = chosen {
+        cx.push(Command::SetPalette(false));
+        match entry {
+            Entry::Action(action) if action != Action::Palette => cx.act(action),
+            Entry::Action(_) => {}
+            Entry::Pair(pair, _) => cx.push(Command::Select(pair)),
+            Entry::Tool(tool) => cx.push(Command::SetToolFilter(Some(tool))),
+        }
+    } else if modal.should_close() {
+        cx.push(Command::SetPalette(false));
+    }
+}
+
+/// Fills the list for the query, if it is another one.
+fn search(cx: &mut Cx<'_>) {
+    let query = cx.local.palette.query.clone();
+    if cx.local.palette.found.as_ref().is_some_and(|(q, _)| *q == query) {
+        return;
+    }
+    let mut found: Vec<(i32, Entry)> = Vec::new();
+    for action in Action::iter() {
+        let name = score(&query, action.name());
+        let help = score(&query, action.tooltip()).map(|s| s - 30).filter(|_| query.len() >= 3);
+        if let Some(s) = name.max(help) {
+            // Actions before samples: there are few of them.
+            found.push((s + 4, Entry::Action(action)));
+        }
+    }
+    if !query.trim().is_empty() {
+        if let Some(open) = &cx.state.library.open {
+            found.extend(open.tools.iter().filter_map(|t| Some((score(&query, t)?, Entry::Tool(t.clone())))));
+        }
+        let pairs = (0u32..).zip(cx.state.library.pairs());
+        found.extend(
+            pairs.filter_map(|(i, e)| Some((score(&query, &e.name)? - 2, Entry::Pair(PairId(i), e.name.clone())))),
+        );
+        found.sort_by_key(|(s, _)| std::cmp::Reverse(*s));
+    }
+    found.truncate(MOST);
+    cx.local.palette.found = Some((query, found.into_iter().map(|(_, e)| e).collect()));
+}
+
+fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Response {
+    let p = cx.p;
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
+    let (name, kind, enabled) = match entry {
+        Entry::Action(action) => {
+            let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
+            (action.name(), keys, action.command(cx.state).is_some())
+        }
+        Entry::Pair(_, name) => (name.as_str(), "sample".to_owned(), true),
+        Entry::Tool(tool) => (tool.as_str(), "tool".to_owned(), true),
+    };
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, name));
+    if ui.is_rect_visible(rect) {
+        if selected {
+            ui.painter().rect_filled(rect, 4.0, p.selected);
+        } else if response.hovered() {
+            ui.painter().rect_filled(rect, 4.0, p.control[0]);
+        }
+        let color = if enabled { p.strong } else { p.weak };
+        let y = rect.center().y;
+        let place = ui.painter().text(pos2(rect.left() + 8.0, y), Align2::LEFT_CENTER, name, FontId::proportional(13.0), color);
+        if let Entry::Action(action) = entry {
+            let clip = egui::Rect::from_min_max(pos2(place.right() + 12.0, rect.top()), pos2(rect.right() - 110.0, rect.bottom()));
+            ui.painter_at(clip).text(pos2(clip.left(), y), Align2::LEFT_CENTER, action.tooltip(), FontId::proportional(SMALL), p.weak);
+        }
+        ui.painter().text(pos2(rect.right() - 8.0, y), Align2::RIGHT_CENTER, kind, FontId::proportional(SMALL), p.weak);
+    }
+    response
+}

@@ -1,0 +1,226 @@
+//! The docked panes: titles, title bars, and which function draws which.
+
+use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetText, vec2};
+use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles, UiResponse};
+
+use super::cx::Cx;
+use super::theme::{SMALL, medium};
+use super::widget::help;
+use super::{browser, generate, images, log, masks, metrics, scene, settings_pane, table};
+use crate::app::command::Pane;
+use crate::app::keys::ImprintSource;
+
+/// The title of a pane.
+pub fn title(pane: Pane) -> &'static str {
+    match pane {
+        Pane::Browser => "Samples",
+        Pane::GelRaw => "GelSlim raw",
+        Pane::GelReference => "GelSlim reference",
+        Pane::GelDifference => "GelSlim difference",
+        Pane::Measured => "Measured imprint",
+        Pane::Predicted => "Predicted imprint",
+        Pane::Error => "Error",
+        Pane::SceneMeasured => "3D measured",
+        Pane::ScenePredicted => "3D predicted",
+        Pane::Generate => "Generate",
+        Pane::Masks => "Mask",
+        Pane::Metrics => "Figures",
+        Pane::Table => "All figures",
+        Pane::Log => "Log",
+        Pane::Settings => "Settings",
+    }
+}
+
+/// What a pane shows, for the tooltip of its title.
+fn tooltip(pane: Pane) -> &'static str {
+    match pane {
+        Pane::Browser => "The pairs of what is open",
+        Pane::GelRaw => "The GelSlim image during the touch, rotated to line up with the bubble",
+        Pane::GelReference => "The GelSlim image without contact, rotated to line up with the bubble",
+        Pane::GelDifference => "Touched minus untouched, around mid grey: what the generator sees",
+        Pane::Measured => "What the Soft Bubble measured; dashed: what the GelSlim sees of it",
+        Pane::Predicted => "What the generator predicts from the GelSlim image, in the same colours",
+        Pane::Error => "Predicted minus measured: blue too shallow, red too deep",
+        Pane::SceneMeasured => "The measured surface on the CAD model, grasp frame",
+        Pane::ScenePredicted => "The predicted surface on the CAD model, grasp frame",
+        Pane::Generate => "Predicts the Soft Bubble imprint",
+        Pane::Masks => "Corrects the contact mask",
+        Pane::Metrics => "The figures of this pair",
+        Pane::Table => "The figures of all pairs so far",
+        Pane::Log => "What happened",
+        Pane::Settings => "Preferences",
+    }
+}
+
+fn side(pane: Pane) -> Option<ImprintSource> {
+    match pane {
+        Pane::Measured | Pane::SceneMeasured => Some(ImprintSource::Measured),
+        Pane::Predicted | Pane::ScenePredicted => Some(ImprintSource::Predicted),
+        _ => None,
+    }
+}
+
+/// Draws a pane.
+pub fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+    cx.local.visible_next.insert(pane);
+    if ui.rect_contains_pointer(ui.max_rect()) {
+        cx.local.hovered_pane = Some(pane);
+    }
+    match pane {
+        Pane::Browser => browser::show(cx, ui),
+        Pane::GelRaw
+        | Pane::GelReference
+        | Pane::GelDifference
+        | Pane::Measured
+        | Pane::Predicted
+        | Pane::Error => images::show(cx, ui, pane),
+        Pane::SceneMeasured => scene::show(cx, ui, ImprintSource::Measured),
+        Pane::ScenePredicted => scene::show(cx, ui, ImprintSource::Predicted),
+        Pane::Generate => generate::show(cx, ui),
+        Pane::Masks => masks::show(cx, ui),
+        Pane::Metrics => metrics::show(cx, ui),
+        Pane::Table => table::show(cx, ui),
+        Pane::Log => log::show(cx, ui),
+        Pane::Settings => settings_pane::show(cx, ui),
+    }
+}
+
+/// The help mark of a pane, if it has mouse controls of its own.
+fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
+    match pane {
+        Pane::Measured | Pane::Predicted if cx.local.visible.contains(&Pane::Masks) => {
+            help::mark(ui, title(pane), help::PAINT);
+        }
+        Pane::GelRaw | Pane::GelReference | Pane::GelDifference | Pane::Measured | Pane::Predicted | Pane::Error => {
+            help::mark(ui, title(pane), help::IMAGE);
+        }
+        Pane::SceneMeasured | Pane::ScenePredicted => help::mark(ui, title(pane), help::SCENE),
+        _ => {}
+    }
+}
+
+/// How the panes behave in their tree.
+pub struct Docking<'a, 'b> {
+    /// What the panes get.
+    pub cx: &'b mut Cx<'a>,
+    /// Whether a person moved something.
+    pub edited: bool,
+}
+
+impl Behavior<Pane> for Docking<'_, '_> {
+    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
+        let rect = ui.max_rect();
+        ui.painter().rect_filled(rect, 0.0, self.cx.p.panel);
+        show(self.cx, ui, *pane);
+        UiResponse::None
+    }
+
+    fn tab_title_for_pane(&mut self, pane: &Pane) -> WidgetText {
+        let color = side(*pane).map_or(self.cx.p.text, |s| super::cx::side_color(self.cx.p, s));
+        RichText::new(title(*pane)).family(medium()).size(12.0).color(color).into()
+    }
+
+    fn on_tab_button(&mut self, tiles: &Tiles<Pane>, tile: TileId, response: egui::Response) -> egui::Response {
+        match tiles.get(tile) {
+            Some(Tile::Pane(pane)) => {
+                if response.double_clicked() {
+                    self.cx.local.maximised = Some(*pane);
+                }
+                response.on_hover_text(format!("{}. Drag to move, double-click to maximise", tooltip(*pane)))
+            }
+            _ => response,
+        }
+    }
+
+    fn top_bar_right_ui(
+        &mut self,
+        tiles: &Tiles<Pane>,
+        ui: &mut Ui,
+        _tile: TileId,
+        tabs: &egui_tiles::Tabs,
+        _scroll: &mut f32,
+    ) {
+        let Some(Tile::Pane(pane)) = tabs.active.and_then(|id| tiles.get(id)) else { return };
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.add_space(4.0);
+        let response = ui
+            .add(egui::Button::new("").frame(false).min_size(vec2(16.0, 16.0)))
+            .accessible_name(format!("Maximise {}", title(*pane)));
+        let color = if response.hovered() { self.cx.p.strong } else { self.cx.p.weak };
+        let square = egui::Rect::from_center_size(response.rect.center(), vec2(8.0, 8.0));
+        ui.painter().rect_stroke(square, 1.0, Stroke::new(1.25, color), egui::StrokeKind::Inside);
+        if response.on_hover_text("Let this pane fill the window (`)").clicked() {
+            self.cx.local.maximised = Some(*pane);
+        }
+        help_mark(self.cx, ui, *pane);
+    }
+
+    fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
+        26.0
+    }
+
+    fn gap_width(&self, _style: &egui::Style) -> f32 {
+        2.0
+    }
+
+    fn min_size(&self) -> f32 {
+        96.0
+    }
+
+    fn simplification_options(&self) -> SimplificationOptions {
+        SimplificationOptions { all_panes_must_have_tabs: true, ..SimplificationOptions::default() }
+    }
+
+    fn tab_bar_color(&self, _visuals: &egui::Visuals) -> Color32 {
+        self.cx.p.frame
+    }
+
+    fn tab_bg_color(&self, _v: &egui::Visuals, tiles: &Tiles<Pane>, id: TileId, state: &TabState) -> Color32 {
+        let alone = tiles.parent_of(id).and_then(|p| tiles.get_container(p)).is_some_and(|c| c.num_children() == 1);
+        if state.active && !alone { self.cx.p.panel } else { Color32::TRANSPARENT }
+    }
+
+    fn tab_outline_stroke(&self, _v: &egui::Visuals, _t: &Tiles<Pane>, _id: TileId, _s: &TabState) -> Stroke {
+        Stroke::NONE
+    }
+
+    fn tab_bar_hline_stroke(&self, _v: &egui::Visuals) -> Stroke {
+        Stroke::new(1.0, self.cx.p.line)
+    }
+
+    fn resize_stroke(&self, _style: &egui::Style, state: egui_tiles::ResizeState) -> Stroke {
+        match state {
+            egui_tiles::ResizeState::Idle => Stroke::new(2.0, self.cx.p.line),
+            _ => Stroke::new(3.0, self.cx.p.accent),
+        }
+    }
+
+    fn on_edit(&mut self, _action: egui_tiles::EditAction) {
+        self.edited = true;
+    }
+}
+
+/// One pane over the whole window, with the way back.
+pub fn show_maximised(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+    let full = ui.available_rect_before_wrap();
+    ui.painter().rect_filled(full, 0.0, cx.p.frame);
+    let bar = egui::Rect::from_min_size(full.min, vec2(full.width(), 26.0));
+    ui.scope_builder(egui::UiBuilder::new().max_rect(bar.shrink2(vec2(8.0, 0.0))), |ui| {
+        ui.horizontal_centered(|ui| {
+            ui.label(super::theme::title(title(pane)));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if ui.button(RichText::new("Back to all panes").size(SMALL)).on_hover_text("` or Esc").clicked() {
+                    cx.local.maximised = None;
+                }
+                help_mark(cx, ui, pane);
+            });
+        });
+    });
+    let rest = egui::Rect::from_min_max(bar.left_bottom(), full.max);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(rest), |ui| {
+        ui.set_clip_rect(rest);
+        ui.painter().rect_filled(rest, 0.0, cx.p.panel);
+        show(cx, ui, pane);
+    });
+    ui.advance_cursor_after_rect(full);
+}

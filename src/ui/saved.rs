@@ -1,0 +1,61 @@
+//! When the labels on screen were last written.
+
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use eframe::egui::Color32;
+
+use super::cx::Cx;
+
+/// What is known about saving.
+#[derive(Debug, Default)]
+pub struct Saved {
+    /// The pairs that were not saved yet, at the last look.
+    pending: std::collections::BTreeSet<String>,
+    /// When the last of them was.
+    at: Option<Duration>,
+}
+
+impl Saved {
+    /// Looks which pairs are unsaved now.
+    pub fn observe(&mut self, unsaved: &std::collections::BTreeSet<String>) {
+        if self.pending == *unsaved {
+            return;
+        }
+        if self.pending.iter().any(|name| !unsaved.contains(name)) {
+            self.at = SystemTime::now().duration_since(UNIX_EPOCH).ok();
+        }
+        self.pending.clone_from(unsaved);
+    }
+}
+
+/// The time of day, universal time.
+fn clock(since_epoch: Duration) -> String {
+    let s = since_epoch.as_secs() % 86_400;
+    format!("{:02}:{:02}:{:02} UTC", s / 3600, s / 60 % 60, s % 60)
+}
+
+/// The state in words, with its colour.
+pub fn text(cx: &Cx<'_>) -> (String, Color32) {
+    if cx.state.document.unsaved.contains(cx.state.pair_name()) {
+        return ("saving…".into(), cx.p.caution);
+    }
+    match cx.local.saved.at {
+        Some(at) => (format!("saved {}", clock(at)), cx.p.good),
+        None => (String::new(), cx.p.weak),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_moment_of_saving_is_kept() {
+        assert_eq!(clock(Duration::from_secs(86_400 * 3 + 12 * 3600 + 3 * 60 + 11)), "12:03:11 UTC");
+        let mut saved = Saved::default();
+        saved.observe(&["a".to_owned()].into());
+        assert_eq!(saved.at, None);
+        saved.observe(&[].into());
+        assert!(saved.at.is_some());
+    }
+}

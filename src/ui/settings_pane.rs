@@ -1,0 +1,78 @@
+//! Preferences.
+
+use eframe::egui::{self, RichText, ScrollArea, Ui};
+use strum::IntoEnumIterator as _;
+
+use super::cx::Cx;
+use super::theme::{caption, section};
+use crate::app::action::Action;
+use crate::app::command::Command;
+use crate::app::settings::{ColourMap, RuntimeChoice, Theme};
+
+/// The pane.
+pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+    super::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        ScrollArea::vertical().id_salt("settings").show(ui, |ui| body(cx, ui));
+    });
+}
+
+fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let settings = &cx.state.settings;
+    ui.label(section("Window", cx.p));
+    ui.horizontal(|ui| {
+        for (theme, name) in [(Theme::Dark, "Dark"), (Theme::Light, "Light")] {
+            if ui.radio(settings.theme == theme, name).on_hover_text("Colours of the window").clicked() {
+                cx.out.push(Command::SetTheme(theme));
+            }
+        }
+        let mut zoom = settings.ui_zoom;
+        let drag = egui::DragValue::new(&mut zoom).speed(0.01).range(0.5..=4.0).fixed_decimals(2).prefix("zoom ");
+        // The whole window is scaled: while the number is dragged the pointer must not slip off it.
+        let response = ui.add(drag.update_while_editing(false)).accessible_name("Zoom");
+        if response.changed() {
+            cx.out.push(Command::SetUiZoom(zoom));
+        }
+        response.on_hover_text("Scale of the whole window (Ctrl + and Ctrl -). Default 1.00");
+    });
+    ui.label(section("Images", cx.p));
+    ui.horizontal(|ui| {
+        for map in ColourMap::iter() {
+            let radio = ui.radio(settings.colour_map == map, map.name());
+            if radio.on_hover_text("Colours of depth").clicked() {
+                cx.out.push(Command::SetColourMap(map));
+            }
+        }
+    });
+    let mut footprint = settings.footprint_visible;
+    if ui.checkbox(&mut footprint, "GelSlim window on bubble images").on_hover_text(Action::Footprint.tooltip()).changed() {
+        cx.out.push(Command::SetFootprintVisible(footprint));
+    }
+    let mut mask = settings.mask_visible;
+    if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(Action::MaskVisible.help()).changed() {
+        cx.out.push(Command::SetMaskVisible(mask));
+    }
+    let mut linked = settings.cameras_linked;
+    if ui.checkbox(&mut linked, "3D views move together").on_hover_text(Action::LinkCameras.tooltip()).changed() {
+        cx.out.push(Command::SetCamerasLinked(linked));
+    }
+    ui.label(section("Models", cx.p));
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Runtime").color(cx.p.weak));
+        let combo = egui::ComboBox::from_id_salt("runtime").selected_text(settings.runtime.name());
+        let response = combo.show_ui(ui, |ui| {
+            for runtime in RuntimeChoice::iter() {
+                if ui.selectable_label(runtime == settings.runtime, runtime.name()).clicked() {
+                    cx.out.push(Command::SetRuntime(runtime));
+                }
+            }
+        });
+        response.response.accessible_name("Runtime").on_hover_text("What runs the models");
+    });
+    if let Ok(device) = cx.device {
+        ui.label(caption(format!("Graphics: {}", device.adapter()), cx.p));
+    }
+    ui.add_space(4.0);
+    cx.action_button(ui, Action::ResetWorkspace, "Reset workspace");
+    cx.action_button(ui, Action::ResetSettings, "Reset preferences");
+}
