@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Instant;
 
 use eframe::egui::{self, ThemePreference, ViewportCommand};
@@ -61,6 +62,8 @@ pub struct StudioApp {
     layouts_loaded: bool,
     folder: Option<PathBuf>,
     services: SharedServices,
+    shot_sender: Sender<Arc<egui::ColorImage>>,
+    shots: Receiver<Arc<egui::ColorImage>>,
 }
 
 impl StudioApp {
@@ -75,6 +78,7 @@ impl StudioApp {
             log::error!("No 3D views: {why}");
         }
         let ctx = cc.egui_ctx.clone();
+        let (shot_sender, shots) = channel();
         let mut runtime = if options.inline {
             Runtime::inline(options.services.clone())
         } else {
@@ -98,6 +102,8 @@ impl StudioApp {
             layouts_loaded: false,
             folder: options.screenshots,
             services: options.services,
+            shot_sender,
+            shots,
         }
     }
 
@@ -251,7 +257,13 @@ impl StudioApp {
                 }
             },
             UiRequest::Screenshot => {
-                ctx.send_viewport_cmd(ViewportCommand::Screenshot(egui::UserData::default()));
+                let (sender, wake) = (self.shot_sender.clone(), ctx.clone());
+                ctx.request_screenshot(move |image| {
+                    // The window may be gone by now: then nobody waits for the picture.
+                    if sender.send(image).is_ok() {
+                        wake.request_repaint();
+                    }
+                });
             }
             UiRequest::ToggleFullscreen => {
                 let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
@@ -288,18 +300,11 @@ impl StudioApp {
     /// Folders and files dropped on the window, and a screenshot that arrived.
     fn outside(&mut self, ctx: &egui::Context) {
         let dropped: Vec<PathBuf> =
-            ctx.input(|i| i.raw.dropped_files.iter().filter_map(|f| f.path.clone()).collect());
+            ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
         if let Some(path) = dropped.into_iter().next() {
             self.inbox.push(Command::Open(Place::Path(path)));
         }
-        let shots: Vec<Arc<egui::ColorImage>> = ctx.input(|i| {
-            let images = i.events.iter().filter_map(|e| match e {
-                egui::Event::Screenshot { image, .. } => Some(image.clone()),
-                _ => None,
-            });
-            images.collect()
-        });
-        for image in shots {
+        while let Ok(image) = self.shots.try_recv() {
             self.inbox.push(super::screenshot::save(self.folder.as_deref(), &image));
         }
     }

@@ -187,7 +187,7 @@ fn engine(cx: &Cx<'_>, ui: &mut Ui) {
     }
     let made = cx.state.chosen(cx.state.selection.finger).and_then(|r| cx.state.results.predictions.get(r));
     let text = match made {
-        Some(prediction) => prediction.raw.runtime.clone(),
+        Some(prediction) => prediction.output.runtime.clone(),
         None => cx.state.settings.runtime.name().to_owned(),
     };
     ui.label(caption(text, cx.p)).on_hover_text("The runtime that runs the models");
@@ -199,7 +199,7 @@ pub fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
     if cx.state.settings.hint_dismissed || cx.state.library.open.is_none() {
         return;
     }
-    let area = egui::Area::new(egui::Id::new("hint")).anchor(egui::Align2::CENTER_BOTTOM, vec2(0.0, -44.0));
+    let area = egui::Area::new(egui::Id::unique("hint")).anchor(egui::Align2::CENTER_BOTTOM, vec2(0.0, -44.0));
     area.show(ctx, |ui| {
         egui::Frame::popup(ui.style()).fill(cx.p.panel).inner_margin(12).show(ui, |ui| {
             ui.set_max_width(520.0);
@@ -223,7 +223,7 @@ pub fn drop_overlay(cx: &Cx<'_>, ctx: &egui::Context) {
     if ctx.input(|i| i.raw.hovered_files.is_empty()) {
         return;
     }
-    let painter = ctx.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::new("drop")));
+    let painter = ctx.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop")));
     let rect = ctx.content_rect();
     painter.rect_filled(rect, 0.0, cx.p.canvas.gamma_multiply(0.85));
     painter.rect_stroke(rect.shrink(24.0), 12.0, Stroke::new(2.0, cx.p.accent), egui::StrokeKind::Inside);

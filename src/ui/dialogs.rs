@@ -105,7 +105,7 @@ impl Dialogs {
         let state = self.path_box.as_mut()?;
         let mut answer = None;
         let mut close = false;
-        let modal = egui::Modal::new(egui::Id::new("path box")).show(ctx, |ui| {
+        let modal = egui::Modal::new(egui::Id::unique("path box")).show(ctx, |ui| {
             ui.set_width(460.0);
             let p = Palette::of(ui);
             ui.label(RichText::new(state.purpose.title()).heading());

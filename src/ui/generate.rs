@@ -17,10 +17,10 @@ use crate::domain::sensor::Finger;
 const LABEL: f32 = 60.0;
 
 /// A caption at the left of its control.
-fn row(ui: &mut Ui, cx: &Cx<'_>, name: &str, add: impl FnOnce(&mut Ui)) {
+fn row(ui: &mut Ui, weak: egui::Color32, name: &str, add: impl FnOnce(&mut Ui)) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        ui.add_sized(vec2(LABEL, 20.0), egui::Label::new(RichText::new(name).color(cx.p.weak)).truncate().halign(egui::Align::Min));
+        ui.add_sized(vec2(LABEL, 20.0), egui::Label::new(RichText::new(name).color(weak)).truncate().halign(egui::Align::Min));
         add(ui);
     });
 }
@@ -43,7 +43,7 @@ pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     let old = cx.state.settings.generate.clone();
     let mut new = old.clone();
-    row(ui, cx, "Model", |ui| {
+    row(ui, cx.p.weak, "Model", |ui| {
         let bundles: Vec<_> =
             cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator).collect();
         let current = cx.state.bundle(BundleKind::Generator).map_or("none found", |b| b.name.as_str());
@@ -62,11 +62,11 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     for problem in &cx.state.library.bundle_problems {
         ui.label(RichText::new(problem.to_string()).size(SMALL).color(cx.p.wrong));
     }
-    row(ui, cx, "Sampler", |ui| {
-        let combo = egui::ComboBox::from_id_salt("sampler").width(72.0).selected_text(new.sampler.name());
+    row(ui, cx.p.weak, "Sampler", |ui| {
+        let combo = egui::ComboBox::from_id_salt("sampler").width(72.0).selected_text(sampler_name(new.sampler));
         let response = combo.show_ui(ui, |ui| {
             for sampler in Sampler::iter() {
-                ui.selectable_value(&mut new.sampler, sampler, sampler.name());
+                ui.selectable_value(&mut new.sampler, sampler, sampler_name(sampler));
             }
         });
         response.response.accessible_name("Sampler").on_hover_text("The way from noise to an image");
@@ -76,14 +76,14 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
             new.eta = GenerateSettings::default().eta;
         });
     });
-    row(ui, cx, "Steps", |ui| {
+    row(ui, cx.p.weak, "Steps", |ui| {
         let drag = egui::DragValue::new(&mut new.steps).speed(0.2).range(STEPS);
         let tip = "Denoising steps: more take longer and add detail";
         reset(ui.add(drag).accessible_name("Steps"), tip, "20", || new.steps = GenerateSettings::default().steps);
         let both = ui.checkbox(&mut new.both_fingers, "both fingers");
         both.on_hover_text("Generate for both fingers: the pose needs both. Off: only the active finger");
     });
-    row(ui, cx, "Seed", |ui| {
+    row(ui, cx.p.weak, "Seed", |ui| {
         let drag = egui::DragValue::new(&mut new.seed).speed(1.0);
         reset(ui.add(drag).accessible_name("Seed"), "Seed of the noise: the same seed gives the same prediction", "42", || {
             new.seed = GenerateSettings::default().seed;
@@ -140,14 +140,35 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
+/// The name on screen.
+fn sampler_name(sampler: Sampler) -> &'static str {
+    match sampler {
+        Sampler::Ddim => "DDIM",
+    }
+}
+
+/// What a range mapping is, for its tooltip.
+fn shift_tooltip(mode: ShiftMode) -> &'static str {
+    match mode {
+        ShiftMode::Raw => {
+            "The prediction as the released script saves it: its range is mapped twice, so depths come out as \
+             (depth + max) / 2, far too deep"
+        }
+        ShiftMode::PaperShift => {
+            "The raw values with mean and deviation matched to the training statistics, as in the paper"
+        }
+        ShiftMode::ExactInverse => "The raw values with the doubled mapping undone: 2 * value - max, the depth itself",
+    }
+}
+
 fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.label(section("Range mapping", cx.p));
     let current = cx.state.settings.shift;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
         for mode in ShiftMode::iter() {
-            let radio = ui.radio(mode == current, mode.name());
-            if radio.on_hover_text(mode.tooltip()).clicked() {
+            let radio = ui.radio(mode == current, mode.label());
+            if radio.on_hover_text(shift_tooltip(mode)).clicked() {
                 cx.push(Command::SetShift(mode));
             }
         }

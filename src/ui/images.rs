@@ -393,7 +393,7 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
     let state = cx.state;
     let right = match pane {
         Pane::Predicted => state.chosen(finger).map_or(String::new(), |recipe| {
-            format!("seed {} · {} steps · {}", recipe.seed, recipe.steps, state.settings.shift.name().to_lowercase())
+            format!("seed {} · {} steps · {}", recipe.seed, recipe.steps, state.settings.shift.label().to_lowercase())
         }),
         Pane::Error => state.comparison(finger).ready().map_or(String::new(), |c| {
             format!("mean |error| {}", units::text_mm(c.mae_m))

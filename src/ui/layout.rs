@@ -109,7 +109,7 @@ pub fn default_tree(workspace: Workspace) -> Tree<Pane> {
 }
 
 fn tree_id(workspace: Workspace) -> Id {
-    Id::new(("workspace", workspace.name()))
+    Id::unique(("workspace", workspace.name()))
 }
 
 /// Whether the tree holds every pane of the workspace exactly once, below its root, and nothing else.

@@ -55,7 +55,7 @@ pub fn notices(cx: &mut Cx<'_>, ctx: &egui::Context) {
     }
     let hidden = unseen.len().saturating_sub(MOST);
     let last = unseen.iter().map(|e| e.number).max().unwrap_or(0);
-    egui::Area::new(egui::Id::new("notices")).anchor(Align2::RIGHT_BOTTOM, vec2(-12.0, -40.0)).show(ctx, |ui| {
+    egui::Area::new(egui::Id::unique("notices")).anchor(Align2::RIGHT_BOTTOM, vec2(-12.0, -40.0)).show(ctx, |ui| {
         egui::Frame::popup(ui.style()).fill(cx.p.panel).inner_margin(12).show(ui, |ui| {
             ui.set_width(340.0);
             for entry in unseen.iter().rev().take(MOST) {

@@ -156,12 +156,17 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut rows: Vec<(&str, Option<Color32>, Stats, bool)> = Vec::new();
     if let Some(recipe) = cx.state.chosen(finger).cloned() {
         if let Some(prediction) = cx.state.results.predictions.get(&recipe) {
-            let stats = *cx.local.stats.get("raw", &recipe, || Stats::of(&prediction.raw.raw));
-            rows.push(("Decoder, 0..1", None, stats, false));
-        }
-        if let Lookup::Ready(imprint) = cx.state.imprint(ImprintSource::Predicted, finger) {
-            let stats = *cx.local.stats.get("predicted", (&recipe, shift), || Stats::of(imprint));
-            rows.push((shift.name(), Some(side_color(cx.p, ImprintSource::Predicted)), stats, true));
+            // The chain is walked once per prediction and mapping, a few milliseconds, and only when this is shown.
+            let stages = cx.local.ledgers.get("ledger", (&recipe, shift), || {
+                let chain = prediction.output.chains.get(&shift).and_then(|c| c.as_ref().ok());
+                let records = chain.and_then(|c| c.run_with_ledger(&prediction.output.raw).ok());
+                records.map_or(Vec::new(), |(_, l)| l.into_iter().map(|r| (r.name, r.stats)).collect())
+            });
+            for (name, stats) in stages {
+                let last = *name == "Raw orientation";
+                let color = last.then(|| side_color(cx.p, ImprintSource::Predicted));
+                rows.push((if last { "Predicted" } else { name }, color, *stats, *name != "Decoder"));
+            }
         }
         if let Lookup::Ready(c) = cx.state.comparison(finger) {
             let stats = *cx.local.stats.get("error", (&recipe, shift), || Stats::of(&c.error));
@@ -172,7 +177,7 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
         (cx.state.imprint(ImprintSource::Measured, finger), cx.state.touch_key(finger))
     {
         let stats = *cx.local.stats.get("measured", touch, || Stats::of(imprint));
-        let at = rows.len().min(2);
+        let at = rows.len().saturating_sub(usize::from(rows.last().is_some_and(|r| r.0 == "Error")));
         rows.insert(at, ("Measured", Some(side_color(cx.p, ImprintSource::Measured)), stats, true));
     }
     if rows.is_empty() {

@@ -43,9 +43,9 @@ pub fn show(cx: &mut Cx<'_>, ctx: &egui::Context) {
         cx.local.palette = PaletteState { open: true, ..PaletteState::default() };
     }
     search(cx);
-    let area = egui::Modal::default_area(egui::Id::new("palette")).anchor(Align2::CENTER_TOP, vec2(0.0, 72.0));
+    let area = egui::Modal::default_area(egui::Id::unique("palette")).anchor(Align2::CENTER_TOP, vec2(0.0, 72.0));
     let mut chosen = None;
-    let modal = egui::Modal::new(egui::Id::new("palette")).area(area).show(ctx, |ui| {
+    let modal = egui::Modal::new(egui::Id::unique("palette")).area(area).show(ctx, |ui| {
         ui.set_width(520.0);
         let count = cx.local.palette.found.as_ref().map_or(0, |f| f.1.len());
         let (down, up, enter) = ui.input_mut(|i| {

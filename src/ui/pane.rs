@@ -120,7 +120,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
         RichText::new(title(*pane)).family(medium()).size(12.0).color(color).into()
     }
 
-    fn on_tab_button(&mut self, tiles: &Tiles<Pane>, tile: TileId, response: egui::Response) -> egui::Response {
+    fn on_tab_button(&mut self, tiles: &mut Tiles<Pane>, tile: TileId, response: egui::Response) -> egui::Response {
         match tiles.get(tile) {
             Some(Tile::Pane(pane)) => {
                 if response.double_clicked() {

@@ -77,7 +77,7 @@ pub fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context) {
         return;
     }
     let size = ctx.content_rect().size();
-    let modal = egui::Modal::new(egui::Id::new("shortcut sheet")).show(ctx, |ui| {
+    let modal = egui::Modal::new(egui::Id::unique("shortcut sheet")).show(ctx, |ui| {
         let columns = if size.x >= 1100.0 { 3 } else { 2 };
         ui.set_width((size.x - 80.0).min(1060.0));
         ui.horizontal(|ui| {

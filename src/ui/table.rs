@@ -160,7 +160,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     let (column, down) = cx.local.table_sort;
     for (i, ((name, _, number, tip), (x, w))) in COLUMNS.iter().zip(columns(rect.left(), rect.width())).enumerate() {
         let cell = egui::Rect::from_min_size(pos2(x, rect.top()), vec2(w, ROW));
-        let response = ui.interact(cell, ui.id().with(("column", i)), Sense::click());
+        let response = ui.interact(cell, ui.scope_id().with(("column", i)), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Sort by {name}")));
         let color = if i == column || response.hovered() { cx.p.strong } else { cx.p.weak };
         let font = FontId::new(SMALL, super::theme::medium());
