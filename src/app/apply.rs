@@ -121,6 +121,7 @@ fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
 
         Command::LogSeen(number) => state.log.seen = state.log.seen.max(number),
         Command::Report(err) => state.log.error(&err),
+        Command::Notice(text) => state.log.info(text),
 
         other => {
             if let Some(other) = preferences::step(state, other, effects) {

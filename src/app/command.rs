@@ -261,8 +261,10 @@ pub enum Command {
     DismissHint,
     /// Log entries up to a number were seen.
     LogSeen(u64),
-    /// Adds a notice or an error of the window's own.
+    /// Adds an error of the window's own.
     Report(TaskError),
+    /// Adds a notice of the window's own.
+    Notice(String),
     /// All preferences back to their defaults; recent places stay.
     ResetSettings,
 

@@ -299,8 +299,7 @@ impl StudioApp {
 
     /// Folders and files dropped on the window, and a screenshot that arrived.
     fn outside(&mut self, ctx: &egui::Context) {
-        let dropped: Vec<PathBuf> =
-            ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
+        let dropped: Vec<PathBuf> = ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
         if let Some(path) = dropped.into_iter().next() {
             self.inbox.push(Command::Open(Place::Path(path)));
         }
@@ -415,7 +414,10 @@ impl StudioApp {
         if self.local.visible != self.state.selection.panes {
             out.push(Command::ShowPanes(self.local.visible.clone()));
         }
-        if self.local.hovered_pane.is_none() && hovered_before.is_some() && ctx.input(|i| i.pointer.hover_pos().is_none()) {
+        if self.local.hovered_pane.is_none()
+            && hovered_before.is_some()
+            && ctx.input(|i| i.pointer.hover_pos().is_none())
+        {
             out.push(Command::HoverPixel(None));
         }
         if self.local.readout != self.local.readout_shown {

@@ -14,7 +14,7 @@ use crate::app::settings::{Theme, Workspace};
 use crate::domain::sensor::Finger;
 
 /// The bar at the top.
-pub fn top(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui) {
     let frame = egui::Frame::new().fill(cx.p.frame).inner_margin(egui::Margin::symmetric(12, 4));
     Panel::top("top").frame(frame).exact_size(36.0).resizable(false).show(ui, |ui| {
         ui.horizontal_centered(|ui| {
@@ -114,7 +114,7 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
 }
 
 /// The bar at the bottom.
-pub fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
     let frame = egui::Frame::new().fill(cx.p.frame).inner_margin(egui::Margin::symmetric(12, 2));
     Panel::bottom("bottom").frame(frame).exact_size(28.0).resizable(false).show(ui, |ui| {
         ui.horizontal_centered(|ui| {
@@ -195,7 +195,7 @@ fn engine(cx: &Cx<'_>, ui: &mut Ui) {
 }
 
 /// Three lines on the first start; gone for good when dismissed.
-pub fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
+pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
     if cx.state.settings.hint_dismissed || cx.state.library.open.is_none() {
         return;
     }
@@ -205,7 +205,10 @@ pub fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
             ui.set_max_width(520.0);
             ui.horizontal(|ui| {
                 ui.vertical(|ui| {
-                    ui.label(RichText::new("Simulated touches are open; the first prediction is being made.").color(cx.p.strong));
+                    ui.label(
+                        RichText::new("Simulated touches are open; the first prediction is being made.")
+                            .color(cx.p.strong),
+                    );
                     ui.label("D and A step through the pairs, Ctrl+G predicts the one on screen.");
                     ui.label("Ctrl+P finds everything else. Drop a folder here to open your own data.");
                 });
@@ -219,7 +222,7 @@ pub fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
 }
 
 /// What a folder dragged over the window would do.
-pub fn drop_overlay(cx: &Cx<'_>, ctx: &egui::Context) {
+pub(super) fn drop_overlay(cx: &Cx<'_>, ctx: &egui::Context) {
     if ctx.input(|i| i.raw.hovered_files.is_empty()) {
         return;
     }

@@ -9,8 +9,8 @@ use strum::IntoEnumIterator as _;
 use super::cx::Cx;
 use super::dialogs::Purpose;
 use super::theme::{Palette, SMALL, caption};
-use super::widget::texture::depth_image;
 use super::widget::empty;
+use super::widget::texture::depth_image;
 use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::document::Review;
@@ -23,7 +23,7 @@ const ROW: f32 = 40.0;
 const THUMB: f32 = 44.0;
 
 /// The colour of a review state.
-pub fn review_color(p: &Palette, review: Review) -> Color32 {
+pub(super) fn review_color(p: &Palette, review: Review) -> Color32 {
     match review {
         Review::Todo => p.weak,
         Review::InProgress => p.caution,
@@ -34,7 +34,7 @@ pub fn review_color(p: &Palette, review: Review) -> Color32 {
 }
 
 /// The pane.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         source_menu(cx, ui);
@@ -141,7 +141,8 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
     let library = &cx.state.library;
     let total = library.pairs().len();
     let shown = library.order.len();
-    let done = library.open.as_ref().map_or(0, |_| cx.state.document.reviews.values().filter(|r| r.is_finished()).count());
+    let done =
+        library.open.as_ref().map_or(0, |_| cx.state.document.reviews.values().filter(|r| r.is_finished()).count());
     ui.horizontal(|ui| {
         let count = if shown == total { format!("{total} pairs") } else { format!("{shown} of {total} pairs") };
         ui.label(caption(count, cx.p));
@@ -168,7 +169,12 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
         if library.opening.is_some() {
             ui.label(caption("Reading the index…", cx.p));
         } else if library.open.is_none() {
-            if empty::show(ui, "Nothing is open", "Drop a folder here", Some(("Open the demo", Action::OpenDemo.tooltip()))) {
+            if empty::show(
+                ui,
+                "Nothing is open",
+                "Drop a folder here",
+                Some(("Open the demo", Action::OpenDemo.tooltip())),
+            ) {
                 cx.act(Action::OpenDemo);
             }
         } else if empty::show(ui, "Nothing passes the filter", "", Some(("Clear the filter", "Shows all pairs"))) {
@@ -249,7 +255,13 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         let clip = Rect::from_min_max(pos2(left, rect.top()), pos2(rect.right() - 18.0, rect.bottom()));
         let text = ui.painter_at(clip);
         let name = entry.name.rsplit('/').next().unwrap_or(&entry.name);
-        text.text(pos2(left, rect.top() + 5.0), Align2::LEFT_TOP, name, FontId::proportional(13.0), if selected { p.strong } else { p.text });
+        text.text(
+            pos2(left, rect.top() + 5.0),
+            Align2::LEFT_TOP,
+            name,
+            FontId::proportional(13.0),
+            if selected { p.strong } else { p.text },
+        );
         let tool = entry.tool.as_deref().unwrap_or("no tool");
         let tool = tool.strip_prefix("pattern_").unwrap_or(tool).replace('_', " ");
         text.text(pos2(left, rect.bottom() - 5.0), Align2::LEFT_BOTTOM, tool, FontId::proportional(SMALL), p.weak);
@@ -268,8 +280,9 @@ fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
     let range = super::images::range_of(cx.state);
     let bits = (range.lo.to_bits(), range.hi.to_bits());
     let map = super::images::map_of(cx.state);
-    let picture = cx.local.textures.get(ui.ctx(), ("thumbnail", key), (bits, map), false, || {
-        (depth_image(depth, map, range), None)
-    });
+    let picture = cx
+        .local
+        .textures
+        .get(ui.ctx(), ("thumbnail", key), (bits, map), false, || (depth_image(depth, map, range), None));
     Some(picture.texture.id())
 }

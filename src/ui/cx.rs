@@ -22,7 +22,7 @@ use crate::domain::postprocess::Stats;
 use crate::domain::sensor::Finger;
 
 /// What a pane may use while it is drawn.
-pub struct Cx<'a> {
+pub(super) struct Cx<'a> {
     /// Everything the studio knows. Read only.
     pub state: &'a State,
     /// Executed before the next frame.
@@ -37,19 +37,19 @@ pub struct Cx<'a> {
 
 impl Cx<'_> {
     /// Puts a command on the list.
-    pub fn push(&mut self, command: Command) {
+    pub(super) fn push(&mut self, command: Command) {
         self.out.push(command);
     }
 
     /// Puts an action on the list, if it can do anything now.
-    pub fn act(&mut self, action: Action) {
+    pub(super) fn act(&mut self, action: Action) {
         if let Some(command) = action.command(self.state) {
             self.out.push(command);
         }
     }
 
     /// A button for an action: its tooltip has the shortcut, and it is greyed out when it can do nothing.
-    pub fn action_button(&mut self, ui: &mut Ui, action: Action, text: &str) -> Response {
+    pub(super) fn action_button(&mut self, ui: &mut Ui, action: Action, text: &str) -> Response {
         let command = action.command(self.state);
         let response = ui.add_enabled(command.is_some(), egui::Button::new(text)).accessible_name(action.name());
         let response = response.on_hover_text(action.help()).on_disabled_hover_text(action.help());
@@ -64,7 +64,7 @@ impl Cx<'_> {
 
 /// The stroke that the pointer is drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Painting {
+pub(super) struct Painting {
     /// The pane.
     pub pane: Pane,
     /// The finger.
@@ -73,7 +73,7 @@ pub struct Painting {
 
 /// Figures of a pair as they were when it was last on screen, for the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SeenPose {
+pub(super) struct SeenPose {
     /// Size of the angle's error, radians, by imprint source.
     pub error_rad: [Option<f64>; 2],
     /// The angle, radians, by imprint source.
@@ -81,7 +81,7 @@ pub struct SeenPose {
 }
 
 /// Points as the renderer takes them, made once per cloud.
-pub struct SceneCloud {
+pub(super) struct SceneCloud {
     /// The cloud.
     pub key: CloudKey,
     /// Counts up with every new cloud.
@@ -93,7 +93,7 @@ pub struct SceneCloud {
 }
 
 /// A CAD model as the renderer takes it.
-pub struct SceneMesh {
+pub(super) struct SceneMesh {
     /// The data set and the tool.
     pub key: (DatasetSeq, String),
     /// Counts up with every new model.
@@ -103,7 +103,7 @@ pub struct SceneMesh {
 }
 
 /// What only the window knows: view positions, text being typed, textures.
-pub struct Local {
+pub(super) struct Local {
     /// Pictures.
     pub textures: Textures,
     /// Outlines of masks.
@@ -168,7 +168,7 @@ pub struct Local {
 
 impl Local {
     /// A fresh window's.
-    pub fn new(native_dialogs: bool) -> Self {
+    pub(super) fn new(native_dialogs: bool) -> Self {
         Self {
             textures: Textures::default(),
             outlines: Memo::default(),
@@ -205,7 +205,7 @@ impl Local {
 }
 
 /// The colour of a side.
-pub fn side_color(p: &Palette, source: ImprintSource) -> egui::Color32 {
+pub(super) fn side_color(p: &Palette, source: ImprintSource) -> egui::Color32 {
     match source {
         ImprintSource::Measured => p.truth,
         ImprintSource::Predicted => p.prediction,

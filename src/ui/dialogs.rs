@@ -13,7 +13,7 @@ const NEVER_SHOWN: Duration = Duration::from_millis(700);
 
 /// What is being chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
+pub(super) enum Purpose {
     /// A folder with pairs, to open.
     Folder,
     /// A file, whose folder is opened.
@@ -41,7 +41,7 @@ struct PathBox {
 }
 
 /// Dialogs under way.
-pub struct Dialogs {
+pub(super) struct Dialogs {
     sender: Sender<(Purpose, Option<PathBuf>, Duration)>,
     answers: Receiver<(Purpose, Option<PathBuf>, Duration)>,
     waiting: bool,
@@ -52,13 +52,13 @@ pub struct Dialogs {
 
 impl Dialogs {
     /// `native` false always shows the path box (tests, or a person's wish).
-    pub fn new(native: bool) -> Self {
+    pub(super) fn new(native: bool) -> Self {
         let (sender, answers) = channel();
         Self { sender, answers, waiting: false, path_box: None, native }
     }
 
     /// Asks for a path.
-    pub fn open(&mut self, purpose: Purpose, ctx: &egui::Context) {
+    pub(super) fn open(&mut self, purpose: Purpose, ctx: &egui::Context) {
         if !self.native {
             self.type_path(purpose, "");
             return;
@@ -86,12 +86,12 @@ impl Dialogs {
     }
 
     /// Shows the path box.
-    pub fn type_path(&mut self, purpose: Purpose, why: &'static str) {
+    pub(super) fn type_path(&mut self, purpose: Purpose, why: &'static str) {
         self.path_box = Some(PathBox { purpose, text: String::new(), why, fresh: true });
     }
 
     /// Shows what is open; returns a path when one was chosen.
-    pub fn show(&mut self, ctx: &egui::Context) -> Option<(Purpose, PathBuf)> {
+    pub(super) fn show(&mut self, ctx: &egui::Context) -> Option<(Purpose, PathBuf)> {
         if let Ok((purpose, path, took)) = self.answers.try_recv() {
             self.waiting = false;
             match path {

@@ -3,7 +3,7 @@
 /// How well `query` fits `text`: higher is better, `None` if its letters do not all occur in order. Case is ignored.
 ///
 /// Letters at the start of a word and letters in a row count more; of equal fits the shorter text wins.
-pub fn score(query: &str, text: &str) -> Option<i32> {
+pub(super) fn score(query: &str, text: &str) -> Option<i32> {
     let mut wanted = query.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_lowercase).peekable();
     let mut total = 0;
     let mut previous_matched = false;

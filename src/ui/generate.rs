@@ -20,13 +20,16 @@ const LABEL: f32 = 60.0;
 fn row(ui: &mut Ui, weak: egui::Color32, name: &str, add: impl FnOnce(&mut Ui)) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        ui.add_sized(vec2(LABEL, 20.0), egui::Label::new(RichText::new(name).color(weak)).truncate().halign(egui::Align::Min));
+        ui.add_sized(
+            vec2(LABEL, 20.0),
+            egui::Label::new(RichText::new(name).color(weak)).truncate().halign(egui::Align::Min),
+        );
         add(ui);
     });
 }
 
 /// The pane.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("generate").show(ui, |ui| {
@@ -44,10 +47,10 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     let old = cx.state.settings.generate.clone();
     let mut new = old.clone();
     row(ui, cx.p.weak, "Model", |ui| {
-        let bundles: Vec<_> =
-            cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator).collect();
+        let bundles: Vec<_> = cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator).collect();
         let current = cx.state.bundle(BundleKind::Generator).map_or("none found", |b| b.name.as_str());
-        let combo = egui::ComboBox::from_id_salt("bundle").width(ui.available_width() - 8.0).selected_text(current).truncate();
+        let combo =
+            egui::ComboBox::from_id_salt("bundle").width(ui.available_width() - 8.0).selected_text(current).truncate();
         let response = combo.show_ui(ui, |ui| {
             for bundle in bundles {
                 let chosen = bundle.name == current;
@@ -72,9 +75,14 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
         response.response.accessible_name("Sampler").on_hover_text("The way from noise to an image");
         ui.label(RichText::new("eta").color(cx.p.weak));
         let drag = egui::DragValue::new(&mut new.eta).speed(0.01).range(0.0..=1.0).fixed_decimals(2);
-        reset(ui.add(drag).accessible_name("Eta"), "DDIM's share of fresh noise, 0 to 1; 0 is deterministic", "0.00", || {
-            new.eta = GenerateSettings::default().eta;
-        });
+        reset(
+            ui.add(drag).accessible_name("Eta"),
+            "DDIM's share of fresh noise, 0 to 1; 0 is deterministic",
+            "0.00",
+            || {
+                new.eta = GenerateSettings::default().eta;
+            },
+        );
     });
     row(ui, cx.p.weak, "Steps", |ui| {
         let drag = egui::DragValue::new(&mut new.steps).speed(0.2).range(STEPS);
@@ -85,9 +93,14 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
     row(ui, cx.p.weak, "Seed", |ui| {
         let drag = egui::DragValue::new(&mut new.seed).speed(1.0);
-        reset(ui.add(drag).accessible_name("Seed"), "Seed of the noise: the same seed gives the same prediction", "42", || {
-            new.seed = GenerateSettings::default().seed;
-        });
+        reset(
+            ui.add(drag).accessible_name("Seed"),
+            "Seed of the noise: the same seed gives the same prediction",
+            "42",
+            || {
+                new.seed = GenerateSettings::default().seed;
+            },
+        );
         let lock = ui.add(egui::Button::selectable(new.seed_locked, "Lock")).accessible_name("Lock the seed");
         if lock.on_hover_text(Action::LockSeed.help()).clicked() {
             new.seed_locked = !new.seed_locked;
@@ -233,4 +246,3 @@ fn choose(cx: &mut Cx<'_>, recipe: &Recipe) {
         }
     }
 }
-

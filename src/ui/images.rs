@@ -20,15 +20,15 @@ use crate::domain::sensor::{Finger, gelslim_footprint_in_bubble};
 use crate::domain::units;
 
 /// The colours of the mask and of contact points, everywhere: apart from every colour of the maps.
-pub const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
+pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
 
 /// The shared range of imprints, metres.
-pub fn range_of(state: &State) -> Range {
+pub(super) fn range_of(state: &State) -> Range {
     Range { lo: state.settings.range.min_m, hi: state.settings.range.max_m }
 }
 
 /// The colour map of imprints.
-pub fn map_of(state: &State) -> ColorMap {
+pub(super) fn map_of(state: &State) -> ColorMap {
     match state.settings.colour_map {
         ColourMap::Viridis => ColorMap::Viridis,
         ColourMap::Grey => ColorMap::Gray,
@@ -36,7 +36,7 @@ pub fn map_of(state: &State) -> ColorMap {
 }
 
 /// What every millimetre of this sample must be labelled with; empty where lengths are measured.
-pub fn scale_note(state: &State) -> &'static str {
+pub(super) fn scale_note(state: &State) -> &'static str {
     match state.sample().ready().map(|s| s.scale) {
         Some(Scale::Assumed) => "assumed scale",
         _ => "",
@@ -59,15 +59,14 @@ fn bubble_from_gel(finger: Finger, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
 }
 
 /// The pane of one kind of image, for every finger on screen.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
     let bar = matches!(pane, Pane::Measured | Pane::Predicted | Pane::Error);
     let full = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(full);
     let bottom = if bar { full.bottom() - colorbar::HEIGHT } else { full.bottom() };
     let area = Rect::from_min_max(full.min, pos2(full.right(), bottom.max(full.top() + 16.0)));
     // In the order right, left, whichever is active: images must not swap places when the finger is switched.
-    let fingers: Vec<Finger> =
-        Finger::BOTH.into_iter().filter(|f| cx.state.selection.fingers().contains(f)).collect();
+    let fingers: Vec<Finger> = Finger::BOTH.into_iter().filter(|f| cx.state.selection.fingers().contains(f)).collect();
     let beside = area.width() >= area.height();
     let n = fingers.len() as f32;
     let mut histogram = None;
@@ -153,17 +152,15 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger) -> Opt
                 Pane::GelRaw => {
                     state.gelslim(finger).and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.raw))
                 }
-                _ => state.gelslim(finger).and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.reference)),
+                _ => {
+                    state.gelslim(finger).and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.reference))
+                }
             };
             gel_image(cx, ui, pane, finger, image);
             None
         }
-        Pane::Measured => {
-            depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Measured, finger))
-        }
-        Pane::Predicted => {
-            depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger))
-        }
+        Pane::Measured => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Measured, finger)),
+        Pane::Predicted => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
         _ => {
             let error = state.comparison(finger).and_then(Absent::NoPrediction, |c| Some(&c.error));
             depth_pane(cx, ui, pane, finger, error)
@@ -202,7 +199,7 @@ fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, Finger), lo
 }
 
 /// A failure in words, with the way to try again.
-pub fn failed(cx: &mut Cx<'_>, ui: &mut Ui, err: &TaskError) {
+pub(super) fn failed(cx: &mut Cx<'_>, ui: &mut Ui, err: &TaskError) {
     let why = match &err.hint {
         Some(hint) => format!("{}\n{hint}", err.why),
         None => err.why.clone(),
@@ -213,7 +210,7 @@ pub fn failed(cx: &mut Cx<'_>, ui: &mut Ui, err: &TaskError) {
 }
 
 /// What is missing, and the action that brings it.
-pub fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
+pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     use crate::app::action::Action;
     // A prediction on its way shows how far it is, where it will appear.
     if absent == Absent::NoPrediction
@@ -263,7 +260,13 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger, lookup: L
     let Some(touch) = cx.state.touch_key(finger) else { return };
     let mut view = cx.local.gel_view;
     let label = format!("{} {}", super::pane::title(pane), finger.name());
-    let canvas = ImageCanvas { label: &label, size: image.size(), rotated: true, primary: Primary::Pan, background: cx.p.canvas };
+    let canvas = ImageCanvas {
+        label: &label,
+        size: image.size(),
+        rotated: true,
+        primary: Primary::Pan,
+        background: cx.p.canvas,
+    };
     let output = canvas.show(ui, &mut view);
     cx.local.gel_view = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
@@ -301,7 +304,7 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger, lookup: L
 
 impl Palette {
     /// Text over pictures: always light, on a dark shade.
-    pub const fn strong_on_image(&self) -> Color32 {
+    const fn strong_on_image(&self) -> Color32 {
         Color32::from_gray(235)
     }
 }
@@ -395,9 +398,10 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
         Pane::Predicted => state.chosen(finger).map_or(String::new(), |recipe| {
             format!("seed {} · {} steps · {}", recipe.seed, recipe.steps, state.settings.shift.label().to_lowercase())
         }),
-        Pane::Error => state.comparison(finger).ready().map_or(String::new(), |c| {
-            format!("mean |error| {}", units::text_mm(c.mae_m))
-        }),
+        Pane::Error => state
+            .comparison(finger)
+            .ready()
+            .map_or(String::new(), |c| format!("mean |error| {}", units::text_mm(c.mae_m))),
         _ => String::new(),
     };
     let color = match (pane, state.settings.shift) {
@@ -424,7 +428,8 @@ fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger, d
 /// The mask in force as a veil with an outline, or the outline alone.
 fn paint_mask(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: ImprintSource, finger: Finger) {
     let settings = &cx.state.settings;
-    if !settings.mask_visible || ui.input(|i| i.key_down(eframe::egui::Key::X)) && !ui.ctx().egui_wants_keyboard_input() {
+    if !settings.mask_visible || ui.input(|i| i.key_down(eframe::egui::Key::X)) && !ui.ctx().egui_wants_keyboard_input()
+    {
         return;
     }
     let Ok(in_force) = cx.state.mask_in_force(source, finger) else { return };
@@ -492,7 +497,7 @@ fn paint_stroke(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, pane: Pane, sou
 }
 
 /// The small square in the colour of a side, beside the pane's title.
-pub fn side_mark(ui: &mut Ui, p: &Palette, source: ImprintSource) {
+pub(super) fn side_mark(ui: &mut Ui, p: &Palette, source: ImprintSource) {
     let (rect, _) = ui.allocate_exact_size(vec2(8.0, 8.0), eframe::egui::Sense::hover());
     ui.painter().rect_filled(rect, 2.0, side_color(p, source));
 }

@@ -15,12 +15,23 @@ use crate::app::settings::Workspace;
 const FORMAT: &str = "touch2touch-layout-1";
 
 /// The panes of a workspace.
-pub fn panes_of(workspace: Workspace) -> &'static [Pane] {
+pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
     use Pane::*;
     match workspace {
         Workspace::Inspect => &[
-            Browser, GelDifference, GelRaw, GelReference, Measured, Predicted, Error, ScenePredicted, SceneMeasured,
-            Generate, Settings, Metrics, Log,
+            Browser,
+            GelDifference,
+            GelRaw,
+            GelReference,
+            Measured,
+            Predicted,
+            Error,
+            ScenePredicted,
+            SceneMeasured,
+            Generate,
+            Settings,
+            Metrics,
+            Log,
         ],
         Workspace::Align => &[Browser, ScenePredicted, SceneMeasured, Measured, Predicted, Metrics, Generate, Log],
         Workspace::Label => {
@@ -56,7 +67,7 @@ impl Builder {
 }
 
 /// The arrangement that a workspace starts with.
-pub fn default_tree(workspace: Workspace) -> Tree<Pane> {
+pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
     use Pane::*;
     let mut b = Builder(Tiles::default());
     let root = match workspace {
@@ -113,7 +124,7 @@ fn tree_id(workspace: Workspace) -> Id {
 }
 
 /// Whether the tree holds every pane of the workspace exactly once, below its root, and nothing else.
-pub fn is_valid(tree: &Tree<Pane>, workspace: Workspace) -> bool {
+pub(super) fn is_valid(tree: &Tree<Pane>, workspace: Workspace) -> bool {
     let mut counts: BTreeMap<Pane, u32> = BTreeMap::new();
     let Some(root) = tree.root() else { return false };
     // A stored tree may be damaged in any way, even be no tree: nothing is visited twice.
@@ -135,18 +146,18 @@ pub fn is_valid(tree: &Tree<Pane>, workspace: Workspace) -> bool {
 }
 
 /// The tree as text for the settings.
-pub fn to_text(tree: &Tree<Pane>) -> Option<String> {
+pub(super) fn to_text(tree: &Tree<Pane>) -> Option<String> {
     serde_json::to_string(&(FORMAT, tree)).ok()
 }
 
 /// The stored arrangement, if it can be used for the workspace.
-pub fn from_text(text: &str, workspace: Workspace) -> Option<Tree<Pane>> {
+pub(super) fn from_text(text: &str, workspace: Workspace) -> Option<Tree<Pane>> {
     let (format, tree): (String, Tree<Pane>) = serde_json::from_str(text).ok()?;
     (format == FORMAT && tree.id() == tree_id(workspace) && is_valid(&tree, workspace)).then_some(tree)
 }
 
 /// The stored arrangement, or the default one where there is none or it cannot be used.
-pub fn restore(stored: Option<&String>, workspace: Workspace) -> Tree<Pane> {
+pub(super) fn restore(stored: Option<&String>, workspace: Workspace) -> Tree<Pane> {
     match stored {
         None => default_tree(workspace),
         Some(text) => from_text(text, workspace).unwrap_or_else(|| {

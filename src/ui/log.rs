@@ -32,7 +32,7 @@ fn entry_ui(p: &Palette, ui: &mut Ui, entry: &Entry) {
 }
 
 /// The pane.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         if cx.state.log.entries.is_empty() {
@@ -47,9 +47,8 @@ pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// Warnings and errors that were not seen yet, over the lower right corner. They never block anything.
-pub fn notices(cx: &mut Cx<'_>, ctx: &egui::Context) {
-    let unseen: Vec<Entry> =
-        cx.state.log.unseen().filter(|e| e.level >= Level::Warning).cloned().collect();
+pub(super) fn notices(cx: &mut Cx<'_>, ctx: &egui::Context) {
+    let unseen: Vec<Entry> = cx.state.log.unseen().filter(|e| e.level >= Level::Warning).cloned().collect();
     if unseen.is_empty() {
         return;
     }

@@ -15,7 +15,7 @@ use crate::app::state::Lookup;
 use crate::domain::sensor::{Finger, bubble};
 
 /// The pane.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         if let Some(err) = cx.state.document.blocked(cx.state.pair_name()) {
@@ -59,7 +59,8 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         let mm = f64::from(radius) / bubble::PX_PER_M * 1e3;
         ui.label(caption(format!("{mm:.2} mm"), cx.p));
-        response.on_hover_text("Radius of brush and eraser, image pixels ([ and ], or Shift + wheel). Double-click resets");
+        response
+            .on_hover_text("Radius of brush and eraser, image pixels ([ and ], or Shift + wheel). Double-click resets");
     });
 }
 
@@ -90,7 +91,8 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
                 mm = MaskSettings::default().threshold_m * 1e3;
             }
             new.threshold_m = mm * 1e-3;
-            response.on_hover_text("Pixels pushed in further than this, millimetres. Default 5.00; double-click resets");
+            response
+                .on_hover_text("Pixels pushed in further than this, millimetres. Default 5.00; double-click resets");
         }
         MaskSource::TopPercent => {
             let slider = egui::Slider::new(&mut new.top_percent, 0.0..=60.0).fixed_decimals(1).suffix(" %");
@@ -108,7 +110,8 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
                 mm = MaskSettings::default().cad_distance_m * 1e3;
             }
             new.cad_distance_m = mm * 1e-3;
-            response.on_hover_text("Largest distance to the CAD model at the true pose. Default 1.00; double-click resets");
+            response
+                .on_hover_text("Largest distance to the CAD model at the true pose. Default 1.00; double-click resets");
         }
         MaskSource::Unet | MaskSource::Truth => {}
     }
@@ -160,7 +163,7 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// `saved 12:03:11`, or what is not saved yet.
-pub fn save_state(cx: &Cx<'_>, ui: &mut Ui) {
+pub(super) fn save_state(cx: &Cx<'_>, ui: &mut Ui) {
     let (text, color) = if cx.state.document.stroke.is_some() {
         ("unsaved stroke".to_owned(), cx.p.caution)
     } else {
@@ -182,7 +185,8 @@ fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
         for review in Review::iter() {
             let on = review == current;
             let color = if on { review_color(cx.p, review) } else { cx.p.text };
-            let text = RichText::new(review.name()).color(if on && review == Review::Skip { cx.p.strong } else { color });
+            let text =
+                RichText::new(review.name()).color(if on && review == Review::Skip { cx.p.strong } else { color });
             let button = ui.add_enabled(editable, egui::Button::selectable(on, text));
             let button = button.accessible_name(format!("Review: {}", review.name()));
             if button.on_hover_text("The review state of this pair").clicked() {
@@ -215,7 +219,8 @@ fn look(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let mut opacity = cx.state.settings.mask_opacity;
         ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
-        let response = ui.add(egui::Slider::new(&mut opacity, 0.0..=1.0).fixed_decimals(2)).accessible_name("Mask opacity");
+        let response =
+            ui.add(egui::Slider::new(&mut opacity, 0.0..=1.0).fixed_decimals(2)).accessible_name("Mask opacity");
         if response.changed() {
             cx.push(Command::SetMaskOpacity(opacity));
         }

@@ -16,7 +16,7 @@ use crate::domain::units;
 use strum::IntoEnumIterator as _;
 
 /// The pane.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("metrics").show(ui, |ui| {
@@ -188,9 +188,12 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
         .on_hover_text("What each stage of the depth chain left behind: smallest, mean, deviation, largest");
     Grid::new("ledger").num_columns(5).spacing([8.0, 2.0]).min_col_width(24.0).show(ui, |ui| {
         for head in ["mm", "min", "mean", "std", "max"] {
-            ui.with_layout(if head == "mm" { Layout::left_to_right(Align::Center) } else { Layout::right_to_left(Align::Center) }, |ui| {
-                ui.label(caption(head, cx.p));
-            });
+            ui.with_layout(
+                if head == "mm" { Layout::left_to_right(Align::Center) } else { Layout::right_to_left(Align::Center) },
+                |ui| {
+                    ui.label(caption(head, cx.p));
+                },
+            );
         }
         ui.end_row();
         for (name, color, stats, metres) in rows {

@@ -25,7 +25,7 @@ enum Entry {
 
 /// What is being typed.
 #[derive(Debug, Default)]
-pub struct PaletteState {
+pub(super) struct PaletteState {
     query: String,
     selected: usize,
     /// The entries for a query, made again when it changes.
@@ -34,7 +34,7 @@ pub struct PaletteState {
 }
 
 /// The palette, if it is open.
-pub fn show(cx: &mut Cx<'_>, ctx: &egui::Context) {
+pub(super) fn show(cx: &mut Cx<'_>, ctx: &egui::Context) {
     if !cx.state.selection.palette {
         cx.local.palette.open = false;
         return;
@@ -147,10 +147,20 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
         }
         let color = if enabled { p.strong } else { p.weak };
         let y = rect.center().y;
-        let place = ui.painter().text(pos2(rect.left() + 8.0, y), Align2::LEFT_CENTER, name, FontId::proportional(13.0), color);
+        let place =
+            ui.painter().text(pos2(rect.left() + 8.0, y), Align2::LEFT_CENTER, name, FontId::proportional(13.0), color);
         if let Entry::Action(action) = entry {
-            let clip = egui::Rect::from_min_max(pos2(place.right() + 12.0, rect.top()), pos2(rect.right() - 110.0, rect.bottom()));
-            ui.painter_at(clip).text(pos2(clip.left(), y), Align2::LEFT_CENTER, action.tooltip(), FontId::proportional(SMALL), p.weak);
+            let clip = egui::Rect::from_min_max(
+                pos2(place.right() + 12.0, rect.top()),
+                pos2(rect.right() - 110.0, rect.bottom()),
+            );
+            ui.painter_at(clip).text(
+                pos2(clip.left(), y),
+                Align2::LEFT_CENTER,
+                action.tooltip(),
+                FontId::proportional(SMALL),
+                p.weak,
+            );
         }
         ui.painter().text(pos2(rect.right() - 8.0, y), Align2::RIGHT_CENTER, kind, FontId::proportional(SMALL), p.weak);
     }

@@ -11,7 +11,7 @@ use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
 
 /// The title of a pane.
-pub fn title(pane: Pane) -> &'static str {
+pub(super) fn title(pane: Pane) -> &'static str {
     match pane {
         Pane::Browser => "Samples",
         Pane::GelRaw => "GelSlim raw",
@@ -61,19 +61,16 @@ fn side(pane: Pane) -> Option<ImprintSource> {
 }
 
 /// Draws a pane.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
     cx.local.visible_next.insert(pane);
     if ui.rect_contains_pointer(ui.max_rect()) {
         cx.local.hovered_pane = Some(pane);
     }
     match pane {
         Pane::Browser => browser::show(cx, ui),
-        Pane::GelRaw
-        | Pane::GelReference
-        | Pane::GelDifference
-        | Pane::Measured
-        | Pane::Predicted
-        | Pane::Error => images::show(cx, ui, pane),
+        Pane::GelRaw | Pane::GelReference | Pane::GelDifference | Pane::Measured | Pane::Predicted | Pane::Error => {
+            images::show(cx, ui, pane)
+        }
         Pane::SceneMeasured => scene::show(cx, ui, ImprintSource::Measured),
         Pane::ScenePredicted => scene::show(cx, ui, ImprintSource::Predicted),
         Pane::Generate => generate::show(cx, ui),
@@ -100,7 +97,7 @@ fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
 }
 
 /// How the panes behave in their tree.
-pub struct Docking<'a, 'b> {
+pub(super) struct Docking<'a, 'b> {
     /// What the panes get.
     pub cx: &'b mut Cx<'a>,
     /// Whether a person moved something.
@@ -201,7 +198,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
 }
 
 /// One pane over the whole window, with the way back.
-pub fn show_maximised(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+pub(super) fn show_maximised(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
     let full = ui.available_rect_before_wrap();
     ui.painter().rect_filled(full, 0.0, cx.p.frame);
     let bar = egui::Rect::from_min_size(full.min, vec2(full.width(), 26.0));

@@ -8,7 +8,7 @@ use super::cx::Cx;
 
 /// What is known about saving.
 #[derive(Debug, Default)]
-pub struct Saved {
+pub(super) struct Saved {
     /// The pairs that were not saved yet, at the last look.
     pending: std::collections::BTreeSet<String>,
     /// When the last of them was.
@@ -17,7 +17,7 @@ pub struct Saved {
 
 impl Saved {
     /// Looks which pairs are unsaved now.
-    pub fn observe(&mut self, unsaved: &std::collections::BTreeSet<String>) {
+    pub(super) fn observe(&mut self, unsaved: &std::collections::BTreeSet<String>) {
         if self.pending == *unsaved {
             return;
         }
@@ -35,7 +35,7 @@ fn clock(since_epoch: Duration) -> String {
 }
 
 /// The state in words, with its colour.
-pub fn text(cx: &Cx<'_>) -> (String, Color32) {
+pub(super) fn text(cx: &Cx<'_>) -> (String, Color32) {
     if cx.state.document.unsaved.contains(cx.state.pair_name()) {
         return ("saving…".into(), cx.p.caution);
     }

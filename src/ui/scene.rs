@@ -28,7 +28,7 @@ use crate::gpu::view::{Camera, Preset};
 const PICK_PX: f64 = 9.0;
 
 /// The pane of one side.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     let device = match cx.device {
         Ok(device) => device,
         Err(why) => {
@@ -183,12 +183,7 @@ fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {
         name: "grid".into(),
         revision: u64::from(*cx.p == super::theme::DARK),
         segments: grid(cx.p).into(),
-        style: LinesStyle {
-            world_from_lines: DAffine3::IDENTITY,
-            width_px: 1.0,
-            opacity: 1.0,
-            overlay: false,
-        },
+        style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.0, opacity: 1.0, overlay: false },
     });
     scene.lines.push(LinesItem {
         name: "axes".into(),
@@ -300,7 +295,7 @@ fn lower_first(absent: Absent) -> String {
 }
 
 /// `11.9° (true 12.3°, error 0.4°)`, green, amber or red by the usual limits of 5 and 10 degrees.
-pub fn angle_text(p: &Palette, pose: &PoseResult) -> (String, Color32) {
+pub(super) fn angle_text(p: &Palette, pose: &PoseResult) -> (String, Color32) {
     let angle = units::text_deg(pose.angle_rad);
     match (pose.truth_rad, pose.error_rad) {
         (Some(truth), Some(error)) => {
@@ -312,7 +307,7 @@ pub fn angle_text(p: &Palette, pose: &PoseResult) -> (String, Color32) {
 }
 
 /// The colour of an angle error.
-pub fn error_color(p: &Palette, error_rad: f64) -> Color32 {
+pub(super) fn error_color(p: &Palette, error_rad: f64) -> Color32 {
     match error_rad.to_degrees() {
         e if e <= 5.0 => p.good,
         e if e <= 10.0 => p.caution,
@@ -321,14 +316,8 @@ pub fn error_color(p: &Palette, error_rad: f64) -> Color32 {
 }
 
 /// Points, residual, stop reason, time.
-pub fn pose_details(pose: &PoseResult) -> String {
-    format!(
-        "{} points · residual {} · {} · {:.0} ms",
-        pose.num_points,
-        units::text_mm(pose.rms_m),
-        pose.stop,
-        pose.ms
-    )
+pub(super) fn pose_details(pose: &PoseResult) -> String {
+    format!("{} points · residual {} · {} · {:.0} ms", pose.num_points, units::text_mm(pose.rms_m), pose.stop, pose.ms)
 }
 
 fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output: &SceneOutput, rect: Rect) {
@@ -378,7 +367,7 @@ fn legend(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
 }
 
 /// The side that a request of the action table means.
-pub fn preset(preset: CameraPreset) -> Preset {
+pub(super) fn preset(preset: CameraPreset) -> Preset {
     match preset {
         CameraPreset::Left => Preset::Left,
         CameraPreset::Right => Preset::Right,

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{self, PointerButton, Pos2, Rect, Response, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2, vec2};
+use eframe::egui::{
+    self, PointerButton, Pos2, Rect, Response, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2, vec2,
+};
 use eframe::egui_wgpu::RenderState;
 use glam::{DVec2, DVec3};
 
@@ -13,7 +15,7 @@ use crate::gpu::view::Camera;
 use crate::gpu::{Gpu, GpuError, wgpu};
 
 /// The graphics device as all 3D panes share it.
-pub struct Device {
+pub(super) struct Device {
     gpu: Gpu,
     pipelines: Arc<Pipelines>,
     state: RenderState,
@@ -24,21 +26,21 @@ impl Device {
     ///
     /// # Errors
     /// What keeps the shaders from being built: shown in place of the 3D views.
-    pub fn new(state: &RenderState) -> Result<Self, GpuError> {
+    pub(super) fn new(state: &RenderState) -> Result<Self, GpuError> {
         let gpu = Gpu::new(&state.adapter, state.device.clone(), state.queue.clone());
         let pipelines = Arc::new(Pipelines::new(&gpu)?);
         Ok(Self { gpu, pipelines, state: state.clone() })
     }
 
     /// Name and driver of the adapter.
-    pub fn adapter(&self) -> &str {
+    pub(super) fn adapter(&self) -> &str {
         &self.gpu.adapter
     }
 }
 
 /// One view.
 #[derive(Default)]
-pub struct SceneView {
+pub(super) struct SceneView {
     /// Where it looks from.
     pub camera: Camera,
     /// Whether the camera was placed by a fit or by a person.
@@ -55,7 +57,7 @@ struct Drawn {
 }
 
 /// What happened in a view.
-pub struct SceneOutput {
+pub(super) struct SceneOutput {
     /// The pane's response.
     pub response: Response,
     /// The picture's size, physical pixels.
@@ -71,9 +73,10 @@ pub struct SceneOutput {
 
 impl SceneOutput {
     /// Where a point of the world appears on the screen.
-    pub fn on_screen(&self, camera: &Camera, p_in_world: DVec3) -> Option<Pos2> {
+    pub(super) fn on_screen(&self, camera: &Camera, p_in_world: DVec3) -> Option<Pos2> {
         let (px, _) = camera.project(p_in_world, self.size)?;
-        let scale = vec2(self.rect.width() / self.size[0].max(1) as f32, self.rect.height() / self.size[1].max(1) as f32);
+        let scale =
+            vec2(self.rect.width() / self.size[0].max(1) as f32, self.rect.height() / self.size[1].max(1) as f32);
         Some(self.rect.min + vec2(px.x as f32, px.y as f32) * scale)
     }
 }
@@ -81,7 +84,7 @@ impl SceneOutput {
 impl SceneView {
     /// Takes the space left in `ui` and moves the camera by what the pointer does. Call [`Self::draw`] next, with
     /// the scene that belongs to the new camera.
-    pub fn interact(&mut self, ui: &mut Ui, label: &str) -> SceneOutput {
+    pub(super) fn interact(&mut self, ui: &mut Ui, label: &str) -> SceneOutput {
         let space = ui.available_size().max(Vec2::splat(16.0));
         let (rect, response) = ui.allocate_exact_size(space, Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, label));
@@ -115,7 +118,7 @@ impl SceneView {
     }
 
     /// Brings the picture up to date and paints it. Nothing is drawn on the device when nothing changed.
-    pub fn draw(&mut self, ui: &Ui, device: &Device, output: &SceneOutput, scene: &SceneData) {
+    pub(super) fn draw(&mut self, ui: &Ui, device: &Device, output: &SceneOutput, scene: &SceneData) {
         match self.try_draw(device, output, scene) {
             Ok(texture) => {
                 let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));

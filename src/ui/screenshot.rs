@@ -9,7 +9,7 @@ use crate::app::command::Command;
 use crate::app::error::TaskError;
 
 /// Writes `image` as a PNG into `folder` (or the working directory), and reports where, or why not.
-pub fn save(folder: Option<&Path>, image: &ColorImage) -> Command {
+pub(super) fn save(folder: Option<&Path>, image: &ColorImage) -> Command {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
     let path = folder.unwrap_or(Path::new(".")).join(format!("touch2touch-{seconds}.png"));
     let [width, height] = image.size.map(|s| u32::try_from(s).unwrap_or(0));

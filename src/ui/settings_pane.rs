@@ -10,7 +10,7 @@ use crate::app::command::Command;
 use crate::app::settings::{ColourMap, RuntimeChoice, Theme};
 
 /// The pane.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("settings").show(ui, |ui| body(cx, ui));
@@ -45,7 +45,11 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
     });
     let mut footprint = settings.footprint_visible;
-    if ui.checkbox(&mut footprint, "GelSlim window on bubble images").on_hover_text(Action::Footprint.tooltip()).changed() {
+    if ui
+        .checkbox(&mut footprint, "GelSlim window on bubble images")
+        .on_hover_text(Action::Footprint.tooltip())
+        .changed()
+    {
         cx.out.push(Command::SetFootprintVisible(footprint));
     }
     let mut mask = settings.mask_visible;

@@ -1,6 +1,6 @@
 //! Keys to actions, and the sheet that lists them: both from the one table of actions.
 
-use eframe::egui::{self, Key as EKey, Modifiers, RichText, Ui};
+use eframe::egui::{self, Key as EKey, RichText, Ui};
 use strum::IntoEnumIterator as _;
 
 use super::cx::Cx;
@@ -24,7 +24,7 @@ fn is_shifted_symbol(key: Key) -> bool {
 }
 
 /// The actions whose shortcut was pressed in this frame. Keys without Ctrl are a text's while text is being typed.
-pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
+pub(super) fn pressed(ctx: &egui::Context) -> Vec<Action> {
     let typing = ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx);
     let mut actions = Vec::new();
     ctx.input_mut(|input| {
@@ -66,13 +66,8 @@ pub fn pressed(ctx: &egui::Context) -> Vec<Action> {
     actions
 }
 
-/// What the toolkit calls the modifiers of a shortcut.
-pub fn modifiers(s: Shortcut) -> Modifiers {
-    Modifiers { alt: s.alt, ctrl: s.ctrl, shift: s.shift, mac_cmd: false, command: s.ctrl }
-}
-
 /// The window with all actions and their keys.
-pub fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context) {
+pub(super) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context) {
     if !cx.state.selection.shortcut_sheet {
         return;
     }
@@ -131,6 +126,7 @@ fn group_ui(p: &Palette, ui: &mut Ui, group: Group) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use eframe::egui::Modifiers;
 
     #[test]
     fn every_key_of_the_table_is_known_to_the_toolkit() {
@@ -139,6 +135,11 @@ mod tests {
                 assert_ne!(key_of(s.key), EKey::F35, "{action:?} {s}");
             }
         }
+    }
+
+    /// What the toolkit calls the modifiers of a shortcut.
+    fn modifiers(s: crate::app::action::Shortcut) -> Modifiers {
+        Modifiers { alt: s.alt, ctrl: s.ctrl, shift: s.shift, mac_cmd: false, command: s.ctrl }
     }
 
     fn press(key: EKey, modifiers: Modifiers) -> Vec<Action> {

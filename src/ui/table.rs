@@ -39,13 +39,18 @@ struct Row {
 }
 
 /// The pane.
-pub fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         let mut rows = rows(cx);
         if rows.is_empty() {
             let action = Action::Generate.command(cx.state).map(|_| ("Generate (Ctrl+G)", Action::Generate.tooltip()));
-            if empty::show(ui, "No figures yet", "Pairs appear here once they were generated or aligned, the worst first", action) {
+            if empty::show(
+                ui,
+                "No figures yet",
+                "Pairs appear here once they were generated or aligned, the worst first",
+                action,
+            ) {
                 cx.act(Action::Generate);
             }
             return;
@@ -185,8 +190,8 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: &Row) {
     let p = cx.p;
-    let selected = cx.state.selection.pair == Some(row.pair)
-        && row.finger.is_none_or(|f| f == cx.state.selection.finger);
+    let selected =
+        cx.state.selection.pair == Some(row.pair) && row.finger.is_none_or(|f| f == cx.state.selection.finger);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
     response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, format!("Row {}", row.name)));
     let fill = if selected {
@@ -202,7 +207,13 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: &Row) {
         let cell = egui::Rect::from_min_size(pos2(x, rect.top()), vec2(w, ROW));
         let painter = ui.painter_at(cell);
         let text = |text: &str, color: Color32| {
-            painter.text(pos2(cell.left() + 6.0, cell.center().y), Align2::LEFT_CENTER, text, FontId::proportional(12.0), color)
+            painter.text(
+                pos2(cell.left() + 6.0, cell.center().y),
+                Align2::LEFT_CENTER,
+                text,
+                FontId::proportional(12.0),
+                color,
+            )
         };
         match i {
             0 => text(&row.name, p.strong),
@@ -216,7 +227,13 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: &Row) {
                     Some(v) => (format!("{v:.decimals$}"), p.strong),
                     None => ("–".to_owned(), p.weak),
                 };
-                painter.text(pos2(cell.right() - 14.0, cell.center().y), Align2::RIGHT_CENTER, text, FontId::proportional(12.0), color)
+                painter.text(
+                    pos2(cell.right() - 14.0, cell.center().y),
+                    Align2::RIGHT_CENTER,
+                    text,
+                    FontId::proportional(12.0),
+                    color,
+                )
             }
         };
     }
