@@ -60,7 +60,7 @@ fn bubble_touch(
     let truly = nominal * calibration_error(config, finger, seed);
     let rays = depth_camera::Rays::new(finger, INTRINSICS, truly);
     let depth_reference = depth_camera::dome_depth(&rays, membrane.dome());
-    let (depth, contact) = depth_camera::membrane_depth(&rays, membrane, &depth_reference);
+    let (depth, contact) = depth_camera::membrane_depth(&rays, membrane);
     let imprint = depth_camera::measure(&depth_reference, &depth, config, finger, seed);
     let mut truth = depth_reference.clone();
     for (imprint, depth) in truth.as_mut_slice().iter_mut().zip(depth.as_slice()) {

@@ -53,11 +53,11 @@ pub struct BubbleConfig {
 impl Default for BubbleConfig {
     fn default() -> Self {
         Self {
-            press_m: 0.0125,
+            press_m: 0.013,
             dome_rise_m: 0.0145,
             rim_semi_axes_m: [0.046, 0.066],
             rim_centre_z_m: 0.006,
-            air_kept: 0.9,
+            air_kept: 0.45,
             noise_m: 0.000_6,
             drift_m: 0.000_25,
             texture_m: 0.000_5,
@@ -136,7 +136,7 @@ impl Default for GelSlimConfig {
             smoothing_m: 0.000_08,
             // green lights the wrist side; red and blue 120 degrees away
             led_angle_rad: [-1.12, std::f64::consts::PI, 1.05],
-            led_gain: [72.0, 29.0, 40.0],
+            led_gain: [84.0, 38.0, 48.0],
             led_falloff: 0.16,
             base: [78.0, 102.0, 147.0],
             saturation: 150.0,
@@ -147,10 +147,10 @@ impl Default for GelSlimConfig {
             marker_phase: [0.2, 0.4],
             marker_angle_rad: 0.01,
             marker_fan: 0.10,
-            marker_darkness: 0.7,
-            marker_push_m: 0.000_55,
+            marker_darkness: 0.6,
+            marker_push_m: 0.000_45,
             spread_m: 0.001_6,
-            shear_m: 0.000_12,
+            shear_m: 0.000_10,
             twist_rad: 0.012,
             noise: 2.4,
             sensor_seed: 1,

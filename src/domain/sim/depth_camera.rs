@@ -11,6 +11,9 @@ use crate::domain::sensor::{Finger, Intrinsics, bubble};
 /// Membrane points up to this far from the tool count as contact, metres: the lab labels its masks so.
 pub const CONTACT_DISTANCE_M: f64 = 0.001;
 
+/// Steepest slope of a membrane: that of the tools' bevels.
+const MAX_SLOPE: f64 = 1.6;
+
 /// The rays of one camera in the coordinates of its membrane (n, y, z).
 pub(super) struct Rays {
     intrinsics: Intrinsics,
@@ -39,45 +42,55 @@ impl Rays {
 /// Depth of the free dome, metres.
 pub(super) fn dome_depth(rays: &Rays, dome: &Dome) -> DepthMap {
     let origin = rays.origin();
-    DepthMap::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| {
-        let d = rays.direction(u, v);
-        // height of the ray over the dome is a quadratic in depth, negative at the camera
-        let o = (DVec2::new(origin.y, origin.z) - dome.centre) / dome.semi;
-        let e = DVec2::new(d.y, d.z) / dome.semi;
-        let a = dome.rise * e.length_squared();
-        let b = d.x + 2.0 * dome.rise * o.dot(e);
-        let c = origin.x - dome.apex + dome.rise * o.length_squared();
-        (2.0 * -c / (b + (b * b - 4.0 * a * c).max(0.0).sqrt())) as f32
-    })
+    DepthMap::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| dome_hit(origin, rays.direction(u, v), dome) as f32)
+}
+
+/// Depth at which a ray meets the dome: its height over the dome is a quadratic in depth, negative at the camera.
+fn dome_hit(origin: DVec3, d: DVec3, dome: &Dome) -> f64 {
+    let o = (DVec2::new(origin.y, origin.z) - dome.centre) / dome.semi;
+    let e = DVec2::new(d.y, d.z) / dome.semi;
+    let a = dome.rise * e.length_squared();
+    let b = d.x + 2.0 * dome.rise * o.dot(e);
+    let c = origin.x - dome.apex + dome.rise * o.length_squared();
+    2.0 * -c / (b + (b * b - 4.0 * a * c).max(0.0).sqrt())
 }
 
 /// Depth of the pressed membrane, metres, and where it lies on the tool.
-pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>, reference: &DepthMap) -> (DepthMap, Mask) {
+pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap, Mask) {
     let origin = rays.origin();
     let mut contact = Mask::filled(bubble::WIDTH, bubble::HEIGHT, false);
+    // the membrane is nowhere pushed in further than this, so a ray cannot meet it before it meets this dome
+    let lowest = membrane.lowest_dome();
     let depth = DepthMap::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| {
         let d = rays.direction(u, v);
         let above = |z: f64| {
             let p = origin + d * z;
             p.x - membrane.height(DVec2::new(p.y, p.z))
         };
-        // the first crossing counts: behind a bar the wall hides the membrane. No slope exceeds about 2, so a
-        // step of the remaining height over that rate cannot jump over the surface.
-        let rate = d.x.abs() + 2.0 * DVec2::new(d.y, d.z).length();
-        let mut z = f64::from(reference[(u, v)]) - 0.04;
-        let mut last = z;
-        for _ in 0..200 {
-            let f = above(z);
-            if f >= 0.0 {
+        // The first crossing counts: behind a bar the wall hides the membrane. The tool's bevels are the steepest
+        // slopes, so a step of the remaining height over that rate cannot jump over the surface.
+        let rate = d.x.abs() + MAX_SLOPE * DVec2::new(d.y, d.z).length();
+        let mut low = dome_hit(origin, d, &lowest) - 1e-4;
+        let mut f_low = above(low);
+        let mut high = low;
+        let mut f_high = f_low;
+        for _ in 0..300 {
+            if f_high >= 0.0 {
                 break;
             }
-            last = z;
-            z += (-f / rate).max(1e-4);
+            (low, f_low) = (high, f_high);
+            high += (-f_high / rate).max(1e-4);
+            f_high = above(high);
         }
-        let (mut low, mut high) = (last, z);
-        for _ in 0..10 {
-            let middle = 0.5 * (low + high);
-            if above(middle) < 0.0 { low = middle } else { high = middle }
+        // false position: the bracket is short and the surface nearly straight in it
+        for _ in 0..3 {
+            let z = low + (high - low) * (f_low / (f_low - f_high)).clamp(0.0, 1.0);
+            let f = above(z);
+            if f.abs() < 1e-7 || f_low == f_high {
+                high = z;
+                break;
+            }
+            if f < 0.0 { (low, f_low) = (z, f) } else { (high, f_high) = (z, f) }
         }
         let hit = origin + d * high;
         let yz = DVec2::new(hit.y, hit.z);

@@ -38,8 +38,7 @@ impl Gel {
         finger: Finger,
         noise: &mut Noise,
     ) -> Self {
-        let columns = (gelslim::WIDTH as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1;
-        let rows = (gelslim::HEIGHT as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1;
+        let (columns, rows) = grid_size();
         // the two surfaces are never quite parallel
         let tilt = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.tilt_rad;
         let depth = config.indentation_m * (1.0 + config.indentation_spread * f64::from(noise.normal()));
@@ -156,42 +155,97 @@ pub(super) fn touch(
         .unwrap_or_else(|| GelSlimTouch { images: None, difference: reference })
 }
 
+/// A colour at every grid node, for effects that are smooth over a few pixels.
+struct Wash {
+    columns: usize,
+    values: Vec<[f32; 3]>,
+}
+
+impl Wash {
+    /// From a function of the node's column and row.
+    fn new(columns: usize, rows: usize, mut f: impl FnMut(usize, usize) -> [f32; 3]) -> Self {
+        let mut values = Vec::with_capacity(columns * rows);
+        for j in 0..rows {
+            for i in 0..columns {
+                values.push(f(i, j));
+            }
+        }
+        Self { columns, values }
+    }
+
+    /// The interpolated picture.
+    fn picture(&self) -> RgbGrid {
+        let steps: Vec<(usize, f32)> = (0..gelslim::WIDTH.max(gelslim::HEIGHT))
+            .map(|x| {
+                let i = x as f64 / PX_PER_STEP + MARGIN_STEPS;
+                (i as usize, i.fract() as f32)
+            })
+            .collect();
+        RgbGrid::from_fn(gelslim::WIDTH, gelslim::HEIGHT, |x, y| {
+            let ((i, tx), (j, ty)) = (steps[x], steps[y]);
+            let k = j * self.columns + i;
+            let (a, b) = (&self.values[k], &self.values[k + 1]);
+            let (c, d) = (&self.values[k + self.columns], &self.values[k + self.columns + 1]);
+            std::array::from_fn(|n| {
+                let top = a[n] + (b[n] - a[n]) * tx;
+                let bottom = c[n] + (d[n] - c[n]) * tx;
+                top + (bottom - top) * ty
+            })
+        })
+    }
+}
+
+/// Columns and rows of the solver's grid.
+fn grid_size() -> (usize, usize) {
+    (
+        (gelslim::WIDTH as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1,
+        (gelslim::HEIGHT as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1,
+    )
+}
+
 /// The light without contact and without markers: each LED is brighter on its own side.
 fn illumination(config: &GelSlimConfig, finger: Finger) -> RgbGrid {
     let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 8 + finger.index());
-    let stain = noise.smooth(gelslim::WIDTH, gelslim::HEIGHT, 150.0);
+    let (columns, rows) = grid_size();
+    let stain = noise.smooth(columns, rows, 150.0 / PX_PER_STEP);
     let leds = config.led_directions();
-    let centre = DVec2::new(0.5 * (gelslim::WIDTH - 1) as f64, 0.5 * (gelslim::HEIGHT - 1) as f64);
-    RgbGrid::from_fn(gelslim::WIDTH, gelslim::HEIGHT, |x, y| {
-        let p = (DVec2::new(x as f64, y as f64) - centre) / centre.x;
+    let middle = DVec2::new(columns as f64, rows as f64) * 0.5;
+    let half_width = 0.5 * gelslim::WIDTH as f64 / PX_PER_STEP;
+    Wash::new(columns, rows, |i, j| {
+        let p = (DVec2::new(i as f64, j as f64) - middle) / half_width;
         std::array::from_fn(|c| {
             let fall = 1.0 + config.led_falloff * leds[c].dot(p) - 0.12 * (p.length_squared() - 0.5);
-            (config.base[c] * fall) as f32 * (1.0 + 0.02 * stain[(x, y)])
+            (config.base[c] * fall) as f32 * (1.0 + 0.02 * stain[(i, j)])
         })
     })
+    .picture()
 }
 
 /// Adds the light and shade of the gel's slopes.
 fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, noise: &mut Noise) {
     let mut pushed = gel.pushed.clone();
     blur(&mut pushed, config.smoothing_m / STEP_M);
-    let slopes = slopes(&pushed, STEP_M);
-    let slow: [_; 3] = std::array::from_fn(|_| noise.smooth(gelslim::WIDTH, gelslim::HEIGHT, 130.0));
+    let [slope_x, slope_y] = slopes(&pushed, STEP_M);
+    let (columns, rows) = (pushed.columns, pushed.rows);
+    let slow: [_; 3] = std::array::from_fn(|_| noise.smooth(columns, rows, 130.0 / PX_PER_STEP));
     let leds = config.led_directions();
-    for y in 0..gelslim::HEIGHT {
-        for x in 0..gelslim::WIDTH {
-            let (i, j) = (x as f64 / PX_PER_STEP + MARGIN_STEPS, y as f64 / PX_PER_STEP + MARGIN_STEPS);
-            // the side of a dent faces away from where it is deepest
-            let facing = -DVec2::new(slopes[0].at(i, j), slopes[1].at(i, j));
-            let steep = facing.length_squared();
-            let pixel = &mut image[(x, y)];
-            for c in 0..3 {
-                let light = config.led_gain[c] * leds[c].dot(facing) / (1.0 + 0.35 * steep).sqrt()
-                    - config.shadow * steep / (1.0 + steep);
-                let shift = config.saturation * (light / config.saturation).tanh()
-                    + config.colour_drift * f64::from(slow[c][(x, y)]);
-                pixel[c] += shift as f32;
-            }
+    let light = Wash::new(columns, rows, |i, j| {
+        // the side of a dent faces away from where it is deepest
+        let k = j * columns + i;
+        let facing = -DVec2::new(f64::from(slope_x.values[k]), f64::from(slope_y.values[k]));
+        let steep = facing.length_squared();
+        std::array::from_fn(|c| {
+            let light = config.led_gain[c] * leds[c].dot(facing) / (1.0 + 0.35 * steep).sqrt()
+                - config.shadow * steep / (1.0 + steep);
+            // more light saturates
+            let light = light / (1.0 + (light / config.saturation).powi(2)).sqrt();
+            (light + config.colour_drift * f64::from(slow[c][(i, j)])) as f32
+        })
+    })
+    .picture();
+    for (pixel, light) in image.as_mut_slice().iter_mut().zip(light.as_slice()) {
+        for c in 0..3 {
+            pixel[c] += light[c];
         }
     }
 }

@@ -74,11 +74,7 @@ impl Problem<'_> {
     /// could fall between the nodes of the coarser ones.
     fn solve_from(&self, levels: usize, sweeps: usize, reach: usize) -> Field {
         let mut start = if levels > 1 && self.obstacle.columns > 8 && self.obstacle.rows > 8 {
-            let obstacle = self.obstacle.coarser(reach);
-            let free: Vec<bool> = (0..obstacle.rows)
-                .flat_map(|y| (0..obstacle.columns).map(move |x| (x, y)))
-                .map(|(x, y)| self.free[2 * y * self.obstacle.columns + 2 * x])
-                .collect();
+            let (obstacle, free) = self.coarser(reach);
             let coarse = Problem { obstacle: &obstacle, free: &free, step: 2.0 * self.step, ..*self };
             let w = coarse.solve_from(levels - 1, 2 * sweeps, 1);
             let mut fine = Field::filled(self.obstacle.columns, self.obstacle.rows, 0.0);
@@ -95,6 +91,17 @@ impl Problem<'_> {
         };
         self.relax(&mut start, sweeps);
         start
+    }
+
+    /// Obstacle and free nodes on a grid of twice the spacing.
+    pub(super) fn coarser(&self, reach: usize) -> (Field, Vec<bool>) {
+        let obstacle = self.obstacle.coarser(reach);
+        let mut free = Vec::with_capacity(obstacle.values.len());
+        for y in 0..obstacle.rows {
+            let row = &self.free[2 * y * self.obstacle.columns..];
+            free.extend((0..obstacle.columns).map(|x| row[2 * x]));
+        }
+        (obstacle, free)
     }
 
     /// `sweeps` red-black sweeps in place.
