@@ -9,6 +9,7 @@
 //! repository. There, bubble and GelSlim folders are paired by position; here every pair is matched by name.
 
 mod load;
+mod mirrored;
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;

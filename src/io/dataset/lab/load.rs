@@ -12,6 +12,8 @@ use crate::domain::sensor::{Finger, Intrinsics, bubble, gelslim};
 use crate::io::dataset::{InvalidPixels, LoadError, Loaded, problem};
 use crate::io::pt::{PtDict, PtError, read_dict};
 
+use super::mirrored::{UNIT_TOLERANCE, recover};
+
 const BUBBLE_SHAPE: [usize; 4] = [2, 1, bubble::HEIGHT, bubble::WIDTH];
 const GELSLIM_SHAPE: [usize; 4] = [2, 3, gelslim::HEIGHT, gelslim::WIDTH];
 /// A depth this close to the lens is the camera's way of saying "nothing measured".
@@ -173,34 +175,61 @@ fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Op
     let bubbles = optional(dict, dict.f64s("bubbles_tr_quat", &[&[2, 1, 7], &[2, 7]]), without, notes)?;
     let grasp = optional(dict, dict.f64s("grasp_frame_quat", &[&[1, 7], &[7], &[1, 1, 7]]), without, notes)?;
     let (Some(k), Some(bubbles), Some(grasp)) = (k, bubbles, grasp) else { return Ok([None, None]) };
-    let frame = |key: &str, values: &[f64], notes: &mut Vec<Problem>| {
-        let numbers: [f64; 7] = values.try_into().ok()?;
-        let length = numbers[3..].iter().map(|q| q * q).sum::<f64>().sqrt();
-        let affine = affine_from_xyz_quat(numbers);
-        if affine.is_none() {
-            let what = format!("key \"{key}\" {numbers:?} is no rigid transform: {without}");
-            notes.push(problem(dict.file(), what, "expected x y z qx qy qz qw, all finite"));
-        } else if (length - 1.0).abs() > 1e-3 {
-            let what = format!("key \"{key}\": the quaternion has length {length:.4}, not 1");
-            notes.push(problem(dict.file(), what, "expected x y z qx qy qz qw; check the order of the numbers"));
-        }
-        affine
+    let Some((base_from_grasp, length)) = rigid(&grasp) else {
+        notes.push(no_frame(dict, "grasp_frame_quat", &grasp, without));
+        return Ok([None, None]);
     };
-    let Some(base_from_grasp) = frame("grasp_frame_quat", &grasp, notes) else { return Ok([None, None]) };
+    if (length - 1.0).abs() > UNIT_TOLERANCE {
+        notes.push(not_unit(dict, "grasp_frame_quat", length, "normalised"));
+    }
     let mut out = [None, None];
+    let mut repaired: Option<(f64, &str)> = None;
     for finger in Finger::BOTH {
         let i = finger.index();
         let m = halves(&k)[i];
         let intrinsics = Intrinsics { fx: m[0], fy: m[4], cx: m[2], cy: m[5] };
-        let base_from_camera = frame("bubbles_tr_quat", halves(&bubbles)[i], notes);
-        if intrinsics.is_plausible() {
-            out[i] = base_from_camera.map(|b| (intrinsics, base_from_grasp.inverse() * b));
-        } else {
+        if !intrinsics.is_plausible() {
             let what = format!("key \"K\", {} finger: {intrinsics:?} is no camera: {without}", finger.name());
             notes.push(problem(dict.file(), what, "expected 3 x 3 pinhole matrices in pixels of the 224 x 171 image"));
+            continue;
         }
+        let numbers = halves(&bubbles)[i];
+        let Some((mut base_from_camera, length)) = rigid(numbers) else {
+            notes.push(no_frame(dict, "bubbles_tr_quat", numbers, without));
+            continue;
+        };
+        if (length - 1.0).abs() > UNIT_TOLERANCE {
+            let quaternion = [numbers[3], numbers[4], numbers[5], numbers[6]];
+            let mirrored = recover(base_from_camera.translation, quaternion, base_from_grasp.translation);
+            let how = if mirrored.is_some() {
+                "it comes from a mirrored camera frame, which was recovered by letting the camera look at the grasp"
+            } else {
+                "normalised"
+            };
+            base_from_camera = mirrored.unwrap_or(base_from_camera);
+            repaired = Some((length, how));
+        }
+        out[i] = Some((intrinsics, base_from_grasp.inverse() * base_from_camera));
     }
+    notes.extend(repaired.map(|(length, how)| not_unit(dict, "bubbles_tr_quat", length, how)));
     Ok(out)
+}
+
+/// The transform of `x y z qx qy qz qw` with the quaternion normalised, and the quaternion's length.
+fn rigid(values: &[f64]) -> Option<(DAffine3, f64)> {
+    let numbers: [f64; 7] = values.try_into().ok()?;
+    let length = numbers[3..].iter().map(|q| q * q).sum::<f64>().sqrt();
+    Some((affine_from_xyz_quat(numbers)?, length))
+}
+
+fn no_frame(dict: &PtDict, key: &str, values: &[f64], without: &str) -> Problem {
+    let what = format!("key \"{key}\" {values:?} is no rigid transform: {without}");
+    problem(dict.file(), what, "expected x y z qx qy qz qw, all finite")
+}
+
+fn not_unit(dict: &PtDict, key: &str, length: f64, how: &str) -> Problem {
+    let what = format!("key \"{key}\": a quaternion has length {length:.4}, not 1: {how}");
+    problem(dict.file(), what, "expected x y z qx qy qz qw of a rotation; check how the frames were converted")
 }
 
 fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[GelSlimTouch; 2], PtError> {

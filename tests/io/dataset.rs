@@ -1,0 +1,258 @@
+//! Opening folders: layouts, names, and everything that can be wrong with them.
+
+use std::path::Path;
+
+use touch2touch::domain::dataset::{PairId, Split};
+use touch2touch::domain::grid::Grid;
+use touch2touch::domain::sensor::Finger;
+use touch2touch::io::dataset::{Dataset, LoadError, OpenError, SourceKind};
+use touch2touch::io::images;
+use touch2touch::io::pt::{PtItem, Tensor, read_dict, write_dict};
+use touch2touch::io::simulated::{Layout, pair_paths, write_pair};
+
+use super::{touch, touch_file};
+
+fn names(dataset: &Dataset) -> Vec<&str> {
+    dataset.index.pairs.iter().map(|p| p.name.as_str()).collect()
+}
+
+#[test]
+fn a_written_touch_reads_back_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    for (layout, split) in
+        [(Layout::Train, Split::Train), (Layout::Test, Split::Test), (Layout::TrainOnly, Split::TrainOnly)]
+    {
+        write_pair(dir.path(), layout, "pattern_31_rod", 7, &touch(split as u8 as f32)).unwrap();
+    }
+    let dataset = Dataset::open(dir.path()).unwrap();
+    assert_eq!(
+        names(&dataset),
+        ["pattern_31_rod/data_7", "train_only/pattern_31_rod_data_7", "test_only/pattern_31_rod_data_7"]
+    );
+    for (i, pair) in dataset.index.pairs.iter().enumerate() {
+        let want = touch(pair.split as u8 as f32);
+        let loaded = dataset.load_with_notes(PairId(i as u32)).unwrap();
+        assert_eq!(loaded.notes, []);
+        let got = loaded.sample;
+        let (a, b) = (got.grasp_from_object.unwrap(), want.grasp_from_object.unwrap());
+        assert!((a.theta_rad - b.theta_rad).abs() < 1e-15 && (a.y_m - b.y_m).abs() < 1e-15);
+        for finger in Finger::BOTH {
+            let (a, b) = (got.finger(finger).unwrap(), want.finger(finger).unwrap());
+            let (ga, gb) = (a.gelslim.as_ref().unwrap(), b.gelslim.as_ref().unwrap());
+            assert_eq!(ga.images.as_ref().unwrap().raw, gb.images.as_ref().unwrap().raw);
+            assert_eq!(ga.difference, gb.difference);
+            let (ba, bb) = (a.bubble.as_ref().unwrap(), b.bubble.as_ref().unwrap());
+            assert_eq!(ba.imprint, bb.imprint);
+            assert_eq!(ba.truth.as_ref().unwrap().contact, bb.truth.as_ref().unwrap().contact);
+            let (ca, cb) = (ba.camera.as_ref().unwrap(), bb.camera.as_ref().unwrap());
+            assert_eq!((&ca.depth_reference, ca.intrinsics), (&cb.depth_reference, cb.intrinsics));
+            // Frames are stored as 32-bit numbers around half a metre: 6e-8 each.
+            assert!(ca.grasp_from_camera.abs_diff_eq(cb.grasp_from_camera, 5e-7));
+        }
+    }
+}
+
+#[test]
+fn everything_wrong_is_listed_and_the_rest_opens() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    for i in 0..9 {
+        write_pair(root, Layout::Test, "pattern_35", i, &touch(i as f32)).unwrap();
+    }
+    let [gel0, _] = pair_paths(root, Layout::Test, "pattern_35", 0);
+    let [_, bubble1] = pair_paths(root, Layout::Test, "pattern_35", 1);
+    let bubble = |i| pair_paths(root, Layout::Test, "pattern_35", i)[1].clone();
+    std::fs::remove_file(&gel0).unwrap();
+    let whole = std::fs::read(&bubble1).unwrap();
+    std::fs::write(&bubble1, &whole[..whole.len() / 2]).unwrap();
+    let imprint = |values: Vec<f32>, shape: &[usize]| PtItem::from(Tensor::f32(shape, values));
+    write_dict(&bubble(2), &[("bubble_imprint", imprint(vec![0.0; 4], &[2, 1, 1, 2]))]).unwrap();
+    write_dict(&bubble(3), &[("imprint", imprint(vec![0.0; 4], &[2, 1, 1, 2]))]).unwrap();
+    let mut values = vec![0.001; 2 * 140 * 175];
+    (values[5], values[6], values[24500]) = (f32::NAN, f32::INFINITY, f32::NAN);
+    write_dict(&bubble(4), &[("bubble_imprint", imprint(values, &[2, 1, 140, 175]))]).unwrap();
+    std::fs::write(bubble(5), b"").unwrap();
+    std::fs::write(bubble(6), b"hello").unwrap();
+    touch_file(&root.join("train/bubbles/data/bubble_style_transfer_dataset_bubbles_pattern_32/readme.txt"));
+    std::fs::create_dir_all(root.join("train/gelslims")).unwrap();
+
+    let dataset = Dataset::open(root).unwrap();
+    assert_eq!(dataset.index.pairs.len(), 8, "the half pair is left out");
+    let listed = |file: &str, word: &str| {
+        dataset
+            .problems
+            .iter()
+            .any(|p| p.file.to_string_lossy().contains(file) && p.what.contains(word) && !p.hint.is_empty())
+    };
+    assert!(listed("bubbles/pattern_35_data_0.pt", "other half"), "{:#?}", dataset.problems);
+    assert!(listed("tools_stls/pattern_35.stl", "CAD"));
+    assert!(listed("bubbles_pattern_32", "empty"));
+    assert!(listed("train/gelslims", "no .pt files"));
+    let id = |n: u64| PairId(dataset.index.pairs.iter().position(|p| p.number == n).unwrap() as u32);
+    let error = |n| dataset.load(id(n)).unwrap_err().to_string();
+    assert!(error(1).contains("truncated") && error(1).contains("data_1.pt"), "{}", error(1));
+    assert!(error(2).contains("[2, 1, 1, 2]") && error(2).contains("[2, 1, 140, 175]"), "{}", error(2));
+    assert!(error(3).contains("bubble_imprint") && error(3).contains("missing"), "{}", error(3));
+    assert!(error(5).contains("empty") && error(6).contains("not a PyTorch file"));
+    let odd = dataset.load_with_notes(id(4)).unwrap();
+    assert_eq!((odd.invalid[0].nan, odd.invalid[0].infinite, odd.invalid[1].nan), (1, 1, 1));
+    let right = odd.sample.finger(Finger::Right).unwrap().bubble.as_ref().unwrap();
+    assert!(right.imprint[(5, 0)].is_nan() && right.imprint[(6, 0)].is_nan() && right.camera.is_none());
+    for key in ["bubble_depth_ref", "\"K\"", "bubbles_tr_quat"] {
+        assert!(odd.notes.iter().any(|n| n.what.contains(key)), "{key}: {:#?}", odd.notes);
+    }
+    assert!(dataset.load(id(7)).is_ok() && dataset.load(id(8)).is_ok());
+    assert!(matches!(dataset.load(PairId(99)), Err(LoadError::NoSuchPair { .. })));
+}
+
+#[test]
+fn halves_of_different_grasps_and_camera_zeros_are_noticed() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut sample = touch(1.0);
+    let bubble = sample.fingers[1].as_mut().unwrap().bubble.as_mut().unwrap();
+    bubble.imprint[(3, 4)] = bubble.camera.as_ref().unwrap().depth_reference[(3, 4)];
+    write_pair(dir.path(), Layout::Test, "rod", 0, &sample).unwrap();
+    write_pair(dir.path(), Layout::Test, "rod", 1, &touch(2.0)).unwrap();
+    let [gel0, _] = pair_paths(dir.path(), Layout::Test, "rod", 0);
+    let [gel1, _] = pair_paths(dir.path(), Layout::Test, "rod", 1);
+    std::fs::copy(gel1, gel0).unwrap();
+    let loaded = Dataset::open(dir.path()).unwrap().load_with_notes(PairId(0)).unwrap();
+    assert_eq!(loaded.invalid[1].dropped, 1);
+    assert!(loaded.notes[0].what.contains("differ"), "{:#?}", loaded.notes);
+}
+
+#[test]
+fn layouts_prefixes_order_and_duplicates() {
+    let dir = tempfile::tempdir().unwrap();
+    // The folder above `data`, bare and prefixed tool folders, the undistorted variant as the only one.
+    let train = dir.path().join("data/train");
+    for i in [10, 9, 100, 1] {
+        touch_file(&train.join(format!("bubbles/data/bubble_style_transfer_dataset_bubbles_rod/data_{i}.pt")));
+        touch_file(&train.join(format!("gelslims_no_distortion/data/rod/data_{i}.pt")));
+    }
+    touch_file(&train.join("bubbles/data/rod/data_9.pt"));
+    touch_file(&train.join("bubbles/data/.hidden.pt"));
+    let dataset = Dataset::open(dir.path()).unwrap();
+    assert_eq!(names(&dataset), ["rod/data_1", "rod/data_9", "rod/data_10", "rod/data_100"]);
+    assert_eq!(dataset.root.as_deref(), Some(dir.path().canonicalize().unwrap().join("data").as_path()));
+    assert_eq!(dataset.problems.iter().filter(|p| p.what.contains("same name")).count(), 1);
+    assert_eq!(Dataset::open(&train.join("bubbles/data/rod/data_9.pt")).unwrap().index.pairs.len(), 4);
+
+    // A flat folder on its own, one sensor only.
+    let flat = tempfile::tempdir().unwrap();
+    touch_file(&flat.path().join("bubbles/pattern_05_3_lines_angle_2_data_5.pt"));
+    let dataset = Dataset::open(flat.path()).unwrap();
+    assert_eq!(names(&dataset), ["pattern_05_3_lines_angle_2_data_5"]);
+    assert_eq!(dataset.index.pairs[0].tool.as_deref(), Some("pattern_05_3_lines_angle_2"));
+    assert!(dataset.problems.iter().any(|p| p.what.contains("one sensor")));
+}
+
+#[cfg(unix)]
+#[test]
+fn links_are_followed_and_loops_end() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path().join("set");
+    write_pair(&dir.path().join("store"), Layout::Test, "rod", 3, &touch(0.0)).unwrap();
+    std::fs::create_dir_all(root.join("test")).unwrap();
+    std::os::unix::fs::symlink("../../store/test/test_only", root.join("test/test_only")).unwrap();
+    let bubbles = dir.path().join("store/test/test_only/bubbles");
+    std::os::unix::fs::symlink("..", bubbles.join("loop")).unwrap();
+    std::os::unix::fs::symlink("nowhere", bubbles.join("rod_data_9.pt")).unwrap();
+    let dataset = Dataset::open(&root).unwrap();
+    assert!(names(&dataset).contains(&"test_only/rod_data_3"));
+    let id = dataset.index.pairs.iter().position(|p| p.name == "test_only/rod_data_3").unwrap();
+    assert!(dataset.load(PairId(id as u32)).is_ok());
+    assert!(dataset.problems.iter().any(|p| p.what.contains("leads nowhere")), "{:#?}", dataset.problems);
+}
+
+#[test]
+fn picture_folders() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| dir.path().join(name);
+    for name in ["b2", "b10"] {
+        images::write_rgb8(&file(&format!("{name}_gelslim.png")), &Grid::from_fn(64, 48, |x, _| [x as f32; 3]))
+            .unwrap();
+        images::write_grey8(&file(&format!("{name}_bubble.png")), &Grid::from_fn(128, 128, |x, y| (x + y) as u8))
+            .unwrap();
+    }
+    images::write_grey8(&file("lone_bubble.png"), &Grid::filled(8, 8, 1)).unwrap();
+    std::fs::write(file("b10_bubble.png"), b"\x89PNG broken").unwrap();
+    std::fs::write(file("notes.txt"), b"x").unwrap();
+    let dataset = Dataset::open(dir.path()).unwrap();
+    assert_eq!((names(&dataset), dataset.kind), (vec!["b2", "b10"], SourceKind::Pictures));
+    assert_eq!(dataset.problems.len(), 1);
+    assert!(dataset.problems[0].what.contains("lone_gelslim.png"));
+    let touch = dataset.load(PairId(0)).unwrap();
+    let imprint = &touch.finger(Finger::Right).unwrap().bubble.as_ref().unwrap().imprint;
+    assert!(imprint[(0, 0)] > imprint[(174, 139)], "turned back by 180 degrees");
+    assert!(dataset.load(PairId(1)).unwrap_err().to_string().contains("b10_bubble.png"));
+    assert_eq!(dataset.vqvae_tile(PairId(0)).unwrap(), None);
+    assert_eq!(dataset.tool_mesh("rod").unwrap(), None);
+}
+
+#[test]
+fn what_is_no_dataset_says_what_would_be() {
+    let dir = tempfile::tempdir().unwrap();
+    let err = Dataset::open(dir.path()).unwrap_err();
+    assert!(matches!(err, OpenError::NothingFound { .. }) && err.hint().contains("tools_stls"));
+    assert!(!err.to_problem().what.is_empty());
+    assert!(matches!(Dataset::open(Path::new("/no/such/folder")), Err(OpenError::Io { .. })));
+}
+
+#[test]
+fn tens_of_thousands_of_pairs_are_indexed_by_name_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let tools = 12;
+    let per_tool = 1344;
+    for (sensor, prefix) in
+        [("bubbles", "bubble_style_transfer_dataset_bubbles_"), ("gelslims", "gelslim_style_transfer_dataset_gelslim_")]
+    {
+        for tool in 0..tools {
+            // Both fingers of the paper's count are in one file, so twice the grasps make its 32,256 pairs.
+            let folder = dir.path().join(format!("train/{sensor}/data/{prefix}pattern_{tool:02}"));
+            std::fs::create_dir_all(&folder).unwrap();
+            for i in 0..2 * per_tool {
+                std::fs::File::create(folder.join(format!("data_{i}.pt"))).unwrap();
+            }
+        }
+    }
+    let start = std::time::Instant::now();
+    let dataset = Dataset::open(dir.path()).unwrap();
+    eprintln!("{} pairs opened in {:.0} ms", dataset.index.pairs.len(), start.elapsed().as_secs_f64() * 1e3);
+    assert_eq!(dataset.index.pairs.len(), 2 * tools * per_tool);
+    assert_eq!(dataset.problems.len(), tools, "only the CAD models are missing");
+    assert!(dataset.load(PairId(0)).unwrap_err().to_string().contains("empty"), "content shows when it is loaded");
+}
+
+/// Needs a Python with PyTorch, named by `TOUCH2TOUCH_TORCH_PYTHON`.
+#[test]
+fn pytorch_reads_a_written_pair() {
+    let dir = tempfile::tempdir().unwrap();
+    let [gelslim, bubble] = write_pair(dir.path(), Layout::Train, "pattern_32", 0, &touch(0.0)).unwrap();
+    assert!(read_dict(&bubble).unwrap().keys().contains(&"contact_mask".to_string()));
+    let Some(python) = std::env::var_os("TOUCH2TOUCH_TORCH_PYTHON") else {
+        eprintln!("TOUCH2TOUCH_TORCH_PYTHON is not set: PyTorch itself is not asked");
+        return;
+    };
+    let script = "
+import sys, torch
+g, b = (torch.load(p, weights_only=True) for p in sys.argv[1:])
+f32, f64 = torch.float32, torch.float64
+want = {'bubble_imprint': (2,1,140,175), 'bubble_depth_ref': (2,1,140,175), 'K': (2,3,3), 'bubbles_tr_quat': (2,1,7),
+        'grasp_frame_quat': (1,7), 'tool_tr_quat': (1,7), 'finger_tr_quat': (2,1,7), 'imprint_clean': (2,1,140,175)}
+for k, s in want.items(): assert b[k].shape == s and b[k].dtype == f32, k
+assert b['contact_mask'].dtype == torch.uint8 and set(b['contact_mask'].unique().tolist()) == {0, 1}
+for d in (g, b):
+    for k in ('theta', 'x', 'y'): assert d[k].shape == () and d[k].dtype == f64, k
+for k in ('gelslim', 'gelslim_ref'): assert g[k].shape == (2,3,320,427) and g[k].dtype == f32, k
+assert abs(b['theta'].item() - 0.1) < 1e-12 and abs(b['x'].item() - 0.002) < 1e-12 and abs(b['y'].item() + 0.003) < 1e-12
+assert g['gelslim'][1,0,0,0] == 101 and g['gelslim'][0,1,5,7] == 107
+";
+    let out = std::process::Command::new(python)
+        .args(["-c", script])
+        .args([gelslim, bubble])
+        .env("OMP_NUM_THREADS", "1")
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+}

@@ -1,0 +1,123 @@
+//! The doctor on good and spoilt data.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use touch2touch::domain::grid::Grid;
+use touch2touch::domain::mesh::TriMesh;
+use touch2touch::domain::sample::Sample;
+use touch2touch::domain::sensor::Finger;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::doctor::{DoctorReport, examine};
+use touch2touch::io::simulated::{Layout, WriteError, write_pair, write_tools};
+
+use super::touch;
+use crate::support;
+
+fn tetrahedron(size: f64) -> TriMesh {
+    let corners = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
+    TriMesh {
+        vertices: corners.iter().map(|&c| glam::DVec3::from_array(c) * size).collect(),
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    }
+}
+
+fn doctor(root: &Path) -> DoctorReport {
+    examine(&Dataset::open(root).unwrap(), &mut |_, _| ControlFlow::Continue(()))
+}
+
+/// Writes one spoilt touch and returns what the doctor says about it.
+fn spoilt(spoil: impl FnOnce(&mut Sample)) -> Vec<String> {
+    let dir = tempfile::tempdir().unwrap();
+    let mut sample = touch(0.0);
+    spoil(&mut sample);
+    write_tools(dir.path(), &[("rod", true, tetrahedron(0.05))]).unwrap();
+    write_pair(dir.path(), Layout::Test, "rod", 0, &sample).unwrap();
+    let report = doctor(dir.path());
+    assert_eq!((report.pairs, report.examined), (1, 1));
+    assert!(
+        report.problems.iter().all(|p| !p.hint.is_empty() && p.file.starts_with(dir.path().canonicalize().unwrap()))
+    );
+    report.problems.into_iter().map(|p| p.what).collect()
+}
+
+/// Changes both bubbles.
+fn bubbles(sample: &mut Sample, f: impl Fn(&mut touch2touch::domain::sample::BubbleTouch)) {
+    for finger in Finger::BOTH {
+        f(sample.fingers[finger.index()].as_mut().unwrap().bubble.as_mut().unwrap());
+    }
+}
+
+#[test]
+fn good_data_has_no_problem_and_every_spoilt_one_is_found() {
+    assert_eq!(spoilt(|_| {}), [""; 0]);
+    let has = |problems: Vec<String>, word: &str| {
+        assert!(problems.iter().any(|p| p.contains(word)), "{word}: {problems:#?}");
+    };
+    has(spoilt(|s| bubbles(s, |b| b.imprint = b.imprint.map(|v| v * 1e3))), "millimetres?");
+    has(spoilt(|s| bubbles(s, |b| b.imprint[(4, 4)] = 0.5)), "single pixels are far off");
+    has(spoilt(|s| bubbles(s, |b| b.imprint = Grid::filled(175, 140, 0.0))), "everywhere");
+    has(spoilt(|s| bubbles(s, |b| b.imprint = Grid::filled(175, 140, f32::NAN))), "no measured pixel");
+    has(spoilt(|s| bubbles(s, |b| b.imprint[(4, 4)] = f32::INFINITY)), "2 infinite".trim_start_matches("2 "));
+    has(spoilt(|s| bubbles(s, |b| b.imprint[(4, 4)] = f32::NAN)), "1 of 1 pairs");
+    has(spoilt(|s| bubbles(s, |b| b.camera.as_mut().unwrap().intrinsics.fx = 0.2)), "K");
+    has(spoilt(|s| bubbles(s, |b| b.camera.as_mut().unwrap().intrinsics.cx = 900.0)), "implausible");
+    let scale_reference = |s: &mut Sample, by: f32| {
+        bubbles(s, |b| {
+            let camera = b.camera.as_mut().unwrap();
+            camera.depth_reference = camera.depth_reference.map(|v| v * by);
+        });
+    };
+    has(spoilt(|s| scale_reference(s, 1e3)), "out of the bubble's range: millimetres?");
+    has(spoilt(|s| bubbles(s, |b| b.camera.as_mut().unwrap().grasp_from_camera.translation *= 20.0)), "past the grasp");
+    has(
+        spoilt(|s| {
+            let left = s.fingers[1].clone();
+            s.fingers[0] = left;
+        }),
+        "same side",
+    );
+    has(spoilt(|s| s.grasp_from_object.as_mut().unwrap().theta_rad = 12.0), "degrees?");
+    has(spoilt(|s| s.grasp_from_object.as_mut().unwrap().y_m = 4.0), "millimetres?");
+    has(
+        spoilt(|s| {
+            let images = s.fingers[0].as_mut().unwrap().gelslim.as_mut().unwrap().images.as_mut().unwrap();
+            images.raw = images.raw.map(|p| p.map(|v| v / 255.0));
+        }),
+        "not the scale 0..255",
+    );
+}
+
+#[test]
+fn cad_in_millimetres_is_found_and_progress_can_end_it() {
+    let dir = tempfile::tempdir().unwrap();
+    write_tools(dir.path(), &[("rod", true, tetrahedron(50.0)), ("cross", false, tetrahedron(0.05))]).unwrap();
+    for i in 0..20 {
+        write_pair(dir.path(), Layout::Train, "rod", i, &touch(0.0)).unwrap();
+    }
+    let report = doctor(dir.path());
+    assert_eq!(report.problems.len(), 1, "{:#?}", report.problems);
+    assert!(report.problems[0].what.contains("not metres") && report.problems[0].hint.contains("0.001"));
+    let dataset = Dataset::open(dir.path()).unwrap();
+    let mut calls = Vec::new();
+    let stopped = examine(&dataset, &mut |done, total| {
+        calls.push((done, total));
+        if done > 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert_eq!((stopped.pairs, stopped.examined), (20, 16));
+    assert_eq!(calls, [(0, 20), (16, 20)]);
+    assert!(matches!(write_tools(dir.path(), &[("../x", true, tetrahedron(1.0))]), Err(WriteError::ToolName { .. })));
+    let empty = Sample::default();
+    assert!(matches!(write_pair(dir.path(), Layout::Train, "rod", 0, &empty), Err(WriteError::Incomplete { .. })));
+}
+
+#[test]
+fn the_reference_sets_are_healthy() {
+    let Some(shared) = support::shared() else { return };
+    let pictures = doctor(&shared.join("real-pairs"));
+    assert_eq!((pictures.pairs, pictures.problems), (36, vec![]));
+    // The lab's sample has mirrored cameras in every file and nothing else.
+    let lab = doctor(&shared.join("lab-sample"));
+    assert_eq!((lab.pairs, lab.problems.len()), (4, 4), "{:#?}", lab.problems);
+    assert!(lab.problems.iter().all(|p| p.what.contains("mirrored camera frame")));
+}

@@ -1,0 +1,221 @@
+//! Corrected masks on disk: nothing is lost, nothing is overwritten blindly.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::process::{Command, Stdio};
+
+use glam::DVec2;
+use touch2touch::domain::frames::PlanarPose;
+use touch2touch::domain::grid::Mask;
+use touch2touch::domain::label::{Patch, paint_stroke};
+use touch2touch::domain::sensor::Finger;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::masks::{FOLDER, JournalEntry, MaskStore, StoreError, StoredMask, StoredReview};
+
+use super::touch_file;
+
+const STORE_VARIABLE: &str = "TOUCH2TOUCH_TEST_STROKES_INTO";
+const PAIR: &str = "pattern_31_rod/data_0";
+
+fn stored(mask: Mask) -> StoredMask {
+    StoredMask { mask, base: "Threshold 5.00 mm".into(), person: "anna".into(), saved_unix_s: 1 }
+}
+
+fn entry(number: u32, points: &[DVec2]) -> JournalEntry {
+    JournalEntry {
+        unix_s: u64::from(number),
+        person: "anna".into(),
+        pair: PAIR.into(),
+        finger: "right".into(),
+        tool: "brush".into(),
+        radius_px: Some(3.0),
+        points: points.iter().map(|p| [p.x as f32, p.y as f32]).collect(),
+    }
+}
+
+/// Stroke `number`: the same in the writing and in the checking process.
+fn stroke(number: u32) -> [DVec2; 2] {
+    let at = |k: u32, size: u32| f64::from(number.wrapping_mul(k) % size);
+    [DVec2::new(at(37, 175), at(61, 140)), DVec2::new(at(53, 175), at(29, 140))]
+}
+
+fn paint(mask: &mut Mask, number: u32) {
+    paint_stroke(mask, &stroke(number), 3.0, number % 5 != 4);
+}
+
+#[test]
+fn what_is_saved_is_loaded_and_undo_changes_the_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = MaskStore::in_folder(dir.path().join("deep/masks"));
+    assert_eq!(store.load(PAIR, Finger::Right).unwrap(), None);
+    let before = Mask::filled(175, 140, false);
+    let mut after = before.clone();
+    paint(&mut after, 0);
+    store.save(PAIR, Finger::Right, Some(&stored(after.clone()))).unwrap();
+    assert_eq!(store.load(PAIR, Finger::Right).unwrap(), Some(stored(after.clone())));
+    assert_eq!(store.load(PAIR, Finger::Left).unwrap(), None);
+    let mut undo = Patch::between(&after, &before).unwrap();
+    undo.swap(&mut after).unwrap();
+    store.save(PAIR, Finger::Right, Some(&stored(after))).unwrap();
+    assert_eq!(store.load(PAIR, Finger::Right).unwrap(), Some(stored(before)));
+    // Names that look alike do not share a file.
+    for name in ["a/b", "a_b", "A/b", "../x", "ä"] {
+        store.save(name, Finger::Left, Some(&stored(Mask::filled(name.len(), 1, true)))).unwrap();
+    }
+    for name in ["a/b", "a_b", "A/b", "../x", "ä"] {
+        assert_eq!(store.load(name, Finger::Left).unwrap().unwrap().mask.width(), name.len());
+    }
+    let mut names: Vec<String> = store.masks().into_iter().map(|(name, _)| name).collect();
+    names.sort();
+    assert_eq!(names, ["../x", "A/b", "a/b", "a_b", PAIR, "ä"]);
+    store.save(PAIR, Finger::Right, None).unwrap();
+    store.save(PAIR, Finger::Right, None).unwrap();
+    assert_eq!(store.load(PAIR, Finger::Right).unwrap(), None);
+}
+
+#[test]
+fn a_damaged_file_blocks_its_pair_and_is_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = MaskStore::in_folder(dir.path().to_owned());
+    let mask = stored(Mask::filled(175, 140, true));
+    store.save(PAIR, Finger::Right, Some(&mask)).unwrap();
+    let file = store.mask_file(PAIR, Finger::Right);
+    let good = std::fs::read_to_string(&file).unwrap();
+    for bad in [
+        String::new(),
+        good[..good.len() / 2].to_owned(),
+        good.replace("\"version\":1", "\"version\":2"),
+        good.replace("24500]", "24499]"),
+        good.replace("\"contact_px\":24500", "\"contact_px\":24000"),
+        good.replace("data_0", "data_1"),
+        good.replace("\"width\":175", "\"width\":18446744073709551615"),
+        "[]".into(),
+    ] {
+        assert_ne!(bad, good);
+        std::fs::write(&file, &bad).unwrap();
+        for result in [
+            store.load(PAIR, Finger::Right).map(drop),
+            store.save(PAIR, Finger::Right, Some(&mask)),
+            store.save(PAIR, Finger::Right, None),
+        ] {
+            let err = result.unwrap_err();
+            assert!(matches!(err, StoreError::Damaged { .. }) && err.hint().contains("backup"), "{err}");
+        }
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), bad, "it is left as it is");
+        store.save(PAIR, Finger::Left, Some(&mask)).unwrap();
+    }
+}
+
+#[test]
+fn reviews_and_the_journal() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = MaskStore::in_folder(dir.path().to_owned());
+    let pose = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.1 / 3.0 };
+    let review = StoredReview { review: "done".into(), accepted: [Some(pose), None] };
+    store.save_review("b", &review).unwrap();
+    store.save_review("a", &StoredReview { review: "flagged".into(), ..StoredReview::default() }).unwrap();
+    assert_eq!(store.load_review("b").unwrap(), Some(review));
+    assert_eq!(store.load_review("c").unwrap(), None);
+    std::fs::write(dir.path().join("c.review.json"), b"{").unwrap();
+    let (reviews, problems) = store.reviews();
+    assert_eq!(
+        reviews.iter().map(|(n, r)| (n.as_str(), r.review.as_str())).collect::<Vec<_>>(),
+        [("a", "flagged"), ("b", "done")]
+    );
+    assert!(problems.len() == 1 && problems[0].file.ends_with("c.review.json"));
+    assert!(store.save_review("c", &StoredReview::default()).is_err());
+
+    assert_eq!(store.journal().unwrap(), []);
+    for i in 0..3 {
+        store.append_journal(&entry(i, &stroke(i))).unwrap();
+    }
+    let file = dir.path().join("journal.jsonl");
+    let mut out = std::fs::OpenOptions::new().append(true).open(&file).unwrap();
+    out.write_all(b"{\"unix_s\":3,\"pers").unwrap();
+    assert_eq!(store.journal().unwrap(), [entry(0, &stroke(0)), entry(1, &stroke(1)), entry(2, &stroke(2))]);
+}
+
+#[test]
+fn masks_lie_beside_the_dataset_or_in_the_users_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path().join("set");
+    touch_file(&root.join("train/bubbles/rod/data_0.pt"));
+    touch_file(&root.join("train/gelslims/rod/data_0.pt"));
+    let dataset = Dataset::open(&root.join("train/bubbles")).unwrap();
+    let store = MaskStore::for_dataset(&dataset).unwrap();
+    assert_eq!(store.folder(), root.canonicalize().unwrap().join(FOLDER));
+    assert!(!store.folder().exists(), "opening creates nothing");
+    store.save(PAIR, Finger::Left, Some(&stored(Mask::filled(2, 2, true)))).unwrap();
+    assert_eq!(Dataset::open(&root).unwrap().index.pairs.len(), 1, "the masks are no data");
+    // A root that cannot be written: here, because it is not there.
+    let user = dir.path().join("home/masks/x");
+    let missing = dir.path().join("gone");
+    let store = MaskStore::choose(Some(&missing), Some(user.clone())).unwrap();
+    assert_eq!(store.folder(), user);
+    store.save(PAIR, Finger::Left, Some(&stored(Mask::filled(2, 2, true)))).unwrap();
+    // Back again, beside the data: the earlier work is still there.
+    std::fs::create_dir(&missing).unwrap();
+    let store = MaskStore::choose(Some(&missing), Some(user)).unwrap();
+    assert_eq!(store.folder(), missing.join(FOLDER));
+    assert!(store.load(PAIR, Finger::Left).unwrap().is_some());
+    assert!(matches!(MaskStore::choose(Some(&dir.path().join("no")), None), Err(StoreError::NoFolder { .. })));
+}
+
+/// Runs only inside the process that [`a_kill_in_mid_stroke_loses_at_most_that_stroke`] starts: paints and saves
+/// until it is killed.
+#[test]
+fn child_that_paints() {
+    let Some(folder) = std::env::var_os(STORE_VARIABLE) else { return };
+    let store = MaskStore::in_folder(folder.into());
+    let mut mask = Mask::filled(175, 140, false);
+    for number in 0..1_000_000 {
+        store.append_journal(&entry(number, &stroke(number))).unwrap();
+        paint(&mut mask, number);
+        store.save(PAIR, Finger::Right, Some(&stored(mask.clone()))).unwrap();
+        println!("saved {number}");
+    }
+}
+
+#[test]
+fn a_kill_in_mid_stroke_loses_at_most_that_stroke() {
+    // The moment is seeded by stroke; where within the next stroke it hits is up to the machine.
+    for last in [0u32, 1, 7, 23, 58] {
+        let dir = tempfile::tempdir().unwrap();
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["io::masks::child_that_paints", "--exact", "--nocapture", "--test-threads=1"])
+            .env(STORE_VARIABLE, dir.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let mut saved = None;
+        let mut killed = false;
+        // After the kill, what the child had already said is still read.
+        for line in BufReader::new(child.stdout.take().unwrap()).lines() {
+            let line = line.unwrap();
+            let Some(number) = line.rsplit_once("saved ").and_then(|(_, n)| n.parse::<u32>().ok()) else { continue };
+            saved = Some(number);
+            if number >= last && !killed {
+                child.kill().unwrap();
+                killed = true;
+            }
+        }
+        child.wait().unwrap();
+        assert!(killed, "the child ended by itself");
+        let saved = saved.unwrap();
+        let store = MaskStore::in_folder(dir.path().to_owned());
+        let found = store.load(PAIR, Finger::Right).unwrap().unwrap().mask;
+        let mut expected = Mask::filled(175, 140, false);
+        (0..=saved).for_each(|number| paint(&mut expected, number));
+        if found != expected {
+            paint(&mut expected, saved + 1);
+            assert!(found == expected, "neither {saved} nor {} strokes are in the file", saved + 1);
+        }
+        let journal = store.journal().unwrap();
+        let entries = journal.len() as u32;
+        assert!(entries > saved && entries <= saved + 2, "{entries} lines for {saved} strokes");
+        assert!(journal.iter().enumerate().all(|(i, e)| *e == entry(i as u32, &stroke(i as u32))));
+        // Work goes on after the crash.
+        store.save(PAIR, Finger::Right, Some(&stored(expected.clone()))).unwrap();
+        assert_eq!(store.load(PAIR, Finger::Right).unwrap().unwrap().mask, expected);
+    }
+}
