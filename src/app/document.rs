@@ -41,6 +41,20 @@ impl Review {
         }
     }
 
+    /// The name in files.
+    pub fn stored(self) -> &'static str {
+        match self {
+            Self::InProgress => "in_progress",
+            other => other.name(),
+        }
+    }
+
+    /// The state of a name in files; `None` for an unknown one.
+    pub fn from_stored(name: &str) -> Option<Self> {
+        use strum::IntoEnumIterator as _;
+        Self::iter().find(|review| review.stored() == name)
+    }
+
     /// Whether nothing more is to be done.
     pub fn is_finished(self) -> bool {
         matches!(self, Self::Done | Self::Skip)

@@ -102,6 +102,8 @@ pub struct BundleInfo {
     pub kind: BundleKind,
     /// Its folder.
     pub folder: PathBuf,
+    /// The denoising steps it recommends, if it is a generator.
+    pub steps: Option<u32>,
 }
 
 /// What a bundle does.

@@ -2,6 +2,8 @@
 //!
 //! The studio and the command line use [`DataSource`] and [`Services`] as [`live`] implements them over `io` and `infer`.
 
+pub mod live;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -6,6 +6,7 @@
 //!
 //! A [`Dataset`] never changes after opening and can be shared with worker threads.
 
+mod demo;
 mod lab;
 mod pictures;
 
@@ -166,6 +167,7 @@ pub struct Dataset {
 enum Source {
     Lab(lab::Lab),
     Pictures(pictures::Pictures),
+    Demo,
 }
 
 /// What a scan finds, before it becomes a [`Dataset`].
@@ -204,6 +206,18 @@ impl Dataset {
         })
     }
 
+    /// The built-in demo: simulated grasps of the simulator's tools, rendered one by one when they are asked for.
+    pub fn demo() -> Self {
+        Self {
+            title: "Demo".into(),
+            root: None,
+            kind: SourceKind::Demo,
+            index: Index { pairs: demo::pairs() },
+            problems: Vec::new(),
+            source: Source::Demo,
+        }
+    }
+
     /// Loads a pair. Takes tens of milliseconds: not for the thread that draws.
     ///
     /// Pixels without measurement are NaN in the imprint, also where the file has infinities or the camera said 0.
@@ -225,6 +239,10 @@ impl Dataset {
         match &self.source {
             Source::Lab(lab) => lab.load(id),
             Source::Pictures(pictures) => pictures.load(id),
+            Source::Demo => {
+                let sample = demo::load(id).ok_or(LoadError::NoSuchPair { id })?;
+                Ok(Loaded { sample, notes: Vec::new(), invalid: Default::default() })
+            }
         }
     }
 
@@ -233,6 +251,9 @@ impl Dataset {
     /// # Errors
     /// [`MeshError`] if there is a file that cannot be used.
     pub fn tool_mesh(&self, tool: &str) -> Result<Option<TriMesh>, MeshError> {
+        if let Source::Demo = self.source {
+            return Ok(demo::mesh(tool));
+        }
         match self.tool_mesh_file(tool) {
             Some(path) => stl::read(path).map(|file| Some(file.mesh)),
             None => Ok(None),
@@ -243,7 +264,7 @@ impl Dataset {
     pub fn tool_mesh_file(&self, tool: &str) -> Option<&Path> {
         match &self.source {
             Source::Lab(lab) => lab.mesh_file(tool),
-            Source::Pictures(_) => None,
+            Source::Pictures(_) | Source::Demo => None,
         }
     }
 
@@ -252,6 +273,7 @@ impl Dataset {
         match &self.source {
             Source::Lab(lab) => lab.files(id),
             Source::Pictures(pictures) => pictures.files(id),
+            Source::Demo => Vec::new(),
         }
     }
 
@@ -262,7 +284,7 @@ impl Dataset {
     pub fn bubble_tile(&self, id: PairId) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
             Source::Pictures(pictures) => pictures.tile(id, pictures::BUBBLE),
-            Source::Lab(_) => Ok(None),
+            Source::Lab(_) | Source::Demo => Ok(None),
         }
     }
 
@@ -274,7 +296,7 @@ impl Dataset {
     pub fn vqvae_tile(&self, id: PairId) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
             Source::Pictures(pictures) => pictures.tile(id, pictures::VQVAE),
-            Source::Lab(_) => Ok(None),
+            Source::Lab(_) | Source::Demo => Ok(None),
         }
     }
 

@@ -8,7 +8,7 @@ use super::super::document::{Document, PairLabels, Stored};
 use super::super::effect::Effect;
 use super::super::error::{TaskError, TaskErrorKind};
 use super::super::keys::{DatasetSeq, ImprintKey, ImprintSource, PairKey, PoseKey, Request};
-use super::super::library::{OpenDataset, Place};
+use super::super::library::{BundleKind, OpenDataset, Place};
 use super::super::results::Prediction;
 use super::super::state::State;
 use super::super::tasks::{Level, Ticket};
@@ -28,6 +28,17 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
         Command::Bundles(bundles, problems) => {
             for problem in &problems {
                 state.log.error(problem);
+            }
+            let lacks = |kind| bundles.iter().all(|bundle| bundle.kind != kind);
+            for (kind, text) in [
+                (BundleKind::Generator, "No generator was found: nothing can be predicted"),
+                (BundleKind::Mask, "No mask model was found: the mask source \"UNet\" is not available"),
+            ] {
+                if lacks(kind) {
+                    let hint = "Put its folder into assets/models beside the program, or name a folder with bundles in \
+                                TOUCH2TOUCH_MODELS.";
+                    state.log.push(Level::Warning, text, None, Some(hint.into()));
+                }
             }
             state.library.bundles = bundles;
             state.library.bundle_problems = problems;
