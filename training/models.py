@@ -83,14 +83,13 @@ class ConditionEncoder(nn.Module):
         super().__init__()
         # Four GelSlim pixels of 128 are one bubble pixel of 128, so the trunk works from a quarter of the size.
         self.trunk = nn.Sequential(
-            nn.Conv2d(3, 24, 5, stride=2, padding=2), nn.SiLU(),
-            nn.Conv2d(24, 64, 3, stride=2, padding=1), ResBlock(64, 64),
-            nn.Conv2d(64, 96, 3, stride=2, padding=1), ResBlock(96, 96),
+            nn.Conv2d(3, 48, 8, stride=4, padding=2), ResBlock(48, 48),
+            nn.Conv2d(48, 96, 3, stride=2, padding=1), ResBlock(96, 96),
             nn.Conv2d(96, dim, 3, stride=2, padding=1), ResBlock(dim, dim), norm(dim))
         self.place = nn.Parameter(torch.randn(1, 64, dim) * 0.1)
         self.query = nn.Parameter(torch.randn(1, 256, dim) * 0.1)
         self.mix = nn.ModuleList(Transformer(dim, 5) for _ in range(depth))
-        self.read = nn.ModuleList(Transformer(dim, 5) for _ in range(2))
+        self.read = Transformer(dim, 5)
         self.norm = nn.LayerNorm(dim)
         self.narrow = nn.Linear(dim, CONDITION)
         self.refine = ResBlock(CONDITION, CONDITION)
@@ -105,9 +104,7 @@ class ConditionEncoder(nn.Module):
         for block in self.mix:
             tokens = block(tokens)
         tokens = self.norm(tokens)
-        cells = self.query.expand(n, -1, -1)
-        for block in self.read:
-            cells = block(cells, tokens)
+        cells = self.read(self.query.expand(n, -1, -1), tokens)
         return self.out(self.refine(self.narrow(cells).transpose(1, 2).reshape(n, -1, 16, 16)))
 
 
@@ -156,16 +153,16 @@ class Autoencoder(nn.Module):
     def __init__(self):
         super().__init__()
         self.encoder = nn.Sequential(
-            nn.Conv2d(1, 24, 5, stride=2, padding=2), ResBlock(24, 24),
-            nn.Conv2d(24, 48, 3, stride=2, padding=1), ResBlock(48, 48),
+            nn.Conv2d(1, 48, 8, stride=4, padding=2), ResBlock(48, 48),
             nn.Conv2d(48, 96, 3, stride=2, padding=1), ResBlock(96, 96), ResBlock(96, 96),
             norm(96), nn.SiLU(), nn.Conv2d(96, 2 * LATENT, 1))
         self.decoder = nn.Sequential(
             nn.Conv2d(LATENT, 112, 3, padding=1), ResBlock(112, 112), ResBlock(112, 112),
             nn.Conv2d(112, 64, 1), nn.Upsample(scale_factor=2.0, mode="nearest"), ResBlock(64, 64), ResBlock(64, 64),
             nn.Conv2d(64, 32, 1), nn.Upsample(scale_factor=2.0, mode="nearest"), ResBlock(32, 32),
-            nn.Conv2d(32, 16, 1), nn.Upsample(scale_factor=2.0, mode="nearest"), ResBlock(16, 16),
-            norm(16), nn.SiLU(), nn.Conv2d(16, 1, 3, padding=1))
+            norm(32), nn.SiLU(), nn.Conv2d(32, 16, 3, padding=1),
+            nn.Upsample(scale_factor=2.0, mode="nearest"), nn.Conv2d(16, 16, 3, padding=1), nn.SiLU(),
+            nn.Conv2d(16, 1, 3, padding=1))
 
     def encode(self, image):
         mean, log_var = self.encoder(image).float().chunk(2, dim=1)

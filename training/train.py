@@ -101,7 +101,7 @@ def autoencoder(args):
     shards, rng = data.Shards(args.data), np.random.default_rng(args.seed)
     net = models.Autoencoder()
     run = Run(args, "autoencoder", {"autoencoder": net}, 1.5e-3)
-    for batch in indices(shards, rng, 12):
+    for batch in indices(shards, rng, 8):
         if run.progress() >= 1:
             break
         k = int(rng.integers(8))
@@ -114,7 +114,7 @@ def autoencoder(args):
             drawn = net.decode(mean + torch.exp(0.5 * log_var) * torch.randn_like(mean)).float()
         l1, edge = (drawn - clean).abs().mean(), edges(drawn, clean)
         kl = 0.5 * (mean**2 + log_var.exp() - 1 - log_var).mean()
-        run.descend(10 * l1 + 20 * edge + 5e-3 * kl, len(batch), {"l1": l1, "edge": edge, "kl": kl})
+        run.descend(10 * l1 + 20 * edge + 4e-4 * kl, len(batch), {"l1": l1, "edge": edge, "kl": kl})
     run.save()
 
 
@@ -149,19 +149,19 @@ def generator(args):
     averages = {"encoder_ema": copy.deepcopy(encoder), "denoiser_ema": copy.deepcopy(denoiser)}
     for net in averages.values():
         net.requires_grad_(False)
-    run = Run(args, "generator", {"encoder": encoder, "denoiser": denoiser, **averages}, 8e-4)
+    run = Run(args, "generator", {"encoder": encoder, "denoiser": denoiser, **averages}, 7e-4)
     latents = Latents(ae, shards)
     if "latent_mean" in run.extra:
         latents.mean, latents.std = run.extra["latent_mean"], run.extra["latent_std"]
     run.extra = {"latent_mean": latents.mean, "latent_std": latents.std}
     bars = torch.from_numpy(diffusion.alpha_bar()).float()
-    for batch in indices(shards, rng, 32):
+    for batch in indices(shards, rng, 16):
         if run.progress() >= 1:
             break
         randomised = torch.from_numpy(shards.meta[batch, 6] == 0)
         # A turned or mirrored pair is a sensor with its lights elsewhere: only for the randomised ones. The symmetry
         # changes from batch to batch, so that most passes meet most samples in the plain orientation.
-        k = int(rng.integers(1, 8)) if rng.random() < 0.5 else 0
+        k = int(rng.integers(1, 8)) if rng.random() < 0.35 else 0
         gelslim = shards.gelslim(batch)
         z = latents.take(batch, 0)
         if k and randomised.any():
