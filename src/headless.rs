@@ -1,8 +1,108 @@
 //! The command line: every verb calls the code that the studio's buttons call.
+//!
+//! With `--json`, standard output carries exactly one JSON object; progress, notes and errors go to standard error.
+//! The exit code is 0 only when everything asked for was done.
 
+mod doctor;
+mod generate;
+mod masks;
+mod models;
+mod output;
+mod pose;
+mod simulate;
+
+use std::path::PathBuf;
 use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+pub use output::Output;
+
+/// From a GelSlim touch to the Soft Bubble imprint and the in-hand pose of the same grasp.
+///
+/// Without a verb the studio opens, on PATH or on the built-in demo.
+#[derive(Debug, Parser)]
+#[command(name = "touch2touch", version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Option<Verb>,
+    /// A dataset to open in the studio: a folder in the lab's layout, or of image pairs.
+    path: Option<PathBuf>,
+    /// Start the studio with its default layout and settings.
+    #[arg(long)]
+    reset_ui: bool,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    /// Write a simulated dataset in the lab's format.
+    Simulate(simulate::SimulateArgs),
+    /// Predict Soft Bubble imprints from GelSlim images and compare them with the measured ones.
+    Generate(generate::GenerateArgs),
+    /// Estimate in-hand poses from measured or predicted imprints.
+    Pose(pose::PoseArgs),
+    /// Contact masks.
+    #[command(subcommand)]
+    Masks(masks::MasksVerb),
+    /// Open a dataset and list what is wrong with it.
+    Doctor(doctor::DoctorArgs),
+    /// Model bundles.
+    #[command(subcommand)]
+    Bundle(models::BundleVerb),
+    /// Say which model runtime is used and why, or fetch the faster one.
+    Runtime(models::RuntimeArgs),
+}
+
+/// Options that every verb takes.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct Common {
+    /// Print one JSON object on standard output.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What a verb hands back: whether everything asked for was done.
+type VerbResult = anyhow::Result<bool>;
 
 /// Parses the arguments and runs the verb or the window.
 pub fn main() -> ExitCode {
-    ExitCode::SUCCESS
+    output::start_log();
+    let cli = Cli::parse();
+    let result = match cli.verb {
+        None => studio(cli.path, cli.reset_ui),
+        Some(Verb::Simulate(args)) => simulate::run(&args),
+        Some(Verb::Generate(args)) => generate::run(&args),
+        Some(Verb::Pose(args)) => pose::run(&args),
+        Some(Verb::Masks(verb)) => masks::run(&verb),
+        Some(Verb::Doctor(args)) => doctor::run(&args),
+        Some(Verb::Bundle(verb)) => models::bundle(&verb),
+        Some(Verb::Runtime(args)) => models::runtime(&args),
+    };
+    match result {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(err) => {
+            output::note(&format!("error: {err:#}"));
+            ExitCode::from(2)
+        }
+    }
+}
+
+#[cfg(feature = "gui")]
+fn studio(path: Option<PathBuf>, reset_ui: bool) -> VerbResult {
+    crate::ui::run(path, reset_ui).map_err(anyhow::Error::msg)?;
+    Ok(true)
+}
+
+#[cfg(not(feature = "gui"))]
+fn studio(_path: Option<PathBuf>, _reset_ui: bool) -> VerbResult {
+    anyhow::bail!("this build has no window (cargo feature `gui`); see `touch2touch --help` for the verbs")
+}
+
+/// The dataset named on the command line; `demo` is the built-in one.
+fn open(path: &std::path::Path) -> anyhow::Result<crate::io::dataset::Dataset> {
+    if path == std::path::Path::new("demo") {
+        return Ok(crate::io::dataset::Dataset::demo());
+    }
+    Ok(crate::io::dataset::Dataset::open(path)?)
 }
