@@ -9,6 +9,7 @@ mod masks;
 mod models;
 mod output;
 mod pose;
+mod predict;
 mod simulate;
 
 use std::path::PathBuf;
@@ -105,4 +106,12 @@ fn open(path: &std::path::Path) -> anyhow::Result<crate::io::dataset::Dataset> {
         return Ok(crate::io::dataset::Dataset::demo());
     }
     Ok(crate::io::dataset::Dataset::open(path)?)
+}
+
+/// At most `limit` of `len` positions, spread evenly.
+fn spread(len: usize, limit: Option<usize>) -> Vec<usize> {
+    match limit {
+        Some(n) if n < len => (0..n).map(|i| i * len / n).collect(),
+        _ => (0..len).collect(),
+    }
 }

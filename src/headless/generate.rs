@@ -1,0 +1,240 @@
+//! `touch2touch generate`: predicted imprints of a whole dataset, beside the measured ones.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::predict::{ModelArgs, Predictor};
+use super::{Common, Output, VerbResult};
+use crate::domain::dataset::PairId;
+use crate::domain::grid::{DepthMap, Grid};
+use crate::domain::metrics::{self, LAB_PSNR_PEAK_M, SsimRange};
+use crate::domain::resample;
+use crate::domain::sample::Scale;
+use crate::domain::sensor::Finger;
+use crate::io::{dataset::Dataset, images};
+
+/// Arguments of `generate`.
+#[derive(Debug, Args)]
+pub(super) struct GenerateArgs {
+    /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.
+    #[arg(long)]
+    input: PathBuf,
+    /// The folder for the predictions; created if missing.
+    #[arg(long)]
+    out: PathBuf,
+    /// Which finger's GelSlim image.
+    #[arg(long, value_enum, default_value_t = FingerArg::Right)]
+    finger: FingerArg,
+    /// Take only this many pairs, spread evenly over the dataset.
+    #[arg(long)]
+    limit: Option<usize>,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum FingerArg {
+    Right,
+    Left,
+    Both,
+}
+
+/// Figures of one prediction. PSNR and SSIM are those of `convention`.
+#[derive(Debug, Default, Clone, Serialize)]
+struct Pair {
+    name: String,
+    finger: &'static str,
+    psnr_db: Option<f64>,
+    ssim: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vqvae_psnr_db: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vqvae_ssim: Option<f64>,
+    seconds: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Mean {
+    psnr_db: Option<f64>,
+    ssim: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vqvae_psnr_db: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vqvae_ssim: Option<f64>,
+    seconds: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    pairs: Vec<Pair>,
+    mean: Mean,
+    convention: &'static str,
+    bundle: String,
+    runtime: &'static str,
+    steps: u32,
+    seed: u64,
+}
+
+/// What PSNR and SSIM mean here.
+fn convention(scale: Scale) -> &'static str {
+    match scale {
+        Scale::Measured => "depth in metres, PSNR peak and SSIM range 0.0225 m (the lab's peak)",
+        Scale::Assumed => "both images scaled to 0..1 one by one, peak and range 1 (the source lost its scale)",
+    }
+}
+
+pub(super) fn run(args: &GenerateArgs) -> VerbResult {
+    let dataset = super::open(&args.input)?;
+    std::fs::create_dir_all(&args.out)
+        .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", args.out.display()))?;
+    let ids = super::spread(dataset.index.pairs.len(), args.limit);
+    let fingers: &[Finger] = match args.finger {
+        FingerArg::Right => &[Finger::Right],
+        FingerArg::Left => &[Finger::Left],
+        FingerArg::Both => &Finger::BOTH,
+    };
+    let output = Output::new(args.common, "generating", ids.len());
+    let mut predictor = Predictor::new(&args.model);
+    let config = predictor.config()?;
+    let mut pairs = Vec::new();
+    let mut complete = !ids.is_empty();
+    let mut scale = Scale::Measured;
+    for id in ids {
+        let id = PairId(id as u32);
+        let name = dataset.index.pairs[id.0 as usize].name.clone();
+        output.step(&name);
+        let done = dataset.load(id).map_err(anyhow::Error::from).and_then(|sample| {
+            scale = sample.scale;
+            // An image folder has one finger, whichever it was.
+            let present: Vec<Finger> = fingers.iter().copied().filter(|f| sample.finger(*f).is_some()).collect();
+            let fingers = if present.is_empty() { Finger::BOTH.to_vec() } else { present };
+            let mut made = Vec::new();
+            for finger in fingers {
+                let Some(touch) = sample.finger(finger) else { continue };
+                let Some(gelslim) = &touch.gelslim else { anyhow::bail!("no GelSlim image") };
+                let shift = predictor.shift();
+                let generator = predictor.generator()?;
+                let start = Instant::now();
+                let raw = generator.generate(&gelslim.difference, &config, &mut |_| ControlFlow::Continue(()))?;
+                let imprint = generator.depth(&raw, shift)?;
+                let seconds = start.elapsed().as_secs_f64();
+                write(&args.out, &name, finger, &imprint)?;
+                let mut pair = Pair { name: name.clone(), finger: finger.name(), seconds, ..Pair::default() };
+                score(&dataset, id, sample.scale, &imprint, touch.bubble.as_ref().map(|b| &b.imprint), &mut pair)?;
+                made.push(pair);
+            }
+            Ok(made)
+        });
+        match done {
+            Ok(made) => pairs.extend(made),
+            Err(err) => {
+                output.note(&format!("{name}: {err:#}"));
+                complete = false;
+            }
+        }
+    }
+    let report = Report {
+        mean: mean(&pairs),
+        convention: convention(scale),
+        bundle: predictor.generator()?.bundle_name().to_owned(),
+        runtime: predictor.generator()?.engine().label(),
+        steps: config.steps,
+        seed: config.seed,
+        pairs,
+    };
+    let file = args.out.join("generate.json");
+    std::fs::write(&file, serde_json::to_vec_pretty(&report)?)
+        .map_err(|err| anyhow::anyhow!("cannot write the report: {err}: {}", file.display()))?;
+    output.finish(&report, || text(&report))?;
+    Ok(complete)
+}
+
+/// Fills in the figures of a prediction against the measured imprint, and of the lab's own prediction where it lies by.
+fn score(
+    dataset: &Dataset,
+    id: PairId,
+    scale: Scale,
+    imprint: &DepthMap,
+    measured: Option<&DepthMap>,
+    pair: &mut Pair,
+) -> anyhow::Result<()> {
+    match scale {
+        Scale::Measured => {
+            if let Some(measured) = measured {
+                pair.psnr_db = metrics::psnr(imprint, measured, LAB_PSNR_PEAK_M)?.db();
+                pair.ssim = Some(metrics::ssim(imprint, measured, SsimRange::Explicit(LAB_PSNR_PEAK_M))?.mean);
+            }
+        }
+        Scale::Assumed => {
+            // Compared on the tile's own pixels and in its orientation, so that the lab's prediction is not resampled.
+            if let Some(tile) = dataset.bubble_tile(id)? {
+                let ours = resample::bilinear(&imprint.rotated_180(), tile.width(), tile.height());
+                (pair.psnr_db, pair.ssim) = unit_scores(&ours, &tile)?;
+                if let Some(vqvae) = dataset.vqvae_tile(id)? {
+                    (pair.vqvae_psnr_db, pair.vqvae_ssim) = unit_scores(&vqvae, &tile)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// PSNR and SSIM of two images, both scaled to 0..1.
+fn unit_scores(a: &Grid<f32>, b: &Grid<f32>) -> anyhow::Result<(Option<f64>, Option<f64>)> {
+    let (a, b) = (metrics::unit_range(a), metrics::unit_range(b));
+    Ok((metrics::psnr(&a, &b, 1.0)?.db(), Some(metrics::ssim(&a, &b, SsimRange::Explicit(1.0))?.mean)))
+}
+
+/// Writes `NAME_FINGER.npy` (metres, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
+/// -20 mm) for people.
+fn write(out: &Path, name: &str, finger: Finger, imprint: &DepthMap) -> anyhow::Result<()> {
+    let stem = format!("{}_{}", name.replace(['/', '\\'], "__"), finger.name());
+    crate::io::npz::write_npy(&out.join(format!("{stem}.npy")), imprint)?;
+    let picture = imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
+    images::write_grey16(&out.join(format!("{stem}.png")), &picture)?;
+    Ok(())
+}
+
+fn mean(pairs: &[Pair]) -> Mean {
+    let of = |get: fn(&Pair) -> Option<f64>| {
+        let values: Vec<f64> = pairs.iter().filter_map(get).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    Mean {
+        psnr_db: of(|p| p.psnr_db),
+        ssim: of(|p| p.ssim),
+        vqvae_psnr_db: of(|p| p.vqvae_psnr_db),
+        vqvae_ssim: of(|p| p.vqvae_ssim),
+        seconds: of(|p| Some(p.seconds)),
+    }
+}
+
+fn text(report: &Report) -> String {
+    let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
+    let mut text = format!(
+        "{:<44} {:>8} {:>6} {:>12} {:>10} {:>8}\n",
+        "pair", "PSNR dB", "SSIM", "VQ-VAE dB", "VQ-VAE SSIM", "seconds"
+    );
+    let mut line = |name: &str, p: &Mean| {
+        text += &format!(
+            "{name:<44} {:>8} {:>6} {:>12} {:>10} {:>8}\n",
+            number(p.psnr_db, 1),
+            number(p.ssim, 3),
+            number(p.vqvae_psnr_db, 1),
+            number(p.vqvae_ssim, 3),
+            number(p.seconds, 2)
+        );
+    };
+    for p in &report.pairs {
+        let name = format!("{} {}", p.name, p.finger);
+        line(&name, &mean(std::slice::from_ref(p)));
+    }
+    line("mean", &report.mean);
+    text + &format!("\n{}; {} steps, seed {}, {} on {}\n", report.convention, report.steps, report.seed, report.bundle, report.runtime)
+}

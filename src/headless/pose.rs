@@ -1,0 +1,359 @@
+//! `touch2touch pose`: in-hand poses of a whole dataset, with the error against the truth where it is known.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::predict::{ModelArgs, Predictor};
+use super::{Common, Output, VerbResult};
+use crate::domain::contact;
+use crate::domain::dataset::PairId;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::metrics::AngleSummary;
+use crate::domain::pose::{self, Engine, FingerInput, ToolModel};
+use crate::domain::sample::Sample;
+use crate::domain::sensor::Finger;
+use crate::domain::units::angle_error;
+
+/// Arguments of `pose`.
+#[derive(Debug, Args)]
+pub(super) struct PoseArgs {
+    /// The dataset: a folder in the lab's layout, or `demo`.
+    #[arg(required_unless_present = "input")]
+    path: Option<PathBuf>,
+    /// The same as PATH.
+    #[arg(long, conflicts_with = "path")]
+    input: Option<PathBuf>,
+    /// Which imprints to align.
+    #[arg(long, value_enum, default_value_t = Imprints::Measured)]
+    imprint: Imprints,
+    /// Where the contact masks come from. `auto`: the CAD model at the true pose for measured imprints whose truth is
+    /// known (the lab's labels, an upper bound), else the mask UNet.
+    #[arg(long, value_enum, default_value_t = MaskFrom::Auto)]
+    mask: MaskFrom,
+    /// Imprint depth from which a pixel counts as contact, for `--mask threshold`.
+    #[arg(long, default_value_t = 7.0)]
+    threshold_mm: f32,
+    /// The registration.
+    #[arg(long, value_enum, default_value_t = Registration::Default)]
+    engine: Registration,
+    /// Take only this many pairs, spread evenly over the dataset.
+    #[arg(long)]
+    limit: Option<usize>,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Imprints {
+    Measured,
+    Predicted,
+    Both,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum MaskFrom {
+    Auto,
+    Cad,
+    Unet,
+    Threshold,
+    Truth,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Registration {
+    /// The distance field with a robust cost.
+    Default,
+    /// The lab's planar ICP.
+    Lab,
+    /// Both, one after the other.
+    All,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Case {
+    name: String,
+    engine: &'static str,
+    imprint: &'static str,
+    mask: &'static str,
+    angle_deg: Option<f64>,
+    truth_deg: Option<f64>,
+    error_deg: Option<f64>,
+    y_m: Option<f64>,
+    z_m: Option<f64>,
+    ms: f64,
+    stop: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Figures {
+    #[serde(flatten)]
+    angles: AngleSummary,
+    median_ms: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct Summary {
+    /// The figures of the first engine on the first kind of imprint.
+    #[serde(flatten)]
+    first: Figures,
+    /// `engine` (first kind of imprint) and `engine/imprint` (all): the figures of each.
+    engines: BTreeMap<String, Figures>,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    cases: Vec<Case>,
+    summary: Summary,
+}
+
+pub(super) fn run(args: &PoseArgs) -> VerbResult {
+    let path = args.path.as_ref().or(args.input.as_ref()).expect("clap asks for one of the two");
+    let dataset = super::open(path)?;
+    let ids = super::spread(dataset.index.pairs.len(), args.limit);
+    let engines: &[Engine] = match args.engine {
+        Registration::Default => &[Engine::DistanceField],
+        Registration::Lab => &[Engine::LabIcp],
+        Registration::All => &[Engine::DistanceField, Engine::LabIcp],
+    };
+    let imprints: &[&'static str] = match args.imprint {
+        Imprints::Measured => &["measured"],
+        Imprints::Predicted => &["predicted"],
+        Imprints::Both => &["measured", "predicted"],
+    };
+    let output = Output::new(args.common, "aligning", ids.len());
+    let mut predictor = Predictor::new(&args.model);
+    let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
+    let mut cases = Vec::new();
+    let mut complete = true;
+    for id in ids {
+        let entry = &dataset.index.pairs[id];
+        output.step(&entry.name);
+        let sample = match dataset.load(PairId(id as u32)) {
+            Ok(sample) => sample,
+            Err(err) => {
+                output.note(&format!("{}: {err}", entry.name));
+                complete = false;
+                continue;
+            }
+        };
+        let Some(tool_name) = entry.tool.clone() else {
+            output.note(&format!("{}: no tool is named, so there is no CAD model to align", entry.name));
+            complete = false;
+            continue;
+        };
+        let tool = tools.entry(tool_name.clone()).or_insert_with(|| match tool_model(&dataset, &tool_name) {
+            Ok(tool) => Some(tool),
+            Err(err) => {
+                output.note(&format!("{tool_name}: {err:#}"));
+                None
+            }
+        });
+        let Some(tool) = tool else {
+            complete = false;
+            continue;
+        };
+        for &imprint in imprints {
+            match pose_cases(args, &entry.name, &sample, tool, imprint, engines, &mut predictor) {
+                Ok(found) => {
+                    complete &= found.iter().all(|c| c.angle_deg.is_some());
+                    cases.extend(found);
+                }
+                Err(err) => {
+                    output.note(&format!("{} ({imprint} imprint): {err:#}", entry.name));
+                    complete = false;
+                }
+            }
+        }
+    }
+    complete &= !cases.is_empty();
+    let report = Report { summary: summary(&cases, imprints[0], engines[0]), cases };
+    output.finish(&report, || text(&report))?;
+    Ok(complete)
+}
+
+fn tool_model(dataset: &crate::io::dataset::Dataset, name: &str) -> anyhow::Result<ToolModel> {
+    let mesh = dataset
+        .tool_mesh(name)?
+        .ok_or_else(|| anyhow::anyhow!("no CAD model (expected tools_stls/{name}.stl), so its grasps have no pose"))?;
+    Ok(ToolModel::new(mesh)?)
+}
+
+/// One case per engine for one pair and one kind of imprint.
+fn pose_cases(
+    args: &PoseArgs,
+    name: &str,
+    sample: &Sample,
+    tool: &ToolModel,
+    imprint: &'static str,
+    engines: &[Engine],
+    predictor: &mut Predictor,
+) -> anyhow::Result<Vec<Case>> {
+    let predicted = imprint == "predicted";
+    let imprints: [Option<DepthMap>; 2] = if predicted {
+        predictor.imprints(sample)?
+    } else {
+        Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
+    };
+    let (mask_name, masks) = masks(args, sample, tool, &imprints, predicted, predictor)?;
+    let fingers = Finger::BOTH.map(|f| {
+        let camera = sample.finger(f)?.bubble.as_ref()?.camera.as_ref()?;
+        Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
+    });
+    let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
+    Ok(engines
+        .iter()
+        .map(|&engine| {
+            let start = Instant::now();
+            let result = pose::estimate(&fingers, tool, engine, false);
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            let found = result.as_ref().ok().map(|r| r.object_from_grasp);
+            Case {
+                name: name.to_owned(),
+                engine: engine_key(engine),
+                imprint,
+                mask: mask_name,
+                angle_deg: found.map(|p| p.theta_rad.to_degrees()),
+                truth_deg: truth.map(f64::to_degrees),
+                error_deg: found.zip(truth).map(|(p, t)| angle_error(p.theta_rad, t).to_degrees()),
+                y_m: found.map(|p| p.y_m),
+                z_m: found.map(|p| p.z_m),
+                ms,
+                stop: match &result {
+                    Ok(r) => r.report.stop.to_string(),
+                    Err(err) => err.to_string(),
+                },
+            }
+        })
+        .collect())
+}
+
+/// The key of an engine in the JSON.
+fn engine_key(engine: Engine) -> &'static str {
+    match engine {
+        Engine::DistanceField => "distance_field",
+        Engine::LabIcp => "lab_icp",
+    }
+}
+
+/// The contact masks and the name of their source.
+fn masks(
+    args: &PoseArgs,
+    sample: &Sample,
+    tool: &ToolModel,
+    imprints: &[Option<DepthMap>; 2],
+    predicted: bool,
+    predictor: &mut Predictor,
+) -> anyhow::Result<(&'static str, [Option<Mask>; 2])> {
+    let source = match args.mask {
+        MaskFrom::Auto if !predicted && sample.grasp_from_object.is_some() => MaskFrom::Cad,
+        // The truth must not leak into the pose of a prediction unless it was asked for.
+        MaskFrom::Auto => MaskFrom::Unet,
+        other => other,
+    };
+    let mut masks = [None, None];
+    for finger in Finger::BOTH {
+        let (Some(imprint), Some(bubble)) =
+            (&imprints[finger.index()], sample.finger(finger).and_then(|t| t.bubble.as_ref()))
+        else {
+            continue;
+        };
+        masks[finger.index()] = Some(match source {
+            MaskFrom::Threshold => contact::threshold(imprint, args.threshold_mm / 1e3),
+            MaskFrom::Unet => predictor.mask(imprint)?,
+            MaskFrom::Truth => bubble
+                .truth
+                .as_ref()
+                .map(|t| t.contact.clone())
+                .ok_or_else(|| anyhow::anyhow!("only simulated pairs know their true contact mask"))?,
+            MaskFrom::Cad | MaskFrom::Auto => {
+                let truth = sample
+                    .grasp_from_object
+                    .ok_or_else(|| anyhow::anyhow!("no true pose is known; use --mask unet or --mask threshold"))?;
+                let camera = bubble
+                    .camera
+                    .as_ref()
+                    .ok_or_else(|| anyhow::anyhow!("no camera data; the imprint cannot be lifted to points"))?;
+                let max_m = contact::CAD_CONTACT_M;
+                contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), max_m)
+            }
+        });
+    }
+    let name = match source {
+        MaskFrom::Threshold => "threshold",
+        MaskFrom::Unet => "unet",
+        MaskFrom::Truth => "truth",
+        MaskFrom::Cad | MaskFrom::Auto => "cad",
+    };
+    Ok((name, masks))
+}
+
+fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> Figures {
+    let cases: Vec<&Case> = cases.collect();
+    // A case without truth has no error; one without a pose is a failure.
+    let errors: Vec<f64> = cases
+        .iter()
+        .filter(|c| c.truth_deg.is_some())
+        .map(|c| c.error_deg.map_or(f64::NAN, f64::to_radians))
+        .collect();
+    let mut ms: Vec<f64> = cases.iter().map(|c| c.ms).collect();
+    ms.sort_by(f64::total_cmp);
+    let median_ms = (!ms.is_empty()).then(|| 0.5 * (ms[(ms.len() - 1) / 2] + ms[ms.len() / 2]));
+    Figures { angles: AngleSummary::from_errors(&errors), median_ms }
+}
+
+fn summary(cases: &[Case], first_imprint: &str, first_engine: Engine) -> Summary {
+    let of = |engine: &str, imprint: &str| figures(cases.iter().filter(|c| c.engine == engine && c.imprint == imprint));
+    let mut engines = BTreeMap::new();
+    for case in cases {
+        let key = format!("{}/{}", case.engine, case.imprint);
+        if !engines.contains_key(&key) {
+            let figures = of(case.engine, case.imprint);
+            if case.imprint == first_imprint {
+                engines.insert(case.engine.to_owned(), figures.clone());
+            }
+            engines.insert(key, figures);
+        }
+    }
+    Summary { first: of(engine_key(first_engine), first_imprint), engines }
+}
+
+fn text(report: &Report) -> String {
+    let number = |v: Option<f64>| v.map_or("      -".to_owned(), |v| format!("{v:7.2}"));
+    let mut text = format!("{:<44} {:>9} {:>9} {:>9}  mask, stop\n", "pair", "angle °", "truth °", "error °");
+    for c in &report.cases {
+        text += &format!(
+            "{:<44} {:>9} {:>9} {:>9}  {}/{}/{}: {}\n",
+            c.name,
+            number(c.angle_deg),
+            number(c.truth_deg),
+            number(c.error_deg),
+            c.engine,
+            c.imprint,
+            c.mask,
+            c.stop
+        );
+    }
+    text += &format!(
+        "\n{:<28} {:>5} {:>9} {:>9} {:>7} {:>7} {:>10}\n",
+        "engine/imprint", "n", "mean °", "median °", "<=5° %", "<=10° %", "median ms"
+    );
+    for (key, f) in report.summary.engines.iter().filter(|(k, _)| k.contains('/')) {
+        let a = f.angles;
+        text += &format!(
+            "{key:<28} {:>5} {:>9} {:>9} {:>7.1} {:>7.1} {:>10}\n",
+            a.count,
+            number(a.mean_deg),
+            number(a.median_deg),
+            a.success_5,
+            a.success_10,
+            f.median_ms.map_or("-".to_owned(), |v| format!("{v:.3}"))
+        );
+    }
+    text
+}
