@@ -11,7 +11,8 @@ use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Grid};
-use crate::domain::metrics::{self, LAB_PSNR_PEAK_M, SsimRange};
+use crate::domain::contact::LAB_IMPRINT_MAX_M;
+use crate::domain::metrics::{self, SsimRange};
 use crate::domain::resample;
 use crate::domain::sample::Scale;
 use crate::domain::sensor::Finger;
@@ -142,7 +143,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let report = Report {
         mean: mean(&pairs),
         convention: convention(scale),
-        bundle: predictor.generator()?.bundle_name().to_owned(),
+        bundle: predictor.bundle_name().to_owned(),
         runtime: predictor.generator()?.engine().label(),
         steps: config.steps,
         seed: config.seed,
@@ -167,8 +168,8 @@ fn score(
     match scale {
         Scale::Measured => {
             if let Some(measured) = measured {
-                pair.psnr_db = metrics::psnr(imprint, measured, LAB_PSNR_PEAK_M)?.db();
-                pair.ssim = Some(metrics::ssim(imprint, measured, SsimRange::Explicit(LAB_PSNR_PEAK_M))?.mean);
+                pair.psnr_db = metrics::psnr(imprint, measured, f64::from(LAB_IMPRINT_MAX_M))?.db();
+                pair.ssim = Some(metrics::ssim(imprint, measured, SsimRange::Explicit(f64::from(LAB_IMPRINT_MAX_M)))?.mean);
             }
         }
         Scale::Assumed => {

@@ -47,7 +47,7 @@ pub(super) fn bundle(verb: &BundleVerb) -> VerbResult {
             bundle: args.path.clone(),
             name: None,
             hash: None,
-            problems: err.problems.iter().map(ToString::to_string).collect(),
+            problems: err.problems.iter().map(|p| format!("{}: {} ({})", p.file.display(), p.what, p.hint)).collect(),
         },
     };
     let sound = report.problems.is_empty();

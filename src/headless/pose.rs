@@ -279,8 +279,8 @@ fn masks(
                     .camera
                     .as_ref()
                     .ok_or_else(|| anyhow::anyhow!("no camera data; the imprint cannot be lifted to points"))?;
-                let max_m = contact::CAD_CONTACT_M;
-                contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), max_m)
+                let max_m = contact::LAB_CAD_DISTANCE_M;
+                contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), max_m)?
             }
         });
     }

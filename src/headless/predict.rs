@@ -10,7 +10,7 @@ use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
-use crate::infer::bundle::{Bundle, BundleKind, find_shipped};
+use crate::infer::bundle::{Bundle, default_roots, find};
 use crate::infer::engine::EngineChoice;
 use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
@@ -64,6 +64,7 @@ enum RuntimeArg {
 /// The models of one run of the program.
 pub(super) struct Predictor {
     args: ModelArgs,
+    bundle_name: String,
     generator: Option<Generator>,
     mask_model: Option<MaskModel>,
 }
@@ -71,7 +72,7 @@ pub(super) struct Predictor {
 impl Predictor {
     /// Nothing is loaded yet.
     pub(super) fn new(args: &ModelArgs) -> Self {
-        Self { args: args.clone(), generator: None, mask_model: None }
+        Self { args: args.clone(), bundle_name: String::new(), generator: None, mask_model: None }
     }
 
     fn choice(&self) -> EngineChoice {
@@ -82,23 +83,32 @@ impl Predictor {
         }
     }
 
-    fn bundle(&self, kind: BundleKind) -> anyhow::Result<Bundle> {
-        let named = match kind {
-            BundleKind::Generator => self.args.bundle.as_ref(),
-            BundleKind::MaskUnet => self.args.mask_bundle.as_ref(),
-        };
-        match named {
-            Some(dir) => Ok(Bundle::open(dir)?),
-            None => Ok(find_shipped(kind)?),
+    /// The bundle in the named folder, else the first one found that fits.
+    fn bundle(named: Option<&PathBuf>, kind: &str, fits: fn(&Bundle) -> bool) -> anyhow::Result<Bundle> {
+        if let Some(dir) = named {
+            return Ok(Bundle::open(dir)?);
         }
+        let found = find(&default_roots());
+        found.bundles.into_iter().find(fits).ok_or_else(|| {
+            let refused: Vec<String> =
+                found.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
+            anyhow::anyhow!("no {kind} bundle was found; name one with an option{}", refused.concat())
+        })
     }
 
     /// The generator, loaded at the first call.
     pub(super) fn generator(&mut self) -> anyhow::Result<&mut Generator> {
         if self.generator.is_none() {
-            self.generator = Some(Generator::open(&self.bundle(BundleKind::Generator)?, self.choice())?);
+            let bundle = Self::bundle(self.args.bundle.as_ref(), "generator", |b| b.generator().is_some())?;
+            self.bundle_name = bundle.name().to_owned();
+            self.generator = Some(Generator::open(&bundle, self.choice())?);
         }
         Ok(self.generator.as_mut().expect("it was just loaded"))
+    }
+
+    /// The name of the generator's bundle; empty before it is loaded.
+    pub(super) fn bundle_name(&self) -> &str {
+        &self.bundle_name
     }
 
     /// The bundle's defaults with what the command line says instead.
@@ -140,7 +150,9 @@ impl Predictor {
     /// The mask model's contact mask of an imprint.
     pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<Mask> {
         if self.mask_model.is_none() {
-            self.mask_model = Some(MaskModel::open(&self.bundle(BundleKind::MaskUnet)?, self.choice())?);
+            let named = self.args.mask_bundle.as_ref();
+            let bundle = Self::bundle(named, "mask model", |b| b.mask_unet().is_some())?;
+            self.mask_model = Some(MaskModel::open(&bundle, self.choice())?);
         }
         Ok(self.mask_model.as_mut().expect("it was just loaded").predict(imprint)?)
     }

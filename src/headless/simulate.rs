@@ -43,7 +43,7 @@ enum Part {
 struct Written {
     out: PathBuf,
     pairs: usize,
-    tools: Vec<&'static str>,
+    tools: Vec<String>,
     seed: u64,
     seconds: f64,
 }
@@ -64,13 +64,13 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
             let seed = args.seed.wrapping_mul(1_000_003) ^ ((t as u64) << 32) ^ u64::from(g);
             let sample = sim::simulate(tool, sim::random_grasp(seed), seed, &config);
             simulated::write_pair(&args.out, layout, tool, u64::from(g), &sample)?;
-            output.step(tool.name);
+            output.step(&tool.name);
         }
     }
     let written = Written {
         out: args.out.clone(),
         pairs: tools.len() * args.grasps as usize,
-        tools: tools.iter().map(|t| t.name).collect(),
+        tools: tools.iter().map(|t| t.name.clone()).collect(),
         seed: args.seed,
         seconds: start.elapsed().as_secs_f64(),
     };
@@ -91,7 +91,7 @@ fn chosen_tools(list: &str) -> anyhow::Result<Vec<&'static sim::ToolSpec>> {
             .split(',')
             .map(|name| {
                 all.iter().find(|t| t.name == name.trim()).ok_or_else(|| {
-                    let known: Vec<&str> = all.iter().map(|t| t.name).collect();
+                    let known: Vec<&str> = all.iter().map(|t| t.name.as_str()).collect();
                     anyhow::anyhow!("no tool is named {name:?}; there are: {}", known.join(", "))
                 })
             })
