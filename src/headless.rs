@@ -3,6 +3,7 @@
 //! With `--json`, standard output carries exactly one JSON object; progress, notes and errors go to standard error.
 //! The exit code is 0 only when everything asked for was done.
 
+mod contact_mask;
 mod doctor;
 mod generate;
 mod masks;

@@ -7,9 +7,9 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::domain::contact;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::AngleSummary;
@@ -30,13 +30,8 @@ pub(super) struct PoseArgs {
     /// Which imprints to align.
     #[arg(long, value_enum, default_value_t = Imprints::Measured)]
     imprint: Imprints,
-    /// Where the contact masks come from. `auto`: the CAD model at the true pose for measured imprints whose truth is
-    /// known (the lab's labels, an upper bound), else the mask UNet.
-    #[arg(long, value_enum, default_value_t = MaskFrom::Auto)]
-    mask: MaskFrom,
-    /// Imprint depth from which a pixel counts as contact, for `--mask threshold`.
-    #[arg(long, default_value_t = 7.0)]
-    threshold_mm: f32,
+    #[command(flatten)]
+    mask: MaskArgs,
     /// The registration.
     #[arg(long, value_enum, default_value_t = Registration::Default)]
     engine: Registration,
@@ -54,15 +49,6 @@ enum Imprints {
     Measured,
     Predicted,
     Both,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum MaskFrom {
-    Auto,
-    Cad,
-    Unet,
-    Threshold,
-    Truth,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -177,7 +163,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     Ok(complete)
 }
 
-fn tool_model(dataset: &crate::io::dataset::Dataset, name: &str) -> anyhow::Result<ToolModel> {
+pub(super) fn tool_model(dataset: &crate::io::dataset::Dataset, name: &str) -> anyhow::Result<ToolModel> {
     let mesh = dataset
         .tool_mesh(name)?
         .ok_or_else(|| anyhow::anyhow!("no CAD model (expected tools_stls/{name}.stl), so its grasps have no pose"))?;
@@ -250,7 +236,7 @@ fn masks(
     predicted: bool,
     predictor: &mut Predictor,
 ) -> anyhow::Result<(&'static str, [Option<Mask>; 2])> {
-    let source = match args.mask {
+    let source = match args.mask.mask {
         MaskFrom::Auto if !predicted && sample.grasp_from_object.is_some() => MaskFrom::Cad,
         // The truth must not leak into the pose of a prediction unless it was asked for.
         MaskFrom::Auto => MaskFrom::Unet,
@@ -263,34 +249,11 @@ fn masks(
         else {
             continue;
         };
-        masks[finger.index()] = Some(match source {
-            MaskFrom::Threshold => contact::threshold(imprint, args.threshold_mm / 1e3),
-            MaskFrom::Unet => predictor.mask(imprint)?,
-            MaskFrom::Truth => bubble
-                .truth
-                .as_ref()
-                .map(|t| t.contact.clone())
-                .ok_or_else(|| anyhow::anyhow!("only simulated pairs know their true contact mask"))?,
-            MaskFrom::Cad | MaskFrom::Auto => {
-                let truth = sample
-                    .grasp_from_object
-                    .ok_or_else(|| anyhow::anyhow!("no true pose is known; use --mask unet or --mask threshold"))?;
-                let camera = bubble
-                    .camera
-                    .as_ref()
-                    .ok_or_else(|| anyhow::anyhow!("no camera data; the imprint cannot be lifted to points"))?;
-                let max_m = contact::LAB_CAD_DISTANCE_M;
-                contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), max_m)?
-            }
-        });
+        let truth = sample.grasp_from_object;
+        masks[finger.index()] =
+            Some(contact_mask(source, &args.mask, imprint, bubble, Some(tool), truth, predictor)?);
     }
-    let name = match source {
-        MaskFrom::Threshold => "threshold",
-        MaskFrom::Unet => "unet",
-        MaskFrom::Truth => "truth",
-        MaskFrom::Cad | MaskFrom::Auto => "cad",
-    };
-    Ok((name, masks))
+    Ok((source.key(), masks))
 }
 
 fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> Figures {

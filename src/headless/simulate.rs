@@ -56,14 +56,15 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
         Part::Train => Layout::Train,
         Part::Test => Layout::Test,
     };
-    simulated::write_tools(&args.out, &tools)?;
+    let models: Vec<_> = tools.iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
+    simulated::write_tools(&args.out, &models)?;
     let config = SimConfig::default();
     for (t, tool) in tools.iter().enumerate() {
         for g in 0..args.grasps {
             // One seed per pair, so that a pair does not depend on how many others were asked for.
             let seed = args.seed.wrapping_mul(1_000_003) ^ ((t as u64) << 32) ^ u64::from(g);
             let sample = sim::simulate(tool, sim::random_grasp(seed), seed, &config);
-            simulated::write_pair(&args.out, layout, tool, u64::from(g), &sample)?;
+            simulated::write_pair(&args.out, layout, &tool.name, u64::from(g), &sample)?;
             output.step(&tool.name);
         }
     }

@@ -4,15 +4,17 @@ use std::collections::BTreeMap;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-use npyz::{NpyFile, Order, TypeChar};
+use npyz::{NpyFile, Order, TypeChar, WriterBuilder as _};
 
+use super::atomic;
 use super::pt::{Tensor, Values};
+use crate::domain::grid::Grid;
 
 /// Why an `.npz` file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum NpzError {
     /// The file cannot be opened.
-    #[error("cannot read the file ({}): {source}", file.display())]
+    #[error("cannot read or write the file ({}): {source}", file.display())]
     Io {
         /// The file.
         file: PathBuf,
@@ -37,6 +39,20 @@ pub enum NpzError {
         /// What was found.
         reason: String,
     },
+}
+
+/// Writes an image as numpy's `.npy`: `f32`, shape `(height, width)`, row-major.
+///
+/// # Errors
+/// [`NpzError::Io`] if the file cannot be written.
+pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
+    let shape = [image.height() as u64, image.width() as u64];
+    atomic::write(file, |out| {
+        let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(out).begin_nd()?;
+        writer.extend(image.as_slice())?;
+        writer.finish()
+    })
+    .map_err(|source| NpzError::Io { file: file.to_owned(), source })
 }
 
 /// An array larger than this is refused: a damaged header must not ask for all memory.

@@ -1,0 +1,84 @@
+//! The options that say where contact masks come from, and the mask they name.
+
+use clap::{Args, ValueEnum};
+
+use super::predict::Predictor;
+use crate::domain::contact;
+use crate::domain::frames::PlanarPose;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::pose::ToolModel;
+use crate::domain::sample::BubbleTouch;
+
+/// Where masks come from.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct MaskArgs {
+    /// Where the contact masks come from. `auto`: the CAD model at the true pose for measured imprints whose truth is
+    /// known (the lab's labels, an upper bound), else the mask UNet.
+    #[arg(long, value_enum, default_value_t = MaskFrom::Auto)]
+    pub mask: MaskFrom,
+    /// Imprint depth from which a pixel counts as contact, for `--mask threshold`.
+    #[arg(long, default_value_t = 7.0)]
+    pub threshold_mm: f32,
+}
+
+/// A source of masks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum MaskFrom {
+    /// The best that is there.
+    Auto,
+    /// Points within 1 mm of the CAD model at the true pose.
+    Cad,
+    /// The mask model.
+    Unet,
+    /// Imprint depth above a threshold.
+    Threshold,
+    /// The simulator's truth.
+    Truth,
+}
+
+impl MaskFrom {
+    /// The key in the JSON.
+    pub(super) fn key(self) -> &'static str {
+        match self {
+            MaskFrom::Auto => "auto",
+            MaskFrom::Cad => "cad",
+            MaskFrom::Unet => "unet",
+            MaskFrom::Threshold => "threshold",
+            MaskFrom::Truth => "truth",
+        }
+    }
+}
+
+/// The mask of one imprint. `truth` is `grasp_from_object`; `auto` means the mask model here.
+///
+/// # Errors
+/// In words, if what the source needs is not there.
+pub(super) fn contact_mask(
+    source: MaskFrom,
+    args: &MaskArgs,
+    imprint: &DepthMap,
+    bubble: &BubbleTouch,
+    tool: Option<&ToolModel>,
+    truth: Option<PlanarPose>,
+    predictor: &mut Predictor,
+) -> anyhow::Result<Mask> {
+    match source {
+        MaskFrom::Threshold => Ok(contact::threshold(imprint, args.threshold_mm / 1e3)),
+        MaskFrom::Unet | MaskFrom::Auto => predictor.mask(imprint),
+        MaskFrom::Truth => {
+            let truth = bubble.truth.as_ref();
+            let contact = truth.map(|t| t.contact.clone());
+            contact.ok_or_else(|| anyhow::anyhow!("only pairs of the built-in demo know their true contact mask"))
+        }
+        MaskFrom::Cad => {
+            let truth =
+                truth.ok_or_else(|| anyhow::anyhow!("no true pose is known; use --mask unet or --mask threshold"))?;
+            let camera = bubble.camera.as_ref();
+            let camera =
+                camera.ok_or_else(|| anyhow::anyhow!("no camera data; the imprint cannot be lifted to points"))?;
+            let tool = tool.ok_or_else(|| anyhow::anyhow!("no CAD model of the tool"))?;
+            let max_m = contact::LAB_CAD_DISTANCE_M;
+            Ok(contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), max_m)?)
+        }
+    }
+}
