@@ -53,12 +53,12 @@ impl Output {
 }
 
 /// A line on standard error.
-pub fn note(text: &str) {
+pub(super) fn note(text: &str) {
     eprintln!("{text}");
 }
 
 /// Sends warnings and errors of the libraries and of our own layers to standard error.
-pub fn start_log() {
+pub(super) fn start_log() {
     struct Stderr;
     impl log::Log for Stderr {
         fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
