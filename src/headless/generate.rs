@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
+use crate::domain::contact::LAB_IMPRINT_MAX_M;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Grid};
-use crate::domain::contact::LAB_IMPRINT_MAX_M;
 use crate::domain::metrics::{self, SsimRange};
 use crate::domain::resample;
 use crate::domain::sample::Scale;
@@ -169,7 +169,8 @@ fn score(
         Scale::Measured => {
             if let Some(measured) = measured {
                 pair.psnr_db = metrics::psnr(imprint, measured, f64::from(LAB_IMPRINT_MAX_M))?.db();
-                pair.ssim = Some(metrics::ssim(imprint, measured, SsimRange::Explicit(f64::from(LAB_IMPRINT_MAX_M)))?.mean);
+                pair.ssim =
+                    Some(metrics::ssim(imprint, measured, SsimRange::Explicit(f64::from(LAB_IMPRINT_MAX_M)))?.mean);
             }
         }
         Scale::Assumed => {
@@ -237,5 +238,8 @@ fn text(report: &Report) -> String {
         line(&name, &mean(std::slice::from_ref(p)));
     }
     line("mean", &report.mean);
-    text + &format!("\n{}; {} steps, seed {}, {} on {}\n", report.convention, report.steps, report.seed, report.bundle, report.runtime)
+    text + &format!(
+        "\n{}; {} steps, seed {}, {} on {}\n",
+        report.convention, report.steps, report.seed, report.bundle, report.runtime
+    )
 }

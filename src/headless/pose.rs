@@ -250,8 +250,7 @@ fn masks(
             continue;
         };
         let truth = sample.grasp_from_object;
-        masks[finger.index()] =
-            Some(contact_mask(source, &args.mask, imprint, bubble, Some(tool), truth, predictor)?);
+        masks[finger.index()] = Some(contact_mask(source, &args.mask, imprint, bubble, Some(tool), truth, predictor)?);
     }
     Ok((source.key(), masks))
 }
@@ -259,11 +258,8 @@ fn masks(
 fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> Figures {
     let cases: Vec<&Case> = cases.collect();
     // A case without truth has no error; one without a pose is a failure.
-    let errors: Vec<f64> = cases
-        .iter()
-        .filter(|c| c.truth_deg.is_some())
-        .map(|c| c.error_deg.map_or(f64::NAN, f64::to_radians))
-        .collect();
+    let errors: Vec<f64> =
+        cases.iter().filter(|c| c.truth_deg.is_some()).map(|c| c.error_deg.map_or(f64::NAN, f64::to_radians)).collect();
     let mut ms: Vec<f64> = cases.iter().map(|c| c.ms).collect();
     ms.sort_by(f64::total_cmp);
     let median_ms = (!ms.is_empty()).then(|| 0.5 * (ms[(ms.len() - 1) / 2] + ms[ms.len() / 2]));
