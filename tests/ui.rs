@@ -1,1 +1,10 @@
-//! (filled by its layer)
+//! The studio driven by clicks and keys, without a window: the whole job on simulated touches in a temporary folder.
+//!
+//! Everything is the program's own (files, labels, settings, simulator, registration) but the generator, which is a
+//! quick double: what models do is tested where models are.
+
+mod layout;
+mod look;
+mod rig;
+
+mod job;

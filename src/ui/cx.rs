@@ -86,10 +86,16 @@ pub(super) struct SceneCloud {
     pub key: CloudKey,
     /// Counts up with every new cloud.
     pub revision: u64,
-    /// Per finger: positions and colours.
-    pub fingers: [Option<(Arc<[DVec3]>, Arc<[[u8; 3]]>)>; 2],
-    /// Whether the colours are those of the dark theme.
-    pub dark: bool,
+    /// Per finger: the membrane and the contact.
+    pub fingers: [Option<[ScenePoints; 2]>; 2],
+}
+
+/// Some points of a finger.
+pub(super) struct ScenePoints {
+    /// Positions, metres, grasp frame.
+    pub points: Arc<[DVec3]>,
+    /// The index of each in the finger's cloud, ascending.
+    pub indices: Vec<usize>,
 }
 
 /// A CAD model as the renderer takes it.

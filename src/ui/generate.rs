@@ -20,10 +20,11 @@ const LABEL: f32 = 60.0;
 fn row(ui: &mut Ui, weak: egui::Color32, name: &str, add: impl FnOnce(&mut Ui)) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        ui.add_sized(
-            vec2(LABEL, 20.0),
-            egui::Label::new(RichText::new(name).color(weak)).truncate().halign(egui::Align::Min),
-        );
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        ui.allocate_ui_with_layout(vec2(LABEL, 24.0), layout, |ui| {
+            ui.set_min_width(LABEL);
+            ui.label(RichText::new(name).color(weak));
+        });
         add(ui);
     });
 }

@@ -81,9 +81,9 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let metrics = b.tabs(&[Metrics, Log]);
             let top = b.row(&[(gel, 1.0), (measured, 1.0), (predicted, 1.0)]);
             let bottom = b.row(&[(error, 1.0), (scene_p, 1.0), (scene_m, 1.0)]);
-            let centre = b.column(&[(top, 1.0), (bottom, 1.0)]);
+            let centre = b.column(&[(top, 0.86), (bottom, 1.14)]);
             let right = b.column(&[(generate, 1.0), (metrics, 1.0)]);
-            b.row(&[(browser, 0.19), (centre, 0.59), (right, 0.22)])
+            b.row(&[(browser, 0.165), (centre, 0.625), (right, 0.21)])
         }
         Workspace::Align => {
             let browser = b.tabs(&[Browser]);
@@ -92,7 +92,7 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let metrics = b.tabs(&[Metrics, Generate, Log]);
             let scenes = b.row(&[(scene_p, 1.0), (scene_m, 1.0)]);
             let right = b.column(&[(metrics, 1.3), (predicted, 0.85), (measured, 0.85)]);
-            b.row(&[(browser, 0.19), (scenes, 0.59), (right, 0.22)])
+            b.row(&[(browser, 0.165), (scenes, 0.625), (right, 0.21)])
         }
         Workspace::Label => {
             let browser = b.tabs(&[Browser]);
@@ -104,7 +104,7 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let below = b.row(&[(gel, 1.0), (scene, 1.4)]);
             let centre = b.column(&[(images, 1.25), (below, 0.75)]);
             let right = b.column(&[(masks, 1.25), (metrics, 0.75)]);
-            b.row(&[(browser, 0.19), (centre, 0.59), (right, 0.22)])
+            b.row(&[(browser, 0.165), (centre, 0.625), (right, 0.21)])
         }
         Workspace::Evaluate => {
             let left = b.tabs(&[Browser]);
@@ -113,7 +113,7 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let right = b.tabs(&[Metrics, Generate, SceneMeasured, Log]);
             let images = b.row(&[(measured, 1.0), (predicted, 1.0), (error, 1.0)]);
             let centre = b.column(&[(table, 1.2), (images, 0.9)]);
-            b.row(&[(left, 0.19), (centre, 0.59), (right, 0.22)])
+            b.row(&[(left, 0.165), (centre, 0.625), (right, 0.21)])
         }
     };
     Tree::new(tree_id(workspace), root, b.0)

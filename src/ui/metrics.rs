@@ -1,6 +1,8 @@
 //! The figures of the selected pair: image metrics, the ledger of the prediction, the pose.
 
-use eframe::egui::{Align, Color32, Grid, Layout, RichText, ScrollArea, Ui};
+use eframe::egui::{
+    Align, Align2, Color32, FontId, Layout, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2,
+};
 
 use super::cx::{Cx, side_color};
 use super::images;
@@ -117,15 +119,20 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     for finger in fingers {
         match cx.state.comparison(finger) {
             Lookup::Ready(c) | Lookup::Stale(c) => {
-                Grid::new(("comparison", finger)).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
-                    let number = |v: Option<f64>, decimals: usize, unit: &str| match v {
-                        Some(v) => format!("{v:.decimals$}{unit}"),
-                        None => "not defined".to_owned(),
-                    };
-                    line(cx, ui, "PSNR (min-max 0..1)", number(c.psnr_db, 1, " dB"), None);
-                    line(cx, ui, "SSIM (min-max 0..1)", number(c.ssim, 3, ""), None);
-                    line(cx, ui, "Mean |error|", units::text_mm(c.mae_m), None);
-                });
+                let number = |v: Option<f64>, decimals: usize, unit: &str| match v {
+                    Some(v) => format!("{v:.decimals$}{unit}"),
+                    None => "not defined".to_owned(),
+                };
+                if cx.state.selection.both_fingers {
+                    ui.label(caption(format!("{} finger", finger.name()), cx.p));
+                }
+                for (name, number) in [
+                    ("PSNR (min-max 0..1)", number(c.psnr_db, 1, " dB")),
+                    ("SSIM (min-max 0..1)", number(c.ssim, 3, "")),
+                    ("Mean |error|", units::text_mm(c.mae_m)),
+                ] {
+                    line(ui, (name, cx.p.weak), &[(number, cx.p.strong)], 0.0);
+                }
             }
             Lookup::Waiting => {
                 ui.label(caption("…", cx.p));
@@ -140,13 +147,19 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// A name at the left, a number at the right.
-fn line(cx: &Cx<'_>, ui: &mut Ui, name: &str, number: String, color: Option<Color32>) {
-    ui.label(RichText::new(name).size(12.0).color(cx.p.weak));
-    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        ui.label(value(number, cx.p).color(color.unwrap_or(cx.p.strong)));
-    });
-    ui.end_row();
+/// A name at the left, numbers at the right, in columns that never move.
+fn line(ui: &mut Ui, name: (&str, Color32), numbers: &[(String, Color32)], width: f32) {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 17.0), Sense::hover());
+    let all: Vec<&str> = numbers.iter().map(|n| n.0.as_str()).collect();
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{} {}", name.0, all.join(" "))));
+    let painter = ui.painter_at(rect);
+    let font = FontId::proportional(12.0);
+    let y = rect.center().y;
+    painter.text(pos2(rect.left(), y), Align2::LEFT_CENTER, name.0, font.clone(), name.1);
+    for (i, (number, color)) in numbers.iter().rev().enumerate() {
+        let x = rect.right() - 2.0 - width * i as f32;
+        painter.text(pos2(x, y), Align2::RIGHT_CENTER, number, font.clone(), *color);
+    }
 }
 
 /// The stages that a prediction went through, with the figures of each.
@@ -186,25 +199,15 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(4.0);
     ui.label(section(&format!("Ledger, {} finger", finger.name()), cx.p))
         .on_hover_text("What each stage of the depth chain left behind: smallest, mean, deviation, largest");
-    Grid::new("ledger").num_columns(5).spacing([8.0, 2.0]).min_col_width(24.0).show(ui, |ui| {
-        for head in ["mm", "min", "mean", "std", "max"] {
-            ui.with_layout(
-                if head == "mm" { Layout::left_to_right(Align::Center) } else { Layout::right_to_left(Align::Center) },
-                |ui| {
-                    ui.label(caption(head, cx.p));
-                },
-            );
-        }
-        ui.end_row();
-        for (name, color, stats, metres) in rows {
-            ui.label(RichText::new(name).size(SMALL).color(color.unwrap_or(cx.p.text)));
-            for v in [stats.min, stats.mean, stats.std, stats.max] {
-                ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    let v = if metres { units::mm(v) } else { v };
-                    ui.label(value(if v.is_finite() { format!("{v:.2}") } else { "–".to_owned() }, cx.p).size(SMALL));
-                });
-            }
-            ui.end_row();
-        }
-    });
+    ui.spacing_mut().item_spacing.y = 0.0;
+    let width = ((ui.available_width() - 76.0) / 4.0).clamp(34.0, 64.0);
+    let heads = ["min", "mean", "std", "max"].map(|h| (h.to_owned(), cx.p.weak));
+    line(ui, ("mm", cx.p.weak), &heads, width);
+    for (name, color, stats, metres) in rows {
+        let numbers = [stats.min, stats.mean, stats.std, stats.max].map(|v| {
+            let v = if metres { units::mm(v) } else { v };
+            (if v.is_finite() { format!("{v:.2}") } else { "–".to_owned() }, cx.p.strong)
+        });
+        line(ui, (name, color.unwrap_or(cx.p.text)), &numbers, width);
+    }
 }

@@ -113,8 +113,15 @@ impl Behavior<Pane> for Docking<'_, '_> {
     }
 
     fn tab_title_for_pane(&mut self, pane: &Pane) -> WidgetText {
+        let title = match pane {
+            // Three tabs have to fit side by side into the narrowest column.
+            Pane::GelDifference => "GelSlim diff",
+            Pane::GelRaw => "raw",
+            Pane::GelReference => "reference",
+            pane => title(*pane),
+        };
         let color = side(*pane).map_or(self.cx.p.text, |s| super::cx::side_color(self.cx.p, s));
-        RichText::new(title(*pane)).family(medium()).size(12.0).color(color).into()
+        RichText::new(title).family(medium()).size(12.0).color(color).into()
     }
 
     fn on_tab_button(&mut self, tiles: &mut Tiles<Pane>, tile: TileId, response: egui::Response) -> egui::Response {
@@ -154,6 +161,10 @@ impl Behavior<Pane> for Docking<'_, '_> {
 
     fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
         26.0
+    }
+
+    fn tab_title_spacing(&self, _visuals: &egui::Visuals) -> f32 {
+        7.0
     }
 
     fn gap_width(&self, _style: &egui::Style) -> f32 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, Ui, pos2, vec2};
 use glam::{DAffine3, DVec3};
 
-use super::cx::{Cx, SceneCloud, SceneMesh, side_color};
+use super::cx::{Cx, SceneCloud, SceneMesh, ScenePoints, side_color};
 use super::images::{self, CONTACT};
 use super::scene_view::SceneOutput;
 use super::theme::Palette;
@@ -89,25 +89,20 @@ fn rgb(c: Color32) -> [f32; 3] {
     [f32::from(c.r()) / 255.0, f32::from(c.g()) / 255.0, f32::from(c.b()) / 255.0]
 }
 
-/// Points and colours for the renderer, made again only for another cloud.
+/// Points for the renderer, made again only for another cloud.
 fn update_cloud(cx: &mut Cx<'_>, source: ImprintSource, key: crate::app::keys::CloudKey, clouds: &Clouds) {
-    let dark = *cx.p == super::theme::DARK;
     let held = &mut cx.local.scene_clouds[source as usize];
-    if held.as_ref().is_some_and(|h| h.key == key && h.dark == dark) {
+    if held.as_ref().is_some_and(|h| h.key == key) {
         return;
     }
-    let side = side_color(cx.p, source);
-    // The membrane recedes, the contact stands out.
-    let rest = super::theme::mix(cx.p.canvas, side, 0.55);
-    let color = |c: Color32| [c.r(), c.g(), c.b()];
-    let (rest, contact) = (color(rest), color(CONTACT));
-    let convert = |f: &FingerCloud| {
-        let colors: Arc<[[u8; 3]]> = f.contact.iter().map(|on| if *on { contact } else { rest }).collect();
-        (Arc::<[DVec3]>::from(f.points.as_slice()), colors)
+    let part = |f: &FingerCloud, contact: bool| {
+        let indices: Vec<usize> = (0..f.points.len()).filter(|i| f.contact.get(*i) == Some(&contact)).collect();
+        ScenePoints { points: indices.iter().map(|i| f.points[*i]).collect(), indices }
     };
+    let convert = |f: &FingerCloud| [part(f, false), part(f, true)];
     cx.local.revision += 1;
     let fingers = [clouds.fingers[0].as_ref().map(convert), clouds.fingers[1].as_ref().map(convert)];
-    *held = Some(SceneCloud { key, revision: cx.local.revision, fingers, dark });
+    *held = Some(SceneCloud { key, revision: cx.local.revision, fingers });
 }
 
 fn update_mesh(cx: &mut Cx<'_>) {
@@ -128,23 +123,29 @@ fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {
     if let Some(cloud) = &cx.local.scene_clouds[source as usize] {
         let clouds = state.cloud(source).ready();
         for finger in Finger::BOTH {
-            let Some((points, colors)) = &cloud.fingers[finger.index()] else { continue };
+            let Some(parts) = &cloud.fingers[finger.index()] else { continue };
             let selected = hover.filter(|h| h.finger == finger).and_then(|h| {
                 let (x, y) = (h.at_px[0].round().max(0.0) as usize, h.at_px[1].round().max(0.0) as usize);
                 clouds?.finger(finger)?.at_pixel(x, y)
             });
-            scene.clouds.push(CloudItem {
-                name: format!("cloud {}", finger.name()),
-                revision: cloud.revision,
-                points: points.clone(),
-                colors: PointColors::PerPoint(colors.clone()),
-                style: CloudStyle {
-                    size: PointSize::Metres(0.000_42),
-                    selected,
-                    highlight: rgb(cx.p.strong),
-                    ..CloudStyle::default()
-                },
-            });
+            // The membrane recedes, the contact stands out.
+            let rest = super::theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
+            let looks = [(PointSize::Px(1.6), rest, "membrane"), (PointSize::Metres(0.000_45), CONTACT, "contact")];
+            for (part, (size, color, name)) in parts.iter().zip(looks) {
+                scene.clouds.push(CloudItem {
+                    name: format!("{name} {}", finger.name()),
+                    revision: cloud.revision,
+                    points: part.points.clone(),
+                    colors: PointColors::One,
+                    style: CloudStyle {
+                        color: rgb(color),
+                        size,
+                        selected: selected.and_then(|i| part.indices.binary_search(&i).ok()),
+                        highlight: rgb(cx.p.strong),
+                        ..CloudStyle::default()
+                    },
+                });
+            }
         }
     }
     let tool_now = state.tool().ready().map(|t| t.name.as_str());
@@ -162,7 +163,7 @@ fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {
                 MeshStyle {
                     world_from_mesh: pose.grasp_from_object.to_affine(),
                     color: rgb(cx.p.cad),
-                    opacity: 0.55,
+                    opacity: 0.9,
                     look: Look::Solid,
                 },
             ));
@@ -173,7 +174,7 @@ fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {
                 MeshStyle {
                     world_from_mesh: truth.to_affine(),
                     color: rgb(cx.p.truth),
-                    opacity: 0.8,
+                    opacity: 0.6,
                     look: Look::XRay,
                 },
             ));

@@ -144,7 +144,7 @@ mod tests {
 
     fn press(key: EKey, modifiers: Modifiers) -> Vec<Action> {
         let ctx = egui::Context::default();
-        let mut raw = egui::RawInput { modifiers, ..Default::default() };
+        let mut raw = egui::RawInput::default();
         raw.events.push(egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers });
         let mut got = Vec::new();
         let _ = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx())));

@@ -10,6 +10,10 @@ use crate::ui::widget::texture::Histogram;
 
 /// Height of the whole bar, points.
 pub const HEIGHT: f32 = 36.0;
+/// Width of the numbers at the ends, points.
+const END: f32 = 42.0;
+/// From this width on the buttons stand beside the bar instead of in a menu, points.
+const WIDE: f32 = 340.0;
 
 /// A bar to be shown. Values are in millimetres.
 pub struct Colorbar<'a> {
@@ -61,38 +65,38 @@ impl Colorbar<'_> {
         ui.allocate_ui(vec2(ui.available_width(), HEIGHT), |ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.horizontal_centered(|ui| {
+                let wide = ui.available_width() >= WIDE;
                 let mut edited = range;
                 let lo = end(ui, &mut edited.lo, &format!("{}, lower end", self.label));
-                let right = if self.locked.is_some() { 168.0 } else { 118.0 };
-                let note_width = if self.note.is_empty() { 0.0 } else { 84.0 };
-                let width = (ui.available_width() - right - note_width).max(24.0);
+                let note = if self.note.is_empty() { 0.0 } else { 80.0 };
+                let buttons = match (wide, self.locked.is_some()) {
+                    (true, true) => 76.0,
+                    (true, false) => 40.0,
+                    (false, _) => 22.0,
+                };
+                let width = (ui.available_width() - END - 26.0 - buttons - note - 8.0).max(24.0);
                 if let Some(new) = self.gradient(ui, width, range, p) {
                     asked = Some(Asked::Range(new));
                 }
                 let hi = end(ui, &mut edited.hi, &format!("{}, upper end", self.label));
                 ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
                 if !self.note.is_empty() {
-                    ui.label(egui::RichText::new(self.note).size(SMALL).color(p.caution))
+                    ui.add(egui::Label::new(egui::RichText::new(self.note).size(SMALL).color(p.caution)))
                         .on_hover_text("The source lost its scale: the range in millimetres is an assumption");
                 }
-                let auto =
-                    ui.add(egui::Button::new(egui::RichText::new("Auto").size(SMALL)).min_size(vec2(30.0, 18.0)));
-                auto.widget_info(|| {
-                    WidgetInfo::labeled(Role::Button, true, format!("{}: set from what is shown", self.label))
-                });
-                if auto.on_hover_text("Set the range once from what is shown (C)").clicked() {
-                    asked = Some(Asked::Auto);
-                }
-                if let Some(locked) = self.locked {
-                    let text = egui::RichText::new("Lock").size(SMALL);
-                    let lock = ui.add(egui::Button::selectable(locked, text).min_size(vec2(30.0, 18.0)));
-                    lock.widget_info(|| {
-                        WidgetInfo::selected(Role::CheckBox, true, locked, format!("{}: lock", self.label))
+                if wide {
+                    asked = self.buttons(ui).or(asked);
+                } else {
+                    let more = egui::Button::new(egui::RichText::new("…").size(SMALL)).min_size(vec2(18.0, 18.0));
+                    let (more, inner) =
+                        egui::containers::menu::MenuButton::from_button(more).ui(ui, |ui| self.buttons(ui));
+                    let more = more.accessible_name(format!("{}: more", self.label));
+                    more.on_hover_text(if self.locked == Some(false) {
+                        "Range: unlocked"
+                    } else {
+                        "Range: automatic, lock"
                     });
-                    let tip = "Locked: colours mean the same in every sample. Unlocked: set from each sample shown (O)";
-                    if lock.on_hover_text(tip).clicked() {
-                        asked = Some(Asked::Lock(!locked));
-                    }
+                    asked = inner.and_then(|i| i.inner).or(asked);
                 }
                 if lo || hi {
                     if self.symmetric {
@@ -105,6 +109,25 @@ impl Colorbar<'_> {
                 }
             });
         });
+        asked
+    }
+
+    fn buttons(&self, ui: &mut Ui) -> Option<Asked> {
+        let mut asked = None;
+        let auto = ui.add(egui::Button::new(egui::RichText::new("Auto").size(SMALL)).min_size(vec2(32.0, 18.0)));
+        let auto = auto.accessible_name(format!("{}: set from what is shown", self.label));
+        if auto.on_hover_text("Set the range once from what is shown (C)").clicked() {
+            asked = Some(Asked::Auto);
+        }
+        if let Some(locked) = self.locked {
+            let text = egui::RichText::new("Lock").size(SMALL);
+            let lock = ui.add(egui::Button::selectable(locked, text).min_size(vec2(32.0, 18.0)));
+            let lock = lock.accessible_name(format!("{}: lock", self.label));
+            let tip = "Locked: colours mean the same in every sample. Unlocked: set from each sample shown (O)";
+            if lock.on_hover_text(tip).clicked() {
+                asked = Some(Asked::Lock(!locked));
+            }
+        }
         asked
     }
 
@@ -200,8 +223,14 @@ fn paint_histogram(painter: &egui::Painter, histogram: &Histogram, range: Range,
 
 /// A number that can be typed or dragged. Returns whether it changed.
 fn end(ui: &mut Ui, value: &mut f32, label: &str) -> bool {
+    ui.scope(|ui| end_inner(ui, value, label)).inner
+}
+
+fn end_inner(ui: &mut Ui, value: &mut f32, label: &str) -> bool {
+    ui.style_mut().override_font_id = Some(FontId::proportional(12.0));
+    ui.spacing_mut().button_padding.x = 2.0;
     let drag = egui::DragValue::new(value).speed(0.05).fixed_decimals(2).range(-100.0..=100.0);
-    let response = ui.add_sized([44.0, 20.0], drag);
+    let response = ui.add_sized([END, 18.0], drag);
     let response = response.accessible_name(label);
     response.on_hover_text(format!("{label}, mm: drag, or click and type")).changed()
 }

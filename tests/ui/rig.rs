@@ -1,0 +1,195 @@
+//! A studio on a small simulated data set, without a window.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use egui_kittest::Harness;
+use touch2touch::app::command::{Command, Opened};
+use touch2touch::app::error::TaskError;
+use touch2touch::app::jobs::JobCx;
+use touch2touch::app::keys::Recipe;
+use touch2touch::app::library::{BundleInfo, BundleKind, Place};
+use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::services::{Generated, Services};
+use touch2touch::app::settings::{RuntimeChoice, Settings};
+use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use touch2touch::domain::postprocess::{
+    DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift, ShiftMode, ShiftStats,
+};
+use touch2touch::domain::resample::Resampling;
+use touch2touch::domain::sensor::bubble;
+use touch2touch::domain::sim;
+use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch::ui::{Options, StudioApp};
+
+/// The program's services with a generator that answers at once.
+struct QuickGenerator {
+    live: LiveServices,
+}
+
+/// A picture of the decoder's kind that depends on the input and the seed: the blurred strength of the difference.
+fn picture(difference: &RgbGrid, seed: u64) -> Grid<f32> {
+    const N: usize = 64;
+    let (w, h) = (difference.width(), difference.height());
+    Grid::from_fn(N, N, |x, y| {
+        let mut sum = 0.0;
+        for dy in 0..4 {
+            for dx in 0..4 {
+                let p = difference[((x * 4 + dx) * w / (4 * N), (y * 4 + dy) * h / (4 * N))];
+                sum += p.iter().map(|v| v.abs()).sum::<f32>();
+            }
+        }
+        (sum / 16.0 / 60.0 - 0.6 + (seed % 7) as f32 * 0.01).clamp(-1.0, 1.0)
+    })
+}
+
+impl Services for QuickGenerator {
+    fn open(&self, place: &Place) -> Result<Opened, TaskError> {
+        self.live.open(place)
+    }
+
+    fn find_bundles(&self, _folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
+        let info = BundleInfo {
+            id: "quick".into(),
+            name: "quick double".into(),
+            kind: BundleKind::Generator,
+            folder: PathBuf::new(),
+            steps: Some(4),
+        };
+        (vec![info], Vec::new())
+    }
+
+    fn generate(
+        &self,
+        recipe: &Recipe,
+        _bundle: &BundleInfo,
+        difference: &RgbGrid,
+        cx: &JobCx,
+    ) -> Result<Generated, TaskError> {
+        for step in 0..recipe.steps {
+            cx.check("Generate")?;
+            cx.progress(step.into(), recipe.steps.into(), format!("step {} of {}", step + 1, recipe.steps));
+        }
+        let chain = DepthChain {
+            range: DepthRange { min_m: -0.0063, max_m: 0.018 },
+            mapping: Mapping::Doubled,
+            reduction: Reduction::Mean,
+            shift: Shift::None,
+            size: [bubble::WIDTH, bubble::HEIGHT],
+            resampling: Resampling::Bilinear,
+            rotation_deg: 180,
+        };
+        let stats = ShiftStats { pred_mean: 0.0115, pred_std: 0.0021, gt_mean: 0.0052, gt_std: 0.0043 };
+        let chains: BTreeMap<ShiftMode, Result<DepthChain, String>> = ShiftMode::ALL
+            .into_iter()
+            .map(|mode| (mode, chain.clone().with_mode(mode, Some(stats)).map_err(|e| e.to_string())))
+            .collect();
+        let raw = RawPrediction { channels: vec![picture(difference, recipe.seed)] };
+        Ok(Generated { raw, chains, runtime: "double".into() })
+    }
+
+    fn mask_by_model(
+        &self,
+        bundle: &BundleInfo,
+        runtime: RuntimeChoice,
+        imprint: &DepthMap,
+    ) -> Result<Mask, TaskError> {
+        self.live.mask_by_model(bundle, runtime, imprint)
+    }
+
+    fn load_settings(&self) -> (Settings, Option<TaskError>) {
+        self.live.load_settings()
+    }
+
+    fn save_settings(&self, settings: &Settings) -> Result<(), TaskError> {
+        self.live.save_settings(settings)
+    }
+}
+
+/// Writes a data set of a few simulated grasps of two tools.
+pub(super) fn write_dataset(root: &Path, grasps: u64) {
+    let tools: Vec<_> = sim::tools().iter().take(2).collect();
+    let config = sim::SimConfig::default();
+    for tool in &tools {
+        for index in 0..grasps {
+            let grasp = sim::random_grasp(index + 3);
+            let sample = sim::simulate(tool, grasp, index, &config);
+            write_pair(root, Layout::Train, &tool.name, index, &sample).unwrap();
+        }
+    }
+    let meshes: Vec<_> = tools.iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
+    write_tools(root, &meshes).unwrap();
+}
+
+/// A studio that runs, and the folders it works in.
+pub(super) struct Rig {
+    pub(super) harness: Harness<'static, StudioApp>,
+    pub(super) data: PathBuf,
+    pub(super) config: PathBuf,
+    _folder: tempfile::TempDir,
+}
+
+impl Rig {
+    /// A studio of the given size on a data set with `grasps` grasps of each of two tools.
+    ///
+    /// `None` where there is no graphics adapter; a failure where the check script demands one.
+    pub(super) fn new(size: [f32; 2], grasps: u64) -> Option<Self> {
+        if let Err(err) = touch2touch::gpu::Gpu::headless() {
+            assert!(!crate::support::require("REQUIRE_GPU"), "the check script demands a graphics adapter: {err}");
+            eprintln!("left out: {err}");
+            return None;
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let (data, config) = (folder.path().join("data"), folder.path().join("config"));
+        write_dataset(&data, grasps);
+        let mut rig = Self { harness: Self::start(size, &data, &config), data, config, _folder: folder };
+        rig.settle();
+        Some(rig)
+    }
+
+    fn start(size: [f32; 2], data: &Path, config: &Path) -> Harness<'static, StudioApp> {
+        let services = Arc::new(QuickGenerator { live: LiveServices::with_config_folder(Some(config.to_owned())) });
+        let mut options = Options::new(services, Some(data.to_owned()));
+        options.inline = true;
+        options.native_dialogs = false;
+        Harness::builder()
+            .with_size(size)
+            .with_max_steps(400)
+            .wgpu()
+            .build_eframe(move |cc| StudioApp::new(cc, options))
+    }
+
+    /// Closes the studio and starts it again on the same folders.
+    pub(super) fn restart(&mut self, size: [f32; 2]) {
+        self.harness = Self::start(size, &self.data, &self.config);
+        self.settle();
+    }
+
+    /// Frames until nothing is to be done any more.
+    pub(super) fn settle(&mut self) {
+        for _ in 0..600 {
+            self.harness.step();
+            if self.harness.state().is_idle() && self.harness.state().state().library.open.is_some() {
+                break;
+            }
+        }
+        assert!(self.harness.state().is_idle(), "{:?}", self.harness.state().state().tasks);
+        self.harness.run();
+    }
+
+    /// Carries a command out as if a pane had sent it.
+    pub(super) fn send(&mut self, command: Command) {
+        self.harness.state_mut().push(command);
+        self.harness.step();
+        self.settle();
+    }
+
+    /// Writes what is on screen, where a person asked for pictures (`TOUCH2TOUCH_SCREENSHOTS`).
+    pub(super) fn shoot(&mut self, name: &str) {
+        if let Some(folder) = std::env::var_os("TOUCH2TOUCH_SCREENSHOTS") {
+            let image = self.harness.render().unwrap();
+            image.save(Path::new(&folder).join(format!("{name}.png"))).unwrap();
+        }
+    }
+}
