@@ -29,3 +29,43 @@ mod shortcuts;
 mod table;
 
 pub use app::{Options, StudioApp};
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use eframe::egui;
+
+use crate::app::services::live::LiveServices;
+
+/// Size of the window on the first start, points. eframe makes it smaller where the screen is.
+const WINDOW: [f32; 2] = [1600.0, 960.0];
+/// Smallest size that every workspace can be used in, points.
+const SMALLEST: [f32; 2] = [960.0, 600.0];
+
+/// Opens the window and returns when it was closed. `open` is a folder or a file in one; `None` opens what was open
+/// last, else the demo. `reset` starts with default preferences and layouts.
+///
+/// # Errors
+/// In words, if no window can be opened: no display, or no graphics device.
+pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
+    let native = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("Touch2Touch Studio")
+            .with_app_id("touch2touch")
+            .with_inner_size(WINDOW)
+            .with_min_inner_size(SMALLEST)
+            .with_clamp_size_to_monitor_size(true)
+            .with_drag_and_drop(true),
+        ..Default::default()
+    };
+    let mut options = Options::new(Arc::new(LiveServices::new()), open);
+    options.reset = reset;
+    eframe::run_native("touch2touch", native, Box::new(move |cc| Ok(Box::new(StudioApp::new(cc, options))))).map_err(
+        |err| {
+            format!(
+                "The window cannot be opened: {err}. The studio needs a display (X11 or Wayland) and a Vulkan or GL \
+                 driver; the command line works without either (touch2touch --help)."
+            )
+        },
+    )
+}

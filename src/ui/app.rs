@@ -36,6 +36,8 @@ pub struct Options {
     pub inline: bool,
     /// Whether the system's file dialogs are tried before the path box.
     pub native_dialogs: bool,
+    /// Whether all preferences and layouts start from their defaults.
+    pub reset: bool,
     /// Where screenshots are written; `None` = the working directory.
     pub screenshots: Option<PathBuf>,
 }
@@ -43,7 +45,7 @@ pub struct Options {
 impl Options {
     /// The usual ones.
     pub fn new(services: SharedServices, open: Option<PathBuf>) -> Self {
-        Self { services, open, inline: false, native_dialogs: true, screenshots: None }
+        Self { services, open, inline: false, native_dialogs: true, reset: false, screenshots: None }
     }
 }
 
@@ -59,7 +61,6 @@ pub struct StudioApp {
     first_prediction: bool,
     applied_theme: Option<Theme>,
     applied_zoom: f32,
-    layouts_loaded: bool,
     folder: Option<PathBuf>,
     services: SharedServices,
     shot_sender: Sender<Arc<egui::ColorImage>>,
@@ -87,7 +88,10 @@ impl StudioApp {
         let mut state = State::default();
         let place = options.open.map(Place::Path);
         let requests = runtime.start(&mut state, place);
-        let inbox = requests.into_iter().map(Command::Ui).collect();
+        let mut inbox: Vec<Command> = requests.into_iter().map(Command::Ui).collect();
+        if options.reset {
+            inbox.push(Command::ResetSettings);
+        }
         Self {
             state,
             runtime,
@@ -99,7 +103,6 @@ impl StudioApp {
             first_prediction: false,
             applied_theme: None,
             applied_zoom: 1.0,
-            layouts_loaded: false,
             folder: options.screenshots,
             services: options.services,
             shot_sender,
@@ -147,6 +150,9 @@ impl StudioApp {
         if commands.iter().any(|c| matches!(c, Command::Undo | Command::Redo | Command::SetWorkspace(_))) {
             // The pen is not to be followed into another state.
             self.local.painting = None;
+        }
+        if commands.iter().any(|c| matches!(c, Command::ResetSettings)) {
+            self.trees.clear();
         }
         let switched = commands.iter().find_map(|c| match c {
             Command::SetWorkspace(w) if *w != self.state.settings.workspace => Some(*w),
@@ -323,11 +329,6 @@ impl eframe::App for StudioApp {
         self.local.readout = None;
         let hovered_before = self.local.hovered_pane.take();
         let workspace = self.state.settings.workspace;
-        // The settings are read on a lane: trees are made once they are there, and again when they were reset.
-        if !self.layouts_loaded && !self.state.settings.layouts.is_empty() {
-            self.layouts_loaded = true;
-            self.trees.clear();
-        }
         let stored = self.state.settings.layouts.get(workspace.name());
         let mut tree = self.trees.remove(&workspace).unwrap_or_else(|| layout::restore(stored, workspace));
         self.local.hidden = layout::panes_of(workspace)
