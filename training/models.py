@@ -71,6 +71,20 @@ class Transformer(nn.Module):
         return x + self.mlp(self.norm2(x))
 
 
+def sinusoids(x, y, dim):
+    """Multi-scale sinusoids (1,T,dim) of places (T,) in bubble pixels."""
+    rates = 2 * math.pi / torch.logspace(math.log10(12), math.log10(500), dim // 4)
+    angles = torch.cat([x[:, None] * rates, y[:, None] * rates], dim=1)
+    return torch.cat([angles.sin(), angles.cos()], dim=1)[None]
+
+
+def raster(n, x0, x1, y0, y1):
+    """Centres (n*n,), (n*n,) of an n x n raster over a rectangle, row by row."""
+    t = (torch.arange(n) + 0.5) / n
+    y, x = torch.meshgrid(y0 + t * (y1 - y0), x0 + t * (x1 - x0), indexing="ij")
+    return x.flatten(), y.flatten()
+
+
 class ConditionEncoder(nn.Module):
     """GelSlim to a condition on the latent's grid.
 
@@ -86,10 +100,14 @@ class ConditionEncoder(nn.Module):
             nn.Conv2d(3, 48, 8, stride=4, padding=2), ResBlock(48, 48),
             nn.Conv2d(48, 96, 3, stride=2, padding=1), ResBlock(96, 96),
             nn.Conv2d(96, dim, 3, stride=2, padding=1), ResBlock(dim, dim), norm(dim))
-        self.place = nn.Parameter(torch.randn(1, 64, dim) * 0.1)
-        self.query = nn.Parameter(torch.randn(1, 256, dim) * 0.1)
+        # Both rasters in pixels of the rotated bubble image (175 x 140); the GelSlim's window lies there on average.
+        # Learnt from this start, so that a cell first reads from what lies under it.
+        self.place = nn.Parameter(sinusoids(*raster(8, 85.0, 127.5, 54.5, 86.3), dim))
+        self.query = nn.Parameter(sinusoids(*raster(16, 0.0, 175.0, 0.0, 140.0), dim))
         self.mix = nn.ModuleList(Transformer(dim, 5) for _ in range(depth))
         self.read = Transformer(dim, 5)
+        with torch.no_grad():
+            self.read.attention.kv.weight[:dim] = self.read.attention.q.weight
         self.norm = nn.LayerNorm(dim)
         self.narrow = nn.Linear(dim, CONDITION)
         self.refine = ResBlock(CONDITION, CONDITION)

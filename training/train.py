@@ -124,18 +124,20 @@ class Latents:
     def __init__(self, net, shards):
         self.net, self.shards, self.store = net.eval(), shards, {}
         chosen = np.random.default_rng(1).choice(len(shards), min(1024, len(shards)), replace=False)
-        z = torch.cat([self._raw(np.sort(chosen[i:i + 32]), 0) for i in range(0, len(chosen), 32)])
+        z, log_var = (torch.cat(x) for x in zip(*(self._raw(np.sort(chosen[i:i + 32]), 0) for i in range(0, len(chosen), 32))))
         self.mean = z.mean(dim=0, keepdim=True)
-        self.std = (z - self.mean).std(dim=(0, 2, 3), keepdim=True)
+        # The posterior's own spread counts too: a channel that carries little must not be blown up to full size.
+        spread = (z - self.mean) ** 2 + log_var.exp()
+        self.std = spread.mean(dim=(0, 2, 3), keepdim=True).sqrt()
 
     @torch.no_grad()
     def _raw(self, batch, k):
-        return self.net.encode(data.dihedral(data.to_model(self.shards.metres("clean", batch)), k))[0]
+        return self.net.encode(data.dihedral(data.to_model(self.shards.metres("clean", batch)), k))
 
     def take(self, batch, k):
         missing = [i for i in batch if (i, k) not in self.store]
         if missing:
-            for i, z in zip(missing, self._raw(np.array(missing), k).half()):
+            for i, z in zip(missing, self._raw(np.array(missing), k)[0].half()):
                 self.store[i, k] = z
         return (torch.stack([self.store[i, k] for i in batch]).float() - self.mean) / self.std
 
