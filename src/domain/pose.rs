@@ -232,6 +232,30 @@ mod tests {
     }
 
     #[test]
+    fn pixels_without_depth_change_nothing() {
+        let tool = ToolModel::new(cross()).unwrap();
+        let camera = camera(175, 140);
+        let mut imprint = DepthMap::from_fn(175, 140, |x, y| 1e-4 * ((x * 7 + y * 13) % 20) as f32);
+        let mask = Mask::from_fn(175, 140, |x, y| (40..130).contains(&x) && (60..72).contains(&y));
+        let mut thinned = mask.clone();
+        for i in 0..200 {
+            let (x, y) = (40 + (i * 37) % 90, 60 + i % 12);
+            // NaN, infinite, zero and negative depth in turn.
+            imprint[(x, y)] = [f32::NAN, f32::NEG_INFINITY, 0.09, 0.2][i % 4];
+            thinned[(x, y)] = false;
+        }
+        for engine in [Engine::DistanceField, Engine::LabIcp] {
+            let ask = |mask| {
+                let fingers = [Some(FingerInput { imprint: &imprint, camera: &camera, mask: Some(mask) }), None];
+                estimate(&fingers, &tool, engine, false).unwrap()
+            };
+            let (with, without) = (ask(&mask), ask(&thinned));
+            assert_eq!(with.grasp_from_object, without.grasp_from_object, "bit for bit");
+            assert!(with.cloud.invalid() > 150 && without.cloud.invalid() == 0);
+        }
+    }
+
+    #[test]
     fn missing_and_empty_inputs_are_errors() {
         let tool = ToolModel::new(cross()).unwrap();
         assert_eq!(estimate(&[None, None], &tool, Engine::default(), false), Err(PoseError::NoFinger));

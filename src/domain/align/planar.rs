@@ -360,3 +360,6 @@ fn fits(points: &[DVec2], field: &DistanceField, pose: PlanarPose, kernel: f64) 
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -36,18 +36,44 @@ pub(crate) fn cross() -> TriMesh {
     mesh
 }
 
-/// Points spread over the silhouette of [`cross`] at the given pose, with noise of standard deviation about
-/// `noise_m`, `(y, z)` in the grasp frame.
+/// Points spread over the silhouette of [`cross`] at the given pose, with noise of up to about `noise_m`,
+/// `(y, z)` in the grasp frame.
 pub(crate) fn cross_contacts(count: usize, grasp_from_object: PlanarPose, noise_m: f64, seed: u64) -> Vec<DVec2> {
+    filled(&CROSS_BARS, std::f64::consts::FRAC_PI_6, count, grasp_from_object, noise_m, seed)
+}
+
+/// Points spread over bars with the given half sizes, turned by `turn_rad`; the noise has a triangular distribution
+/// with standard deviation `noise_m`.
+pub(crate) fn filled(
+    bars: &[DVec2],
+    turn_rad: f64,
+    count: usize,
+    grasp_from_object: PlanarPose,
+    noise_m: f64,
+    seed: u64,
+) -> Vec<DVec2> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let turn = DVec2::from_angle(std::f64::consts::FRAC_PI_6);
+    let turn = DVec2::from_angle(turn_rad);
     (0..count)
         .map(|i| {
-            let half = CROSS_BARS[i % 2];
+            let half = bars[i % bars.len()];
             let mut uniform = || rng.random::<f64>() * 2.0 - 1.0;
             let p = DVec2::new(uniform(), uniform()) * half;
-            let noise = DVec2::new(uniform() + uniform(), uniform() + uniform()) * (noise_m * 1.2);
+            let noise = DVec2::new(uniform() + uniform(), uniform() + uniform()) * (noise_m * 1.22);
             grasp_from_object.transform_yz(turn.rotate(p) + noise)
         })
         .collect()
+}
+
+/// A flat disc across the closing axis, radius in metres, closed.
+pub(crate) fn disc(radius: f64, sides: u32) -> TriMesh {
+    let mut mesh =
+        TriMesh { vertices: vec![DVec3::new(-0.003, 0.0, 0.0), DVec3::new(0.003, 0.0, 0.0)], ..TriMesh::default() };
+    for i in 0..sides {
+        let p = DVec2::from_angle(std::f64::consts::TAU * f64::from(i) / f64::from(sides)) * radius;
+        mesh.vertices.extend([DVec3::new(-0.003, p.x, p.y), DVec3::new(0.003, p.x, p.y)]);
+        let (a, b) = (2 + 2 * i, 2 + 2 * ((i + 1) % sides));
+        mesh.triangles.extend([[0, b, a], [1, a + 1, b + 1], [a, b, a + 1], [b, b + 1, a + 1]]);
+    }
+    mesh
 }
