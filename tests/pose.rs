@@ -1,90 +1,18 @@
 //! Depth to pose on synthetic grasps with known truth, made by an independent membrane model.
 
-use std::path::Path;
 use std::time::Instant;
 
-use glam::{DAffine3, DMat3, DVec3};
-use touch2touch::domain::grid::{DepthMap, Mask};
-use touch2touch::domain::mesh::TriMesh;
-use touch2touch::domain::pose::{Engine, FingerInput, ToolModel, estimate};
-use touch2touch::domain::sample::BubbleCamera;
-use touch2touch::domain::sensor::Intrinsics;
+use touch2touch::domain::contact::{LAB_CAD_DISTANCE_M, cad_signed_distance};
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::grid::Mask;
+use touch2touch::domain::pose::{Engine, FingerInput, ToolModel, estimate, fingers_of};
+use touch2touch::domain::sensor::Finger;
 use touch2touch::domain::units::angle_error;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::stl;
 
-use crate::support::{Npz, shared};
-
-struct Case {
-    imprints: [DepthMap; 2],
-    cameras: [BubbleCamera; 2],
-    masks: [Mask; 2],
-    theta_rad: f64,
-    yz: [f64; 2],
-    tool: usize,
-    stratum: usize,
-}
-
-fn read_case(path: &Path) -> Case {
-    let mut npz = Npz::open(path);
-    let reference = npz.read("depth_ref");
-    let depth = npz.read("depth");
-    let mask = npz.read("mask");
-    let k = npz.read("K");
-    let t = npz.read("T");
-    let pixels = 140 * 175;
-    let map = |values: &[f64], finger: usize| {
-        let part = &values[finger * pixels..(finger + 1) * pixels];
-        DepthMap::from_vec(175, 140, part.iter().map(|&v| v as f32).collect()).unwrap()
-    };
-    let camera = |finger: usize| {
-        let k = &k[finger * 9..];
-        let t = &t[finger * 16..];
-        let column = |c: usize| DVec3::new(t[c], t[4 + c], t[8 + c]);
-        BubbleCamera {
-            depth_reference: map(&reference, finger),
-            intrinsics: Intrinsics { fx: k[0], fy: k[4], cx: k[2], cy: k[5] },
-            grasp_from_camera: DAffine3::from_mat3_translation(
-                DMat3::from_cols(column(0), column(1), column(2)),
-                column(3),
-            ),
-        }
-    };
-    let imprint = |finger: usize| {
-        let (reference, depth) = (map(&reference, finger), map(&depth, finger));
-        DepthMap::from_fn(175, 140, |x, y| reference[(x, y)] - depth[(x, y)])
-    };
-    let yz = npz.read("yz");
-    Case {
-        imprints: [imprint(0), imprint(1)],
-        cameras: [camera(0), camera(1)],
-        masks: [0, 1].map(|finger| map(&mask, finger).map(|&m| m > 0.5)),
-        theta_rad: npz.read("theta_deg")[0].to_radians(),
-        yz: [yz[0], yz[1]],
-        tool: npz.read("tool")[0] as usize,
-        stratum: npz.read("stratum")[0] as usize,
-    }
-}
-
-/// A binary STL, corners merged by their bits.
-fn read_stl(path: &Path) -> TriMesh {
-    let bytes = std::fs::read(path).unwrap();
-    let count = u32::from_le_bytes(bytes[80..84].try_into().unwrap()) as usize;
-    let mut mesh = TriMesh::default();
-    let mut known = std::collections::HashMap::new();
-    for i in 0..count {
-        let corner = |c: usize, axis: usize| {
-            let at = 84 + i * 50 + 12 + c * 12 + axis * 4;
-            f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
-        };
-        mesh.triangles.push([0, 1, 2].map(|c| {
-            let p = [0, 1, 2].map(|axis| corner(c, axis));
-            *known.entry(p.map(f32::to_bits)).or_insert_with(|| {
-                mesh.vertices.push(DVec3::from_array(p.map(f64::from)));
-                mesh.vertices.len() as u32 - 1
-            })
-        }));
-    }
-    mesh
-}
+use crate::support::cases::{Case, case_files, read_case};
+use crate::support::shared;
 
 fn percent(values: &[f64], below: f64) -> f64 {
     values.iter().filter(|v| **v <= below).count() as f64 / values.len() as f64 * 100.0
@@ -103,18 +31,13 @@ fn forty_known_grasps_with_spoilt_masks() {
         return;
     };
     let mut tools: Vec<Option<ToolModel>> = (0..12).map(|_| None).collect();
-    let mut names: Vec<_> = std::fs::read_dir(&folder)
-        .unwrap()
-        .map(|e| e.unwrap().path())
-        .filter(|p| p.extension().is_some_and(|e| e == "npz"))
-        .collect();
-    names.sort();
+    let names = case_files(&folder);
     assert_eq!(names.len(), 40);
     let mut build_ms = Vec::new();
     let cases: Vec<Case> = names.iter().map(|p| read_case(p)).collect();
     for case in &cases {
         tools[case.tool].get_or_insert_with(|| {
-            let mesh = read_stl(&folder.join(format!("tool_{:02}.stl", case.tool)));
+            let mesh = stl::read(&folder.join(format!("tool_{:02}.stl", case.tool))).unwrap().mesh;
             let begin = Instant::now();
             let tool = ToolModel::new(mesh).unwrap();
             build_ms.push(begin.elapsed().as_secs_f64() * 1e3);
@@ -181,4 +104,35 @@ fn forty_known_grasps_with_spoilt_masks() {
             assert!(s5 >= 50.0, "within 5 deg {s5} %");
         }
     }
+}
+
+#[test]
+fn the_labs_files_with_the_mask_from_the_cad_give_the_stored_angle() {
+    let Some(folder) = shared().map(|s| s.join("lab-sample")) else { return };
+    let dataset = Dataset::open(&folder).unwrap();
+    let mut seen = 0;
+    for (i, entry) in dataset.index.pairs.iter().enumerate() {
+        let sample = dataset.load(PairId(i as u32)).unwrap();
+        let truth = sample.grasp_from_object.unwrap();
+        let tool = ToolModel::new(dataset.tool_mesh(entry.tool.as_ref().unwrap()).unwrap().unwrap()).unwrap();
+        let masks: [Option<Mask>; 2] = Finger::BOTH.map(|finger| {
+            let bubble = sample.finger(finger)?.bubble.as_ref()?;
+            let camera = bubble.camera.as_ref()?;
+            let mask =
+                cad_signed_distance(&bubble.imprint, camera, &tool.distance, truth.inverse(), LAB_CAD_DISTANCE_M);
+            Some(mask.unwrap())
+        });
+        let fingers = fingers_of(&sample, [masks[0].as_ref(), masks[1].as_ref()]);
+        let pose = estimate(&fingers, &tool, Engine::DistanceField, false).unwrap();
+        let error = angle_error(pose.object_from_grasp.theta_rad, truth.inverse().theta_rad).to_degrees();
+        eprintln!(
+            "{}: {:.2} deg, error {error:.2} deg, {} points",
+            entry.name,
+            pose.object_from_grasp.theta_rad.to_degrees(),
+            pose.cloud.points.len()
+        );
+        assert!(error < 2.0, "{}: {error} deg", entry.name);
+        seen += 1;
+    }
+    assert_eq!(seen, 4);
 }

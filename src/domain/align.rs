@@ -149,6 +149,9 @@ pub enum Stop {
     /// The nearest points did not change, so no later iteration can change the pose.
     #[strum(to_string = "converged: the correspondences repeat")]
     FixedPoint,
+    /// The run came to where another one already was; its end is the other's.
+    #[strum(to_string = "met the run of another start")]
+    Merged,
     /// The number of iterations was used up while the pose still moved.
     #[strum(to_string = "stopped: iteration limit")]
     IterationLimit,

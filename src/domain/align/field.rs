@@ -11,7 +11,7 @@ use crate::domain::mesh::TriMesh;
 /// Cell size, metres.
 pub const CELL_M: f64 = 0.25e-3;
 /// Border around the silhouette, metres: the prior's shift plus what a scene adds before it counts as lost anyway.
-const MARGIN_M: f64 = 0.015;
+const MARGIN_M: f64 = 0.012;
 /// Sizes (longest side of the bounding box, metres) that a hand-held tool in metres can have.
 const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.004..=0.4;
 /// Factors to metres that are offered for a mesh whose size is not plausible: mm, cm, inch, µm, and "scaled twice".
@@ -95,7 +95,7 @@ impl DistanceField {
         let silhouette = [DVec2::new(low.y, low.z), DVec2::new(high.y, high.z)];
         let origin = silhouette[0] - MARGIN_M;
         let cells = ((silhouette[1] + MARGIN_M - origin) / CELL_M).ceil();
-        let mut raster = Raster { columns: cells.x as usize + 1, rows: cells.y as usize + 1, origin };
+        let raster = Raster { columns: cells.x as usize + 1, rows: cells.y as usize + 1, origin };
         let values = raster.signed_distance(&triangles);
         Ok(Self { columns: raster.columns, rows: raster.rows, origin, values, silhouette })
     }
@@ -177,47 +177,54 @@ struct Raster {
 }
 
 impl Raster {
-    fn signed_distance(&mut self, triangles: &[[DVec2; 3]]) -> Vec<f32> {
+    fn signed_distance(&self, triangles: &[[DVec2; 3]]) -> Vec<f32> {
         let triangles: Vec<[DVec2; 3]> =
             triangles.iter().map(|t| t.map(|p| (p - self.origin) * (1.0 / CELL_M))).collect();
         let inside = self.fill(&triangles);
 
         // Outside: the nearest edge of any triangle. Seeds next to the silhouette, then carried outwards.
-        let segments: Vec<[DVec2; 2]> = triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
-        let mut outside = Sweep::new(self.columns, self.rows, inside.iter().map(|i| !i).collect());
-        for (id, segment) in segments.iter().enumerate() {
-            outside.seed_along(id as u32, segment, &segments);
+        let segments: Vec<Segment> = triangles
+            .iter()
+            .flat_map(|&[a, b, c]| [Segment::new(a, b), Segment::new(b, c), Segment::new(c, a)])
+            .collect();
+        let mut outside = Sweep::new(self.columns, self.rows, inside.iter().map(|i| !i));
+        for id in 0..segments.len() {
+            outside.seed_along(id as u32, &segments);
         }
         outside.spread(&segments);
 
         // Inside: short pieces of the outline, each around the point that an outside cell found. They are used
         // instead of the edges because edges run on through the body where parts cross.
-        let mut pieces: Vec<[DVec2; 2]> = Vec::new();
-        let mut interior = Sweep::new(self.columns, self.rows, inside);
+        let mut pieces: Vec<Segment> = Vec::new();
+        let mut interior = Sweep::new(self.columns, self.rows, inside.iter().copied());
         for row in 0..self.rows {
             for column in 0..self.columns {
-                let at = row * self.columns + column;
-                if outside.owner[at] == NONE || outside.squared[at] > 2.3 {
+                let cell = outside.get(column, row);
+                if cell.owner == NONE || cell.squared > 2.3 {
                     continue;
                 }
                 let centre = DVec2::new(column as f64, row as f64);
-                let segment = &segments[outside.owner[at] as usize];
-                let foot = nearest_on_segment(segment, centre);
-                let away = (centre - foot).try_normalize().unwrap_or_else(|| (segment[1] - segment[0]).perp());
-                let along = away.try_normalize().unwrap_or(DVec2::X).perp() * 0.7;
-                pieces.push([foot - along, foot + along]);
+                let segment = &segments[cell.owner as usize];
+                let foot = segment.nearest(centre);
+                let away = (centre - foot).try_normalize().unwrap_or_else(|| segment.along.perp());
+                let half = away.try_normalize().unwrap_or(DVec2::X).perp() * 0.7;
+                pieces.push(Segment::new(foot - half, foot + half));
                 interior.seed_around(pieces.len() as u32 - 1, foot, &pieces);
             }
         }
         interior.spread(&pieces);
 
-        outside
-            .squared
-            .iter()
-            .zip(&interior.squared)
-            .zip(&interior.member)
-            .map(|((out, inn), inside)| (if *inside { -inn.sqrt() } else { out.sqrt() } * CELL_M) as f32)
-            .collect()
+        let mut values = Vec::with_capacity(inside.len());
+        for (i, inside) in inside.iter().enumerate() {
+            let (column, row) = (i % self.columns, i / self.columns);
+            let cells = if *inside {
+                -interior.get(column, row).squared.sqrt()
+            } else {
+                outside.get(column, row).squared.sqrt()
+            };
+            values.push((cells * CELL_M) as f32);
+        }
+        values
     }
 
     /// Which cell centres lie in or on a projected triangle.
@@ -258,100 +265,139 @@ impl Raster {
     }
 }
 
+/// A segment in cell units, prepared for many distance questions.
+#[derive(Clone, Copy)]
+struct Segment {
+    from: DVec2,
+    along: DVec2,
+    /// One over the squared length; 0 for a point.
+    scale: f64,
+}
+
+impl Segment {
+    fn new(from: DVec2, to: DVec2) -> Self {
+        let along = to - from;
+        let squared = along.length_squared();
+        Self { from, along, scale: if squared > 0.0 { 1.0 / squared } else { 0.0 } }
+    }
+
+    fn nearest(&self, p: DVec2) -> DVec2 {
+        self.from + self.along * ((p - self.from).dot(self.along) * self.scale).clamp(0.0, 1.0)
+    }
+}
+
 /// Nearest-segment transform: every member cell learns its nearest segment by asking its neighbours for theirs.
+///
+/// The grid has a border of one cell that never takes part, so that neighbours need no bounds check.
 struct Sweep {
     columns: usize,
     rows: usize,
-    /// Cells that take part.
-    member: Vec<bool>,
-    /// Squared distance in cells.
-    squared: Vec<f64>,
-    owner: Vec<u32>,
+    /// Cells from one row to the next.
+    stride: usize,
+    cells: Vec<SweepCell>,
+}
+
+#[derive(Clone, Copy)]
+struct SweepCell {
+    /// Squared distance in cells; negative for cells that do not take part, so that nothing is nearer.
+    squared: f64,
+    owner: u32,
 }
 
 impl Sweep {
-    fn new(columns: usize, rows: usize, member: Vec<bool>) -> Self {
-        let count = columns * rows;
-        Self { columns, rows, member, squared: vec![f64::INFINITY; count], owner: vec![NONE; count] }
+    /// `member` says row by row which cells take part.
+    fn new(columns: usize, rows: usize, member: impl Iterator<Item = bool>) -> Self {
+        let stride = columns + 2;
+        let mut cells = vec![SweepCell { squared: -1.0, owner: NONE }; stride * (rows + 2)];
+        for (i, _) in member.enumerate().filter(|(_, takes_part)| *takes_part) {
+            cells[(i / columns + 1) * stride + i % columns + 1].squared = f64::INFINITY;
+        }
+        Self { columns, rows, stride, cells }
     }
 
-    fn offer(&mut self, column: usize, row: usize, id: u32, segments: &[[DVec2; 2]]) {
-        let at = row * self.columns + column;
-        if self.member[at] && self.owner[at] != id {
-            let centre = DVec2::new(column as f64, row as f64);
-            let squared = (nearest_on_segment(&segments[id as usize], centre) - centre).length_squared();
-            if squared < self.squared[at] {
-                self.squared[at] = squared;
-                self.owner[at] = id;
-            }
+    fn get(&self, column: usize, row: usize) -> SweepCell {
+        self.cells[(row + 1) * self.stride + column + 1]
+    }
+
+    #[inline]
+    fn offer(&mut self, at: usize, centre: DVec2, id: u32, segments: &[Segment]) {
+        let squared = (segments[id as usize].nearest(centre) - centre).length_squared();
+        let cell = &mut self.cells[at];
+        if squared < cell.squared {
+            *cell = SweepCell { squared, owner: id };
         }
     }
 
-    /// Offers a segment to the cells around a point.
-    fn seed_around(&mut self, id: u32, point: DVec2, segments: &[[DVec2; 2]]) {
+    /// Offers a segment to the cells around a point of the grid.
+    fn seed_around(&mut self, id: u32, point: DVec2, segments: &[Segment]) {
         let (column, row) = (point.x.round() as usize, point.y.round() as usize);
         for r in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
             for c in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
-                self.offer(c, r, id, segments);
+                let at = (r + 1) * self.stride + c + 1;
+                if self.cells[at].squared > 0.0 {
+                    self.offer(at, DVec2::new(c as f64, r as f64), id, segments);
+                }
             }
         }
     }
 
     /// Offers a segment to the cells along it.
-    fn seed_along(&mut self, id: u32, segment: &[DVec2; 2], segments: &[[DVec2; 2]]) {
-        let steps = (segment[0].distance(segment[1]) * 1.5).ceil().max(1.0);
+    fn seed_along(&mut self, id: u32, segments: &[Segment]) {
+        let Segment { from, along, .. } = segments[id as usize];
+        let steps = (along.length() * 0.8).ceil().max(1.0);
         for i in 0..=steps as usize {
-            let point = segment[0].lerp(segment[1], i as f64 / steps);
-            self.seed_around(id, point, segments);
+            self.seed_around(id, from + along * (i as f64 / steps), segments);
         }
     }
 
-    /// Two passes over the grid, each asking the four neighbours that were visited before, there and back in a row.
-    fn spread(&mut self, segments: &[[DVec2; 2]]) {
+    /// Two passes over the grid, each asking the neighbours that were visited before, there and back in a row.
+    fn spread(&mut self, segments: &[Segment]) {
+        let s = self.stride;
         for row in 0..self.rows {
+            let start = (row + 1) * s + 1;
             for column in 0..self.columns {
-                self.ask(column, row, [(-1, 0), (-1, -1), (0, -1), (1, -1)], segments);
+                let at = start + column;
+                self.ask(at, column, row, [at - 1, at - s - 1, at - s, at - s + 1], segments);
             }
             for column in (0..self.columns).rev() {
-                self.ask(column, row, [(1, 0), (1, 0), (1, 0), (1, 0)], segments);
+                self.ask(start + column, column, row, [start + column + 1], segments);
             }
         }
         for row in (0..self.rows).rev() {
+            let start = (row + 1) * s + 1;
             for column in (0..self.columns).rev() {
-                self.ask(column, row, [(1, 0), (1, 1), (0, 1), (-1, 1)], segments);
+                let at = start + column;
+                self.ask(at, column, row, [at + 1, at + s + 1, at + s, at + s - 1], segments);
             }
             for column in 0..self.columns {
-                self.ask(column, row, [(-1, 0), (-1, 0), (-1, 0), (-1, 0)], segments);
+                self.ask(start + column, column, row, [start + column - 1], segments);
             }
         }
     }
 
-    fn ask(&mut self, column: usize, row: usize, neighbours: [(isize, isize); 4], segments: &[[DVec2; 2]]) {
-        let mut last = NONE;
-        for (dx, dy) in neighbours {
-            let (Some(c), Some(r)) = (column.checked_add_signed(dx), row.checked_add_signed(dy)) else {
-                continue;
-            };
-            if c >= self.columns || r >= self.rows {
-                continue;
-            }
-            let id = self.owner[r * self.columns + c];
-            // Neighbours mostly agree: ask about each segment once.
-            if id != NONE && id != last {
+    #[inline]
+    fn ask<const N: usize>(
+        &mut self,
+        at: usize,
+        column: usize,
+        row: usize,
+        neighbours: [usize; N],
+        segments: &[Segment],
+    ) {
+        let cell = self.cells[at];
+        if cell.squared <= 0.0 {
+            return;
+        }
+        // Neighbours mostly agree with each other and with the cell: ask about each segment once.
+        let (own, mut last) = (cell.owner, NONE);
+        for neighbour in neighbours {
+            let id = self.cells[neighbour].owner;
+            if id != NONE && id != last && id != own {
                 last = id;
-                self.offer(column, row, id, segments);
+                self.offer(at, DVec2::new(column as f64, row as f64), id, segments);
             }
         }
     }
-}
-
-fn nearest_on_segment([a, b]: &[DVec2; 2], p: DVec2) -> DVec2 {
-    let along = *b - *a;
-    let squared = along.length_squared();
-    if squared <= 0.0 {
-        return *a;
-    }
-    *a + along * ((p - *a).dot(along) / squared).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]

@@ -52,39 +52,32 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
         return Err(AlignError::NoOverlap { share: reach });
     }
 
-    let mut ends: Vec<End> = Vec::with_capacity(states.len());
-    for (run, state) in states.into_iter().enumerate() {
-        let mut end = End { state, cost: f64::INFINITY, iterations: 0, stop: Stop::IterationLimit };
-        for kernel in &config.kernels_m {
-            end = search.descend(run, &scouts, end, *kernel, STEP_COARSE_M);
+    // All starts go through the kernels side by side, so that runs that meet go on as one.
+    let mut runs: Vec<Progress> = states.into_iter().map(Progress::new).collect();
+    for kernel in &config.kernels_m {
+        for run in 0..runs.len() {
+            if runs[run].merged_into.is_none() {
+                search.descend(run, &mut runs[run], &scouts, *kernel, STEP_COARSE_M);
+            }
         }
-        ends.push(end);
+        merge_met(&mut runs);
     }
-    // The few best are refined with all points; runs that met are refined once.
-    let mut order: Vec<usize> = (0..ends.len()).collect();
-    order.sort_by(|&a, &b| ends[a].cost.total_cmp(&ends[b].cost));
-    let mut refined: Vec<usize> = Vec::new();
-    for run in order {
-        if refined.len() >= config.keep {
-            break;
-        }
-        if refined.iter().any(|&r| ends[r].state.is_near(&ends[run].state)) {
-            continue;
-        }
-        ends[run] = search.descend(run, &chosen, ends[run], final_kernel, STEP_FINE_M);
-        refined.push(run);
+    // The few best are refined with all points.
+    let mut order: Vec<usize> = (0..runs.len()).filter(|&r| runs[r].merged_into.is_none()).collect();
+    order.sort_by(|&a, &b| runs[a].cost.total_cmp(&runs[b].cost));
+    let (refined, rest) = order.split_at(config.keep.min(order.len()));
+    for &run in refined {
+        search.descend(run, &mut runs[run], &chosen, final_kernel, STEP_FINE_M);
     }
-    let winner = refined.into_iter().min_by(|&a, &b| ends[a].cost.total_cmp(&ends[b].cost)).unwrap_or(0);
-    // Costs of the runs that were not refined come from fewer points; bring all to the same points.
-    for (run, end) in ends.iter_mut().enumerate() {
-        if run != winner {
-            end.cost = search.normal_equations(&chosen, end.state, final_kernel).cost / chosen.len() as f64;
-        }
+    // The others only get their cost, with the same points, so that all are comparable.
+    for &run in rest {
+        runs[run].cost = search.normal_equations(&chosen, runs[run].state, final_kernel).cost / chosen.len() as f64;
     }
-
-    let best = ends[winner];
-    let last = search.normal_equations(&chosen, best.state, final_kernel);
-    let inlier_share = last.inliers as f64 / chosen.len() as f64;
+    let cheapest =
+        |candidates: &[usize]| candidates.iter().copied().min_by(|&a, &b| runs[a].cost.total_cmp(&runs[b].cost));
+    let winner = cheapest(refined).unwrap_or(0);
+    let best = &runs[winner];
+    let inlier_share = best.inliers as f64 / chosen.len() as f64;
     if inlier_share < MIN_SHARE {
         return Err(AlignError::NoOverlap { share: inlier_share });
     }
@@ -96,25 +89,28 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
         converged: best.stop.converged(),
         stop: best.stop,
         start: config.starts[winner],
-        runs: ends
+        runs: runs
             .iter()
             .zip(&config.starts)
-            .map(|(end, start)| Run {
-                start: *start,
-                end: end.state.to_pose(c),
-                cost_m2: end.cost,
-                iterations: end.iterations,
-                stop: end.stop,
+            .map(|(run, start)| {
+                let last = run.merged_into.map_or(run, |other| &runs[other]);
+                Run {
+                    start: *start,
+                    end: last.state.to_pose(c),
+                    cost_m2: last.cost,
+                    iterations: run.iterations,
+                    stop: run.stop,
+                }
             })
             .collect(),
         winner,
-        iterations: ends.iter().map(|e| e.iterations).sum(),
+        iterations: runs.iter().map(|r| r.iterations).sum(),
         lookups: search.lookups,
         offered: points_yz.len(),
         not_finite: cleaned.not_finite,
         used: chosen.len(),
         inlier_share,
-        inlier_rms_m: (last.inlier_squares / (last.inliers as f64).max(1.0)).sqrt(),
+        inlier_rms_m: (best.inlier_squares / (best.inliers as f64).max(1.0)).sqrt(),
         within_prior: config.prior.allows(pose),
         observability: Some(observability(&absolute, field, pose)),
         trace: search.trace,
@@ -174,14 +170,50 @@ impl State {
     }
 }
 
-/// Where a descent stands.
+/// Where the run from one start stands.
 #[derive(Clone, Copy, Debug)]
-struct End {
+struct Progress {
     state: State,
-    /// Per point, square metres.
+    /// Per point, square metres; of the kernel and the points that were used last.
     cost: f64,
+    inliers: usize,
+    inlier_squares: f64,
     iterations: usize,
     stop: Stop,
+    /// The run that goes on for this one; itself not merged.
+    merged_into: Option<usize>,
+}
+
+impl Progress {
+    fn new(state: State) -> Self {
+        Self {
+            state,
+            cost: f64::INFINITY,
+            inliers: 0,
+            inlier_squares: 0.0,
+            iterations: 0,
+            stop: Stop::IterationLimit,
+            merged_into: None,
+        }
+    }
+}
+
+/// Lets only the cheapest of runs that stand in the same place go on.
+fn merge_met(runs: &mut [Progress]) {
+    let mut order: Vec<usize> = (0..runs.len()).filter(|&r| runs[r].merged_into.is_none()).collect();
+    order.sort_by(|&a, &b| runs[a].cost.total_cmp(&runs[b].cost));
+    let mut alive: Vec<usize> = Vec::with_capacity(order.len());
+    for run in order {
+        if let Some(&other) = alive.iter().find(|&&a| runs[a].state.is_near(&runs[run].state)) {
+            runs[run].stop = Stop::Merged;
+            runs[run].merged_into = Some(other);
+            for earlier in runs.iter_mut().filter(|r| r.merged_into == Some(run)) {
+                earlier.merged_into = Some(other);
+            }
+        } else {
+            alive.push(run);
+        }
+    }
 }
 
 /// Sums over the points at one state.
@@ -258,51 +290,47 @@ impl Search<'_> {
     ///
     /// The damping is the same in all directions, so that a direction without slope (a rod along itself) gets no
     /// step at all instead of an arbitrary one.
-    fn descend(&mut self, run: usize, points: &[DVec2], from: End, kernel: f64, small: f64) -> End {
-        let count = points.len() as f64;
-        let mut end = from;
-        let mut here = self.normal_equations(points, end.state, kernel);
-        self.note(run, &end, &here, kernel, points.len());
+    fn descend(&mut self, run: usize, at: &mut Progress, points: &[DVec2], kernel: f64, small: f64) {
+        let mut here = self.normal_equations(points, at.state, kernel);
+        self.note(run, at, &here, kernel, points.len());
         let mut damping = DAMPING_START;
-        end.stop = Stop::IterationLimit;
-        let mut tries = 0;
-        while tries < self.max {
-            tries += 1;
+        at.stop = Stop::IterationLimit;
+        for _ in 0..self.max {
             let Some(step) = solve(&here, damping * here.weight.max(1e-12)) else {
                 damping *= 10.0;
                 continue;
             };
-            let length = step[0].abs().max(step[1].hypot(step[2]));
-            if length < small {
-                end.stop = Stop::SmallStep;
+            if step[0].abs().max(step[1].hypot(step[2])) < small {
+                at.stop = Stop::SmallStep;
                 break;
             }
-            let state = end.state.moved(step);
+            let state = at.state.moved(step);
             let there = self.normal_equations(points, state, kernel);
             if there.cost < here.cost {
-                end.state = state;
-                end.iterations += 1;
+                at.state = state;
+                at.iterations += 1;
                 here = there;
                 damping = (damping * 0.1).max(1e-6);
-                self.note(run, &end, &here, kernel, points.len());
+                self.note(run, at, &here, kernel, points.len());
             } else {
                 damping *= 10.0;
                 if damping > DAMPING_MAX {
-                    end.stop = Stop::NoDescent;
+                    at.stop = Stop::NoDescent;
                     break;
                 }
             }
         }
-        end.cost = here.cost / count;
-        end
+        at.cost = here.cost / points.len() as f64;
+        at.inliers = here.inliers;
+        at.inlier_squares = here.inlier_squares;
     }
 
-    fn note(&mut self, run: usize, end: &End, n: &Normal, kernel_m: f64, points: usize) {
+    fn note(&mut self, run: usize, at: &Progress, n: &Normal, kernel_m: f64, points: usize) {
         if self.record {
             self.trace.push(TraceStep {
                 run,
-                iteration: end.iterations,
-                grasp_from_object: end.state.to_pose(self.centroid),
+                iteration: at.iterations,
+                grasp_from_object: at.state.to_pose(self.centroid),
                 cost_m2: n.cost / points as f64,
                 inlier_share: n.inliers as f64 / points as f64,
                 kernel_m,

