@@ -1,7 +1,7 @@
 //! numpy's `.npz`: a zip of arrays.
 
 use std::collections::BTreeMap;
-use std::io::Read as _;
+use std::io::{Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use npyz::{NpyFile, Order, TypeChar, WriterBuilder as _};
@@ -48,9 +48,12 @@ pub enum NpzError {
 pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
     let shape = [image.height() as u64, image.width() as u64];
     atomic::write(file, |out| {
-        let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(out).begin_nd()?;
+        // Buffered: the writer hands over value by value.
+        let mut bytes = Vec::with_capacity(128 + 4 * image.len());
+        let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
         writer.extend(image.as_slice())?;
-        writer.finish()
+        writer.finish()?;
+        out.write_all(&bytes)
     })
     .map_err(|source| NpzError::Io { file: file.to_owned(), source })
 }
@@ -146,7 +149,6 @@ fn row_major(shape: &[usize], values: Values) -> Values {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::Write as _;
 
     /// A version 1.0 header and the data.
     fn npy(descr: &str, fortran: &str, shape: &str, data: &[u8]) -> Vec<u8> {
@@ -194,6 +196,18 @@ mod tests {
         assert_eq!(arrays["big"].values, Values::I64(vec![256]));
         assert_eq!(arrays["flag"].values, Values::U8(vec![1, 0]));
         assert_eq!(arrays.len(), 5);
+    }
+
+    #[test]
+    fn a_written_image_is_an_array() {
+        let dir = tempfile::tempdir().unwrap();
+        for width in [1, 7, 64] {
+            let image = Grid::from_fn(width, 3, |x, y| x as f32 - 0.1 * y as f32);
+            let path = dir.path().join("i.npy");
+            write_npy(&path, &image).unwrap();
+            let read = array(&std::fs::read(&path).unwrap()).unwrap();
+            assert_eq!(read, Tensor::f32(&[3, width], image.into_vec()));
+        }
     }
 
     #[test]

@@ -191,6 +191,29 @@ fn picture_folders() {
 }
 
 #[test]
+fn the_demo_renders_what_is_asked_for() {
+    let demo = Dataset::demo();
+    let pairs = demo.index.pairs.len();
+    assert_eq!((demo.kind, demo.index.pairs.len(), demo.index.tools().len()), (SourceKind::Demo, pairs, 12));
+    assert!(demo.problems.is_empty() && demo.root.is_none());
+    let mut seen: Vec<&str> = names(&demo);
+    seen.sort();
+    seen.dedup();
+    assert!(seen.len() == pairs && pairs >= 12 * 20);
+    let (a, again, b) = (demo.load(PairId(3)).unwrap(), demo.load(PairId(3)).unwrap(), demo.load(PairId(4)).unwrap());
+    let imprint = |s: &touch2touch::domain::sample::Sample| {
+        let map = &s.finger(Finger::Left).unwrap().bubble.as_ref().unwrap().imprint;
+        map.as_slice().iter().map(|v| v.to_bits()).collect::<Vec<u32>>()
+    };
+    assert_eq!(imprint(&a), imprint(&again));
+    assert_ne!(imprint(&a), imprint(&b));
+    for tool in demo.index.tools() {
+        assert!(demo.tool_mesh(&tool).unwrap().unwrap().is_watertight(), "{tool}");
+    }
+    assert!(demo.load(PairId(pairs as u32)).is_err());
+}
+
+#[test]
 fn what_is_no_dataset_says_what_would_be() {
     let dir = tempfile::tempdir().unwrap();
     let err = Dataset::open(dir.path()).unwrap_err();

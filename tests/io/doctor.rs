@@ -3,12 +3,15 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Grid;
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::sample::Sample;
 use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::sim;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::doctor::{DoctorReport, examine};
+use touch2touch::io::pt::read_text_lists;
 use touch2touch::io::simulated::{Layout, WriteError, write_pair, write_tools};
 
 use super::touch;
@@ -120,4 +123,23 @@ fn the_reference_sets_are_healthy() {
     let lab = doctor(&shared.join("lab-sample"));
     assert_eq!((lab.pairs, lab.problems.len()), (4, 4), "{:#?}", lab.problems);
     assert!(lab.problems.iter().all(|p| p.what.contains("mirrored camera frame")));
+}
+
+#[test]
+fn what_the_simulator_writes_is_healthy() {
+    let dir = tempfile::tempdir().unwrap();
+    let demo = Dataset::demo();
+    let tools: Vec<_> = sim::tools().iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
+    write_tools(dir.path(), &tools).unwrap();
+    for i in [0, 120, 250] {
+        let pair = demo.index.get(PairId(i)).unwrap();
+        let sample = demo.load(PairId(i)).unwrap();
+        write_pair(dir.path(), Layout::Test, pair.tool.as_deref().unwrap(), pair.number, &sample).unwrap();
+    }
+    let lists = read_text_lists(&dir.path().join("tools.pt")).unwrap();
+    assert_eq!((lists[0].1.len(), lists[1].1.len()), (3, 9));
+    let report = doctor(dir.path());
+    // Dropped pixels are the camera's, and summed up in one entry; nothing else may be odd.
+    let odd: Vec<_> = report.problems.iter().filter(|p| !p.what.contains("without measurement")).collect();
+    assert!(report.pairs == 3 && odd.is_empty() && report.problems.len() <= 1, "{odd:#?}");
 }
