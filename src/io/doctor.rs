@@ -46,8 +46,7 @@ pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> Cont
         return report;
     }
     for batch in ids.chunks(BATCH) {
-        let found: Vec<(Vec<Problem>, Option<(usize, usize)>)> =
-            batch.par_iter().map(|&id| pair_problems(dataset, id)).collect();
+        let found: Vec<_> = batch.par_iter().map(|&id| pair_problems(dataset, id)).collect();
         for (id, (problems, invalid)) in batch.iter().zip(found) {
             report.problems.extend(problems);
             if let Some((count, pixels)) = invalid {

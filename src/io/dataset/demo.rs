@@ -7,7 +7,7 @@ use crate::domain::sample::Sample;
 use crate::domain::sim::{self, SimConfig};
 
 /// Grasps of each tool.
-pub const GRASPS_PER_TOOL: u64 = 24;
+const GRASPS_PER_TOOL: u64 = 24;
 
 /// The demo's pairs; unseen tools are of [`Split::Test`].
 pub(super) fn pairs() -> Vec<PairEntry> {
