@@ -85,6 +85,11 @@ impl Dialogs {
         }
     }
 
+    /// Whether the path box is open.
+    pub(super) fn is_path_box_open(&self) -> bool {
+        self.path_box.is_some()
+    }
+
     /// Shows the path box.
     pub(super) fn type_path(&mut self, purpose: Purpose, why: &'static str) {
         self.path_box = Some(PathBox { purpose, text: String::new(), why, fresh: true });

@@ -24,8 +24,10 @@ fn is_shifted_symbol(key: Key) -> bool {
 }
 
 /// The actions whose shortcut was pressed in this frame. Keys without Ctrl are a text's while text is being typed.
-pub(super) fn pressed(ctx: &egui::Context) -> Vec<Action> {
-    let typing = ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx);
+///
+/// While something covers the panes (`covered`) they are its own: Escape closes it and nothing else.
+pub(super) fn pressed(ctx: &egui::Context, covered: bool) -> Vec<Action> {
+    let typing = covered || ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx);
     let mut actions = Vec::new();
     ctx.input_mut(|input| {
         // The most specific first: Ctrl + Shift + Z is not Ctrl + Z.
@@ -147,7 +149,7 @@ mod tests {
         let mut raw = egui::RawInput::default();
         raw.events.push(egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers });
         let mut got = Vec::new();
-        let _ = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx())));
+        let _ = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), false)));
         got
     }
 
