@@ -347,9 +347,8 @@ impl eframe::App for StudioApp {
                 device: self.device.as_ref().map_err(String::as_str),
                 p: palette_colors,
             };
-            let covered = cx.state.selection.palette
-                || cx.state.selection.shortcut_sheet
-                || cx.local.dialogs.is_path_box_open();
+            let covered =
+                cx.state.selection.palette || cx.state.selection.shortcut_sheet || cx.local.dialogs.is_path_box_open();
             for action in shortcuts::pressed(&ctx, covered) {
                 if action == crate::app::action::Action::CancelJobs && cx.local.maximised.take().is_some() {
                     continue;

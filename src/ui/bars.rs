@@ -125,8 +125,11 @@ pub(super) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
                 engine(cx, ui);
                 jobs(cx, ui);
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                    let text = cx.local.readout.clone().unwrap_or_default();
-                    let label = egui::Label::new(RichText::new(text).size(12.0).color(cx.p.text)).truncate();
+                    let (text, color) = match &cx.local.readout {
+                        Some(text) => (text.clone(), cx.p.text),
+                        None => (cx.state.pair_name().to_owned(), cx.p.weak),
+                    };
+                    let label = egui::Label::new(RichText::new(text).size(12.0).color(color)).truncate();
                     ui.add(label);
                 });
             });
@@ -196,7 +199,8 @@ fn engine(cx: &Cx<'_>, ui: &mut Ui) {
 
 /// Three lines on the first start; gone for good when dismissed.
 pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
-    if cx.state.settings.hint_dismissed || cx.state.library.open.is_none() {
+    let demo = cx.state.library.open.as_ref().is_some_and(|open| open.place == Place::Demo);
+    if cx.state.settings.hint_dismissed || !demo {
         return;
     }
     let area = egui::Area::new(egui::Id::unique("hint")).anchor(egui::Align2::CENTER_BOTTOM, vec2(0.0, -44.0));

@@ -91,7 +91,7 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 4.0;
         let sort_width = 74.0;
         let edit = egui::TextEdit::singleline(&mut cx.local.filter)
-            .hint_text("Filter: rod  is:todo")
+            .hint_text("Filter")
             .desired_width(ui.available_width() - sort_width - 12.0);
         let response = ui.add(edit).accessible_name("Filter samples");
         if std::mem::take(&mut cx.local.focus_filter) {

@@ -87,15 +87,7 @@ pub(super) struct SceneCloud {
     /// Counts up with every new cloud.
     pub revision: u64,
     /// Per finger: the membrane and the contact.
-    pub fingers: [Option<[ScenePoints; 2]>; 2],
-}
-
-/// Some points of a finger.
-pub(super) struct ScenePoints {
-    /// Positions, metres, grasp frame.
-    pub points: Arc<[DVec3]>,
-    /// The index of each in the finger's cloud, ascending.
-    pub indices: Vec<usize>,
+    pub fingers: [Option<[Arc<[DVec3]>; 2]>; 2],
 }
 
 /// A CAD model as the renderer takes it.

@@ -434,7 +434,8 @@ fn paint_mask(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: ImprintSo
     }
     let Ok(in_force) = cx.state.mask_in_force(source, finger) else { return };
     let key: (&MaskVersion, _) = (&in_force.version, cx.state.imprint_key(source, finger).ok());
-    if !settings.mask_outline {
+    // Where nobody paints the data itself is what counts: the outline says enough.
+    if !settings.mask_outline && cx.local.visible.contains(&Pane::Masks) {
         let mask = in_force.mask;
         let slot = ("mask", source, finger);
         let picture = cx.local.textures.get(ui.ctx(), slot, &key, true, || (mask_image(mask, Color32::WHITE), None));

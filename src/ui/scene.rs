@@ -5,11 +5,12 @@ use std::sync::Arc;
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, Ui, pos2, vec2};
 use glam::{DAffine3, DVec3};
 
-use super::cx::{Cx, SceneCloud, SceneMesh, ScenePoints, side_color};
+use super::cx::{Cx, SceneCloud, SceneMesh, side_color};
 use super::images::{self, CONTACT};
 use super::scene_view::SceneOutput;
 use super::theme::Palette;
 use super::widget::empty;
+use crate::app::action::Action;
 use crate::app::command::{CameraPreset, Command, Hover};
 use crate::app::keys::ImprintSource;
 use crate::app::results::{Clouds, FingerCloud, PoseResult};
@@ -97,7 +98,9 @@ fn update_cloud(cx: &mut Cx<'_>, source: ImprintSource, key: crate::app::keys::C
     }
     let part = |f: &FingerCloud, contact: bool| {
         let indices: Vec<usize> = (0..f.points.len()).filter(|i| f.contact.get(*i) == Some(&contact)).collect();
-        ScenePoints { points: indices.iter().map(|i| f.points[*i]).collect(), indices }
+        // The membrane only has to be seen, and seen through: every other pixel of every other row.
+        let kept = |i: &usize| contact || f.pixels.get(*i).is_some_and(|p| p[0] % 2 == 0 && p[1] % 2 == 0);
+        indices.into_iter().filter(kept).filter_map(|i| f.points.get(i).copied()).collect::<Arc<[DVec3]>>()
     };
     let convert = |f: &FingerCloud| [part(f, false), part(f, true)];
     cx.local.revision += 1;
@@ -121,32 +124,37 @@ fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {
     let mut scene = SceneData { background: rgb(cx.p.canvas), ..SceneData::default() };
     let hover = state.selection.hover;
     if let Some(cloud) = &cx.local.scene_clouds[source as usize] {
-        let clouds = state.cloud(source).ready();
         for finger in Finger::BOTH {
             let Some(parts) = &cloud.fingers[finger.index()] else { continue };
-            let selected = hover.filter(|h| h.finger == finger).and_then(|h| {
-                let (x, y) = (h.at_px[0].round().max(0.0) as usize, h.at_px[1].round().max(0.0) as usize);
-                clouds?.finger(finger)?.at_pixel(x, y)
-            });
             // The membrane recedes, the contact stands out.
             let rest = super::theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
-            let looks = [(PointSize::Px(1.6), rest, "membrane"), (PointSize::Metres(0.000_45), CONTACT, "contact")];
+            let looks = [(PointSize::Px(1.6), rest, "membrane"), (PointSize::Metres(0.000_35), CONTACT, "contact")];
             for (part, (size, color, name)) in parts.iter().zip(looks) {
                 scene.clouds.push(CloudItem {
                     name: format!("{name} {}", finger.name()),
                     revision: cloud.revision,
-                    points: part.points.clone(),
+                    points: part.clone(),
                     colors: PointColors::One,
-                    style: CloudStyle {
-                        color: rgb(color),
-                        size,
-                        selected: selected.and_then(|i| part.indices.binary_search(&i).ok()),
-                        highlight: rgb(cx.p.strong),
-                        ..CloudStyle::default()
-                    },
+                    style: CloudStyle { color: rgb(color), size, ..CloudStyle::default() },
                 });
             }
         }
+    }
+    // The pixel under the pointer, as a point of its own: it must not drown among the others.
+    let pointed = hover.and_then(|h| {
+        let cloud = state.cloud(source).ready()?.finger(h.finger)?;
+        let (x, y) = (h.at_px[0].round().max(0.0) as usize, h.at_px[1].round().max(0.0) as usize);
+        cloud.points.get(cloud.at_pixel(x, y)?).copied()
+    });
+    if let Some(point) = pointed {
+        let bits = point.to_array().map(f64::to_bits);
+        scene.clouds.push(CloudItem {
+            name: "pointer".into(),
+            revision: bits[0] ^ bits[1].rotate_left(21) ^ bits[2].rotate_left(42),
+            points: [point].into(),
+            colors: PointColors::One,
+            style: CloudStyle { color: rgb(cx.p.strong), size: PointSize::Px(9.0), ..CloudStyle::default() },
+        });
     }
     let tool_now = state.tool().ready().map(|t| t.name.as_str());
     if let Some(mesh) = cx.local.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) {
@@ -287,6 +295,36 @@ fn overlay(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, output: &SceneOu
         Lookup::Absent(absent) => write(format!("No pose: {}", lower_first(absent)), 12.0, cx.p.weak),
     }
     legend(cx, ui, source, rect);
+    sides(cx, ui, source, rect);
+}
+
+/// Buttons that turn the view, at the right edge.
+fn sides(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
+    let place =
+        Rect::from_min_max(pos2(rect.right() - 28.0, rect.top() + 52.0), pos2(rect.right() - 4.0, rect.bottom()));
+    if place.height() < 160.0 {
+        return;
+    }
+    let builder = egui::UiBuilder::new().max_rect(place).id_salt(("sides", source as usize));
+    ui.scope_builder(builder, |ui| {
+        ui.spacing_mut().item_spacing.y = 2.0;
+        let side = if source == ImprintSource::Measured { "measured" } else { "predicted" };
+        for action in [Action::CameraLeft, Action::CameraRight, Action::CameraFront, Action::CameraTop, Action::Fit] {
+            let letter = match action {
+                Action::CameraLeft => "L",
+                Action::CameraRight => "R",
+                Action::CameraFront => "F",
+                Action::CameraTop => "T",
+                _ => "0",
+            };
+            let text = egui::RichText::new(letter).size(11.0).color(cx.p.weak);
+            let button = ui.add(egui::Button::new(text).min_size(vec2(22.0, 18.0)).fill(cx.p.panel));
+            let button = button.accessible_name(format!("{}, {side}", action.name()));
+            if button.on_hover_text(action.help()).clicked() {
+                cx.act(action);
+            }
+        }
+    });
 }
 
 fn lower_first(absent: Absent) -> String {

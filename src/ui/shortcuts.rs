@@ -86,7 +86,7 @@ pub(super) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context) {
             });
         });
         ui.add_space(4.0);
-        egui::ScrollArea::vertical().max_height(size.y - 160.0).show(ui, |ui| {
+        egui::ScrollArea::vertical().max_height(size.y - 160.0).min_scrolled_height(size.y - 160.0).show(ui, |ui| {
             // Filled column by column, about equally long.
             let groups: Vec<Group> = Group::iter().collect();
             let rows = |g: &Group| g.actions().count() + 2;
@@ -94,7 +94,7 @@ pub(super) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context) {
             let mut parts: Vec<Vec<Group>> = vec![Vec::new(); columns];
             let mut filled = 0;
             for group in groups {
-                let column = (filled * columns / total.max(1)).min(columns - 1);
+                let column = ((filled + rows(&group) / 2) * columns / total.max(1)).min(columns - 1);
                 filled += rows(&group);
                 parts[column].push(group);
             }

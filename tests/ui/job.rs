@@ -139,7 +139,10 @@ fn browse_generate_shift_paint_undo() {
     assert_eq!(rig.stored(&pair, Finger::Right), Some(painted), "undo changes the file too");
     rig.key(Modifiers::CTRL, Key::Z);
     assert_eq!(area(&rig), automatic);
-    assert_eq!(rig.harness.state().state().pose(ImprintSource::Measured).ready().unwrap().num_points, before.num_points);
+    assert_eq!(
+        rig.harness.state().state().pose(ImprintSource::Measured).ready().unwrap().num_points,
+        before.num_points
+    );
     rig.key(Modifiers::CTRL | Modifiers::SHIFT, Key::Z);
     assert_eq!(area(&rig), painted);
 

@@ -1,7 +1,9 @@
 //! Nothing to see is an error, and pictures for people.
 
 use touch2touch::app::command::Command;
+use touch2touch::app::library::Place;
 use touch2touch::app::settings::{Theme, Workspace};
+use touch2touch::domain::dataset::PairId;
 
 use super::rig::Rig;
 
@@ -21,6 +23,44 @@ fn every_workspace_draws_in_both_themes() {
             colors.sort_unstable();
             colors.dedup();
             assert!(colors.len() > 500, "{workspace:?} {theme:?}: {} colours", colors.len());
+        }
+    }
+}
+
+/// Pictures for the README and for looking at: only where a folder for them is given. With the shipped models.
+///
+/// `TOUCH2TOUCH_SCREENSHOTS` is the folder, `TOUCH2TOUCH_REAL_PAIRS` a folder of image pairs to show as well.
+#[test]
+fn pictures_for_the_docs() {
+    if std::env::var_os("TOUCH2TOUCH_SCREENSHOTS").is_none() {
+        return;
+    }
+    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
+        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
+        rig.shoot(&format!("{name}-first-start"));
+        rig.send(Command::DismissHint);
+        rig.send(Command::Select(PairId(30)));
+        rig.send(Command::Generate);
+        rig.shoot(&format!("{name}-demo-inspect"));
+        rig.send(Command::SetWorkspace(Workspace::Align));
+        rig.shoot(&format!("{name}-demo-align"));
+        rig.send(Command::SetWorkspace(Workspace::Label));
+        rig.shoot(&format!("{name}-demo-label"));
+        rig.send(Command::SetWorkspace(Workspace::Evaluate));
+        for _ in 0..5 {
+            rig.send(Command::Step(7));
+            rig.send(Command::Generate);
+        }
+        rig.shoot(&format!("{name}-demo-evaluate"));
+        rig.send(Command::SetTheme(Theme::Light));
+        rig.send(Command::SetWorkspace(Workspace::Inspect));
+        rig.shoot(&format!("{name}-demo-light"));
+        rig.send(Command::SetTheme(Theme::Dark));
+        if let Some(pairs) = std::env::var_os("TOUCH2TOUCH_REAL_PAIRS") {
+            rig.send(Command::Open(Place::Path(pairs.into())));
+            rig.send(Command::Select(PairId(7)));
+            rig.send(Command::Generate);
+            rig.shoot(&format!("{name}-pairs-inspect"));
         }
     }
 }

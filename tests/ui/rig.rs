@@ -148,9 +148,28 @@ impl Rig {
         Some(rig)
     }
 
+    /// A studio with the shipped models on a place, for pictures. Panics without a graphics adapter.
+    pub(super) fn live(size: [f32; 2], place: Place) -> Option<Self> {
+        let folder = tempfile::tempdir().unwrap();
+        let (data, config) = (folder.path().join("data"), folder.path().join("config"));
+        let services = Arc::new(LiveServices::with_config_folder(Some(config.clone())));
+        let open = match place {
+            Place::Demo => None,
+            Place::Path(path) => Some(path),
+        };
+        let harness = Self::build(size, services, open);
+        let mut rig = Self { harness, data, config, _folder: folder };
+        rig.settle();
+        Some(rig)
+    }
+
     fn start(size: [f32; 2], data: &Path, config: &Path) -> Harness<'static, StudioApp> {
         let services = Arc::new(QuickGenerator { live: LiveServices::with_config_folder(Some(config.to_owned())) });
-        let mut options = Options::new(services, Some(data.to_owned()));
+        Self::build(size, services, Some(data.to_owned()))
+    }
+
+    fn build(size: [f32; 2], services: Arc<dyn Services>, open: Option<PathBuf>) -> Harness<'static, StudioApp> {
+        let mut options = Options::new(services, open);
         options.inline = true;
         options.native_dialogs = false;
         Harness::builder()
