@@ -449,3 +449,118 @@ impl From<RuntimeChoice> for EngineChoice {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::frames::PlanarPose;
+
+    /// A folder with one pair of pictures.
+    fn pictures(folder: &Path) {
+        let grey = crate::domain::grid::Grid::from_fn(32, 32, |x, y| (x * 4 + y) as u8);
+        let rgb = RgbGrid::from_fn(32, 32, |x, y| [x as f32, y as f32, 9.0]);
+        crate::io::images::write_grey8(&folder.join("a_bubble.png"), &grey).unwrap();
+        crate::io::images::write_rgb8(&folder.join("a_gelslim.png"), &rgb).unwrap();
+    }
+
+    fn labels() -> PairLabels {
+        let mask = Arc::new(Mask::from_fn(175, 140, |x, y| x > 20 && y < 9));
+        PairLabels {
+            masks: [Some(HandMask { mask, revision: Revision(3), base: "Threshold 5.00 mm".into() }), None],
+            review: Review::InProgress,
+            accepted: [Some(PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }), None],
+        }
+    }
+
+    fn same(a: &PairLabels, b: &PairLabels) -> bool {
+        let masks = |l: &PairLabels| l.masks.clone().map(|m| m.map(|h| (h.mask, h.base)));
+        masks(a) == masks(b) && a.review == b.review && a.accepted == b.accepted
+    }
+
+    #[test]
+    fn labels_come_back_and_undo_reaches_the_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        pictures(folder.path());
+        let place = Place::Path(folder.path().to_owned());
+        let source = open_source(&place).unwrap();
+        let name = source.index().pairs[0].name.clone();
+        assert!(source.load_labels(&name).unwrap().is_empty());
+        source.save_labels(&name, &labels()).unwrap();
+        let again = LiveServices::with_config_folder(None).open(&place).unwrap();
+        assert_eq!(again.reviews[&name], Review::InProgress);
+        assert!(same(&again.source.load_labels(&name).unwrap(), &labels()));
+        again.source.save_labels(&name, &PairLabels::default()).unwrap();
+        assert!(open_source(&place).unwrap().load_labels(&name).unwrap().is_empty());
+    }
+
+    #[test]
+    fn damaged_labels_are_refused_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        pictures(folder.path());
+        let place = Place::Path(folder.path().to_owned());
+        let source = open_source(&place).unwrap();
+        let name = source.index().pairs[0].name.clone();
+        source.save_labels(&name, &labels()).unwrap();
+        let file = source.store("test").unwrap().mask_file(&name, Finger::Right);
+        std::fs::write(&file, b"{ half a fi").unwrap();
+        let again = open_source(&place).unwrap();
+        assert!(again.load_labels(&name).unwrap_err().hint.is_some());
+        assert!(again.save_labels(&name, &labels()).is_err());
+        assert_eq!(std::fs::read(&file).unwrap(), b"{ half a fi");
+    }
+
+    #[test]
+    fn export_takes_what_is_stored_and_what_changed_since() {
+        let folder = tempfile::tempdir().unwrap();
+        pictures(folder.path());
+        let source = open_source(&Place::Path(folder.path().to_owned())).unwrap();
+        let name = source.index().pairs[0].name.clone();
+        let out = folder.path().join("export");
+        let cx = JobCx::unwatched();
+        let none = source.export_masks(&BTreeMap::new(), &out, &cx).unwrap_err();
+        assert!(none.why.contains("no mask") && !out.exists());
+        let finger = source.load(PairId(0)).unwrap().fingers.iter().position(Option::is_some).unwrap();
+        let mut labels = labels();
+        labels.masks.swap(0, finger);
+        let line = source.export_masks(&BTreeMap::from([(name.clone(), labels.clone())]), &out, &cx).unwrap();
+        assert!(line.starts_with("Exported 1 masks"), "{line}");
+        labels.review = Review::Skip;
+        assert!(source.export_masks(&BTreeMap::from([(name, labels)]), &out, &cx).is_err());
+        cx.cancel.cancel();
+    }
+
+    #[test]
+    fn settings_come_back_and_bad_ones_are_set_aside() {
+        let folder = tempfile::tempdir().unwrap();
+        let services = LiveServices::with_config_folder(Some(folder.path().join("new")));
+        assert_eq!(services.load_settings(), (Settings::default(), None));
+        let mut settings = Settings::default();
+        settings.mask.radius_px = 7.5;
+        settings.recent.push(Place::Path("/data/x".into()));
+        services.save_settings(&settings).unwrap();
+        assert_eq!(services.load_settings(), (settings, None));
+        let file = folder.path().join("new").join(SETTINGS_FILE);
+        for bad in ["", "[1, 2", r#"{"version": 999}"#, r#"{"version": 1, "theme": "plaid"}"#] {
+            std::fs::write(&file, bad).unwrap();
+            let (settings, problem) = services.load_settings();
+            assert_eq!(settings, Settings::default(), "{bad}");
+            assert!(problem.unwrap().hint.unwrap().contains(BAD_SETTINGS_FILE));
+            assert!(!file.exists(), "set aside, so that the next start is quiet");
+            assert_eq!(std::fs::read_to_string(file.with_file_name(BAD_SETTINGS_FILE)).unwrap(), bad);
+        }
+        // Numbers that cannot be worked with are brought into range; unknown and missing keys are no harm.
+        std::fs::write(&file, r#"{"version": 1, "ui_zoom": 1e9, "new_key": 3}"#).unwrap();
+        assert_eq!(services.load_settings().0.ui_zoom, 4.0);
+    }
+
+    #[test]
+    fn the_demo_opens_without_a_folder() {
+        let demo = open_source(&Place::Demo).unwrap();
+        assert_eq!(demo.root(), None);
+        assert!(demo.index().pairs.len() >= 12);
+        let tool = demo.index().pairs[0].tool.clone().unwrap();
+        assert!(demo.tool_mesh(&tool).unwrap().is_watertight());
+        assert!(demo.tool_mesh("no such tool").unwrap_err().hint.is_some());
+        assert!(open_source(&Place::Path("/no/such/folder".into())).unwrap_err().hint.is_some());
+    }
+}

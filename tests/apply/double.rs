@@ -1,0 +1,340 @@
+//! Stand-ins for files and models, and a bench to drive the model on.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+
+use touch2touch::app::command::{Command, Opened};
+use touch2touch::app::document::{PairLabels, Review};
+use touch2touch::app::error::TaskError;
+use touch2touch::app::jobs::JobCx;
+use touch2touch::app::keys::{Recipe, ShiftMode};
+use touch2touch::app::library::{BundleInfo, BundleKind, Place};
+use touch2touch::app::runtime::Runtime;
+use touch2touch::app::services::{DataSource, Generated, Services};
+use touch2touch::app::settings::{RuntimeChoice, Settings};
+use touch2touch::app::state::State;
+use touch2touch::app::tasks::Level;
+use touch2touch::domain::dataset::{Index, PairEntry, PairId, Problem, Split};
+use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use touch2touch::domain::mesh::TriMesh;
+use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift};
+use touch2touch::domain::resample::Resampling;
+use touch2touch::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample, Scale};
+use touch2touch::domain::sim;
+
+/// `[width, height]` of the imprints of [`Source`].
+pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];
+/// The pair that is a simulated grasp with cameras, tool and truth.
+pub(crate) const SIMULATED: PairId = PairId(12);
+
+/// Twelve pairs of two made-up tools (no camera); with `simulated`, one real grasp more.
+pub(crate) struct Source {
+    index: Index,
+    loads: Mutex<BTreeMap<u32, u32>>,
+    failing: Mutex<BTreeSet<u32>>,
+    panicking: Mutex<BTreeSet<u32>>,
+    /// Labels as they would lie on the disk.
+    pub(crate) labels: Mutex<BTreeMap<String, PairLabels>>,
+    /// Pairs whose stored labels are damaged.
+    pub(crate) damaged: Mutex<BTreeSet<String>>,
+    pub(crate) full_disk: AtomicBool,
+    pub(crate) saves: AtomicU64,
+}
+
+impl Source {
+    fn new(simulated: bool) -> Self {
+        let entry = |tool: &str, number: u64| PairEntry {
+            name: format!("{tool}/data_{number}"),
+            tool: Some(tool.to_owned()),
+            split: Split::None,
+            number,
+        };
+        let mut pairs: Vec<PairEntry> =
+            ["tool_a", "tool_b"].iter().flat_map(|tool| (0..6).map(|n| entry(tool, n))).collect();
+        if simulated {
+            pairs.push(entry(&sim::tools()[0].name, 0));
+        }
+        Self {
+            index: Index { pairs },
+            loads: Mutex::default(),
+            failing: Mutex::default(),
+            panicking: Mutex::default(),
+            labels: Mutex::default(),
+            damaged: Mutex::default(),
+            full_disk: AtomicBool::new(false),
+            saves: AtomicU64::new(0),
+        }
+    }
+
+    pub(crate) fn loads(&self) -> u32 {
+        self.loads.lock().unwrap().values().sum()
+    }
+
+    pub(crate) fn loads_of(&self, pair: u32) -> u32 {
+        self.loads.lock().unwrap().get(&pair).copied().unwrap_or(0)
+    }
+
+    pub(crate) fn fail(&self, pair: u32) {
+        self.failing.lock().unwrap().insert(pair);
+    }
+
+    pub(crate) fn panic(&self, pair: u32) {
+        self.panicking.lock().unwrap().insert(pair);
+    }
+
+    pub(crate) fn heal(&self) {
+        self.failing.lock().unwrap().clear();
+    }
+}
+
+impl DataSource for Source {
+    fn title(&self) -> &str {
+        "Double"
+    }
+
+    fn root(&self) -> Option<&Path> {
+        None
+    }
+
+    fn index(&self) -> &Index {
+        &self.index
+    }
+
+    fn problems(&self) -> &[Problem] {
+        &[]
+    }
+
+    fn load(&self, pair: PairId) -> Result<Sample, TaskError> {
+        *self.loads.lock().unwrap().entry(pair.0).or_default() += 1;
+        assert!(!self.panicking.lock().unwrap().contains(&pair.0), "the file bit back");
+        if self.failing.lock().unwrap().contains(&pair.0) {
+            return Err(TaskError::new(format!("Load pair {}", pair.0), "the file is too short (x.pt)"));
+        }
+        if pair == SIMULATED {
+            let grasp = sim::Grasp { theta_rad: 0.2, x_m: 0.001, y_m: -0.001 };
+            return Ok(sim::simulate(&sim::tools()[0], grasp, 7, &sim::SimConfig::default()));
+        }
+        let finger = |sign: f32| {
+            let [w, h] = IMPRINT_SIZE;
+            // A bump with a hole in it, a second bump, and a deeper one with each pair.
+            let imprint = DepthMap::from_fn(w, h, |x, y| {
+                let ring = (3..9).contains(&x) && (3..9).contains(&y) && (x, y) != (5, 5);
+                let spot = (15..17).contains(&x) && (10..12).contains(&y);
+                let depth = if ring || spot { 0.008 + 0.0005 * pair.0 as f32 } else { 0.001 };
+                depth + sign * 1e-5 * (x + y) as f32
+            });
+            let difference = RgbGrid::from_fn(6, 4, |x, y| [x as f32, y as f32, sign]);
+            Some(FingerTouch {
+                gelslim: Some(GelSlimTouch { images: None, difference }),
+                bubble: Some(BubbleTouch { imprint, camera: None, truth: None }),
+            })
+        };
+        Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, scale: Scale::Measured })
+    }
+
+    fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
+        let tool = sim::tools().iter().find(|t| t.name == tool);
+        tool.map(sim::ToolSpec::mesh).ok_or_else(|| TaskError::new("CAD model", "there is none"))
+    }
+
+    fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {
+        if self.damaged.lock().unwrap().contains(name) {
+            return Err(TaskError::new(format!("Labels of {name}"), "the file is damaged (x.json)"));
+        }
+        Ok(self.labels.lock().unwrap().get(name).cloned().unwrap_or_default())
+    }
+
+    fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError> {
+        assert!(!self.damaged.lock().unwrap().contains(name), "a damaged file must not be written over");
+        if self.full_disk.load(Ordering::Relaxed) {
+            return Err(TaskError::new("Save the labels", "no space left"));
+        }
+        self.saves.fetch_add(1, Ordering::Relaxed);
+        self.labels.lock().unwrap().insert(name.to_owned(), labels.clone());
+        Ok(())
+    }
+
+    fn export_masks(
+        &self,
+        changed: &BTreeMap<String, PairLabels>,
+        folder: &Path,
+        cx: &JobCx,
+    ) -> Result<String, TaskError> {
+        cx.check("Export masks")?;
+        Ok(format!("{} pairs to {}", changed.len(), folder.display()))
+    }
+}
+
+/// Services over one [`Source`].
+pub(crate) struct Double {
+    pub(crate) source: Arc<Source>,
+    generated: AtomicU64,
+    panics: AtomicBool,
+    cancel_at: AtomicU64,
+    settings_saved: AtomicU64,
+    bundles: bool,
+}
+
+impl Double {
+    pub(crate) fn new(simulated: bool, bundles: bool) -> Self {
+        Self {
+            source: Arc::new(Source::new(simulated)),
+            generated: AtomicU64::new(0),
+            panics: AtomicBool::new(false),
+            cancel_at: AtomicU64::new(u64::MAX),
+            settings_saved: AtomicU64::new(0),
+            bundles,
+        }
+    }
+
+    pub(crate) fn generated(&self) -> u64 {
+        self.generated.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn settings_saved(&self) -> u64 {
+        self.settings_saved.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn panic_in_generate(&self) {
+        self.panics.store(true, Ordering::Relaxed);
+    }
+
+    /// The next generations are told to stop while they are at this step.
+    pub(crate) fn cancel_itself_at_step(&self, step: u64) {
+        self.cancel_at.store(step, Ordering::Relaxed);
+    }
+}
+
+impl Services for Double {
+    fn open(&self, place: &Place) -> Result<Opened, TaskError> {
+        if *place == Place::Path("missing".into()) {
+            return Err(TaskError::new("Open missing", "there is no such folder (missing)"));
+        }
+        let source: Arc<dyn DataSource> = self.source.clone();
+        let labels = self.source.labels.lock().unwrap();
+        let reviews = labels.iter().filter(|(_, l)| l.review != Review::Todo);
+        Ok(Opened { source, reviews: reviews.map(|(name, l)| (name.clone(), l.review)).collect() })
+    }
+
+    fn find_bundles(&self, _: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
+        let bundle = |id: &str, kind| BundleInfo {
+            id: id.into(),
+            name: id.into(),
+            kind,
+            folder: PathBuf::from(id),
+            steps: Some(20),
+        };
+        match self.bundles {
+            true => (vec![bundle("gen", BundleKind::Generator), bundle("unet", BundleKind::Mask)], Vec::new()),
+            false => (Vec::new(), Vec::new()),
+        }
+    }
+
+    fn generate(
+        &self,
+        recipe: &Recipe,
+        _: &BundleInfo,
+        difference: &RgbGrid,
+        cx: &JobCx,
+    ) -> Result<Generated, TaskError> {
+        self.generated.fetch_add(1, Ordering::Relaxed);
+        assert!(!self.panics.load(Ordering::Relaxed), "the model fell over");
+        for step in 0..u64::from(recipe.steps) {
+            cx.progress(step, recipe.steps.into(), "step");
+            if step == self.cancel_at.load(Ordering::Relaxed) {
+                cx.cancel.cancel();
+            }
+            cx.check("Generate")?;
+        }
+        // Depends on the condition and on the seed, as a real one does.
+        let condition = difference.as_slice().iter().map(|p| p[2]).sum::<f32>() / difference.len() as f32;
+        let [w, h] = IMPRINT_SIZE;
+        let raw = RawPrediction {
+            channels: vec![Grid::from_fn(w, h, |x, y| {
+                (((x * y) as f32 + recipe.seed as f32).sin() * 0.5 + 0.1 * condition).clamp(-1.0, 1.0)
+            })],
+        };
+        let chain = DepthChain {
+            range: DepthRange { min_m: -0.01, max_m: 0.03 },
+            mapping: Mapping::Correct,
+            reduction: Reduction::Mean,
+            shift: Shift::None,
+            size: IMPRINT_SIZE,
+            resampling: Resampling::Bilinear,
+            rotation_deg: 0,
+        };
+        let chains = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse]
+            .map(|mode| (mode, chain.clone().with_mode(mode, None).map_err(|err| err.to_string())));
+        Ok(Generated { raw, chains: chains.into(), runtime: "double".into() })
+    }
+
+    fn mask_by_model(&self, _: &BundleInfo, _: RuntimeChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
+        Ok(imprint.map(|v| *v > 0.006))
+    }
+
+    fn load_settings(&self) -> (Settings, Option<TaskError>) {
+        (Settings::default(), None)
+    }
+
+    fn save_settings(&self, _: &Settings) -> Result<(), TaskError> {
+        self.settings_saved.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+/// A state, a runtime without threads, and the doubles behind it.
+pub(crate) struct Bench {
+    pub(crate) state: State,
+    pub(crate) runtime: Runtime,
+    pub(crate) services: Arc<Double>,
+}
+
+impl Bench {
+    fn with(services: Double) -> Self {
+        let services = Arc::new(services);
+        let mut bench = Self { state: State::default(), runtime: Runtime::inline(services.clone()), services };
+        bench.runtime.start(&mut bench.state, Some(Place::Demo));
+        bench.settle();
+        bench
+    }
+
+    /// Twelve made-up pairs, opened; no pane is visible.
+    pub(crate) fn open() -> Self {
+        Self::with(Double::new(false, true))
+    }
+
+    /// With a simulated grasp as pair [`SIMULATED`].
+    pub(crate) fn open_simulated() -> Self {
+        Self::with(Double::new(true, true))
+    }
+
+    /// Without any model bundle.
+    pub(crate) fn open_without_models() -> Self {
+        Self::with(Double::new(false, false))
+    }
+
+    /// One round with one command; jobs wait.
+    pub(crate) fn send(&mut self, command: Command) {
+        self.runtime.tick(&mut self.state, vec![command]);
+    }
+
+    /// One round.
+    pub(crate) fn tick(&mut self) {
+        self.runtime.tick(&mut self.state, Vec::new());
+    }
+
+    /// Rounds until nothing waits.
+    pub(crate) fn settle(&mut self) {
+        self.runtime.settle(&mut self.state);
+    }
+
+    pub(crate) fn errors(&self) -> usize {
+        self.state.log.entries.iter().filter(|e| e.level == Level::Error).count()
+    }
+
+    pub(crate) fn log(&self) -> Vec<String> {
+        self.state.log.entries.iter().map(|e| e.text.clone()).collect()
+    }
+}

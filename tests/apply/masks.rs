@@ -1,0 +1,252 @@
+//! Correcting masks: strokes, clean-ups, undo, saving.
+
+use std::sync::atomic::Ordering;
+
+use touch2touch::app::action::Action;
+use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::document::Review;
+use touch2touch::app::keys::{ImprintSource, MaskVersion};
+use touch2touch::app::settings::{MaskSource, MaskTool};
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::grid::Mask;
+use touch2touch::domain::sensor::Finger;
+
+use super::double::Bench;
+use super::panes;
+
+const MEASURED: ImprintSource = ImprintSource::Measured;
+
+fn bench() -> Bench {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::Measured, Pane::Masks]));
+    bench.settle();
+    bench
+}
+
+fn begin(bench: &mut Bench, finger: Finger, at_px: [f32; 2]) {
+    bench.send(Command::BeginStroke { finger, source: MEASURED, at_px, erase: false });
+}
+
+fn stroke(bench: &mut Bench, finger: Finger, from: [f32; 2], to: [f32; 2]) {
+    begin(bench, finger, from);
+    bench.send(Command::StrokeTo(to));
+    bench.send(Command::EndStroke);
+}
+
+fn mask(bench: &Bench, finger: Finger) -> Mask {
+    (**bench.state.mask_in_force(MEASURED, finger).unwrap().mask).clone()
+}
+
+fn count(mask: &Mask) -> usize {
+    mask.as_slice().iter().filter(|v| **v).count()
+}
+
+#[test]
+fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
+    let mut bench = bench();
+    let automatic = mask(&bench, Finger::Right);
+    assert_eq!(count(&automatic), 35 + 4, "the ring and the spot");
+    begin(&mut bench, Finger::Right, [12.0, 2.0]);
+    bench.settle();
+    assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0, "nothing is saved while the pen is down");
+    bench.send(Command::StrokeTo([14.0, 2.0]));
+    bench.send(Command::EndStroke);
+    let drawn = mask(&bench, Finger::Right);
+    assert!(drawn[(12, 2)] && drawn[(14, 2)] && drawn[(4, 4)]);
+    let in_force = bench.state.mask_in_force(MEASURED, Finger::Right).unwrap();
+    assert_eq!(in_force.label, "By hand, from Threshold 5.00 mm");
+    bench.settle();
+    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    assert_eq!(*saved.masks[0].as_ref().unwrap().mask, drawn);
+    assert_eq!(saved.masks[1], None);
+    assert_eq!(saved.review, Review::InProgress);
+    assert!(bench.state.document.unsaved.is_empty());
+    // Another automatic source does not touch it; removing it brings that source back.
+    bench.send(Command::SetMaskSource(MaskSource::TopPercent));
+    bench.settle();
+    assert_eq!(mask(&bench, Finger::Right), drawn);
+    bench.send(Command::ResetMask);
+    bench.settle();
+    assert!(matches!(bench.state.mask_in_force(MEASURED, Finger::Right).unwrap().version, MaskVersion::Auto(_)));
+    // Undo changes the file too.
+    bench.send(Command::Undo);
+    bench.settle();
+    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    assert_eq!(*saved.masks[0].as_ref().unwrap().mask, drawn);
+}
+
+#[test]
+fn a_stroke_that_changes_nothing_leaves_nothing() {
+    let mut bench = bench();
+    bench.send(Command::SetMaskTool(MaskTool::Eraser));
+    stroke(&mut bench, Finger::Right, [21.0, 1.0], [22.0, 1.0]);
+    bench.send(Command::SetMaskTool(MaskTool::Brush));
+    stroke(&mut bench, Finger::Right, [900.0, -900.0], [f32::NAN, 1.0]);
+    bench.settle();
+    assert!(bench.state.document.hand_mask("tool_a/data_0", Finger::Right).is_none());
+    assert!(Action::Undo.command(&bench.state).is_none());
+    assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0);
+    assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
+}
+
+#[test]
+fn escape_gives_a_stroke_up() {
+    let mut bench = bench();
+    let before = mask(&bench, Finger::Right);
+    begin(&mut bench, Finger::Right, [12.0, 2.0]);
+    assert_ne!(mask(&bench, Finger::Right), before);
+    let cancel = Action::CancelJobs.command(&bench.state).unwrap();
+    bench.send(cancel);
+    assert_eq!(mask(&bench, Finger::Right), before);
+    assert!(bench.state.document.stroke.is_none());
+}
+
+#[test]
+fn undo_and_redo_follow_what_is_on_screen() {
+    let mut bench = bench();
+    let automatic = [mask(&bench, Finger::Right), {
+        bench.send(Command::SelectFinger(Finger::Left));
+        bench.settle();
+        mask(&bench, Finger::Left)
+    }];
+    bench.send(Command::SelectFinger(Finger::Right));
+    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
+    let first = mask(&bench, Finger::Right);
+    stroke(&mut bench, Finger::Right, [20.0, 6.0], [21.0, 6.0]);
+    let second = mask(&bench, Finger::Right);
+    bench.send(Command::SelectFinger(Finger::Left));
+    stroke(&mut bench, Finger::Left, [20.0, 1.0], [21.0, 1.0]);
+    bench.send(Command::Select(PairId(1)));
+    bench.settle();
+    assert!(Action::Undo.command(&bench.state).is_none(), "nothing of pair 1 was changed");
+    bench.send(Command::Undo);
+    bench.send(Command::Select(PairId(0)));
+    bench.settle();
+    bench.send(Command::Undo);
+    assert_eq!(mask(&bench, Finger::Left), automatic[1], "only the left finger is on screen");
+    bench.send(Command::SelectFinger(Finger::Right));
+    assert_eq!(mask(&bench, Finger::Right), second);
+    bench.send(Command::Undo);
+    assert_eq!(mask(&bench, Finger::Right), first);
+    bench.send(Command::Undo);
+    assert_eq!(mask(&bench, Finger::Right), automatic[0]);
+    assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo, "untouched again");
+    bench.send(Command::Redo);
+    bench.send(Command::Redo);
+    assert_eq!(mask(&bench, Finger::Right), second);
+}
+
+#[test]
+fn clean_ups_work_on_the_mask_in_force() {
+    let mut bench = bench();
+    bench.send(Command::FillHoles);
+    assert_eq!(count(&mask(&bench, Finger::Right)), 36 + 4);
+    bench.send(Command::LargestIsland);
+    assert_eq!(count(&mask(&bench, Finger::Right)), 36);
+    bench.send(Command::LargestIsland);
+    assert!(bench.log().last().unwrap().contains("nothing to change"));
+    bench.send(Command::AdoptAutomatic);
+    assert_eq!(count(&mask(&bench, Finger::Right)), 39);
+    for expected in [36, 40, 39] {
+        bench.send(Command::Undo);
+        assert_eq!(count(&mask(&bench, Finger::Right)), expected);
+    }
+    assert!(bench.state.document.hand_mask("tool_a/data_0", Finger::Right).is_none());
+}
+
+#[test]
+fn labels_that_cannot_be_read_are_never_written() {
+    let mut bench = Bench::open();
+    bench.services.source.damaged.lock().unwrap().insert("tool_a/data_0".into());
+    bench.send(panes(&[Pane::Measured]));
+    bench.settle();
+    assert_eq!(bench.errors(), 1);
+    assert!(bench.state.document.blocked("tool_a/data_0").is_some());
+    let automatic = mask(&bench, Finger::Right);
+    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
+    for command in [Command::FillHoles, Command::AdoptAutomatic, Command::SetReview(Review::Done), Command::ResetMask] {
+        bench.send(command);
+    }
+    bench.settle();
+    assert_eq!(mask(&bench, Finger::Right), automatic, "the automatic mask is shown, and stays");
+    assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0);
+    assert!(Action::FillHoles.command(&bench.state).is_none());
+}
+
+#[test]
+fn nothing_is_drawn_before_the_stored_labels_are_read() {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::Measured]));
+    begin(&mut bench, Finger::Right, [12.0, 2.0]);
+    assert!(bench.state.document.stroke.is_none());
+    assert!(bench.state.document.labels.is_empty());
+}
+
+#[test]
+fn a_full_disk_is_said_and_what_was_drawn_is_kept_and_saved_later() {
+    let mut bench = bench();
+    bench.services.source.full_disk.store(true, Ordering::Relaxed);
+    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
+    bench.settle();
+    assert_eq!(bench.errors(), 1);
+    assert!(bench.state.document.unsaved.contains("tool_a/data_0"));
+    bench.services.source.full_disk.store(false, Ordering::Relaxed);
+    bench.send(Command::Save);
+    bench.settle();
+    assert!(bench.state.document.unsaved.is_empty());
+    assert!(bench.services.source.labels.lock().unwrap().contains_key("tool_a/data_0"));
+}
+
+#[test]
+fn moving_on_ends_the_stroke() {
+    let mut bench = bench();
+    begin(&mut bench, Finger::Right, [12.0, 2.0]);
+    bench.send(Command::Step(1));
+    bench.settle();
+    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    assert!(saved.masks[0].as_ref().unwrap().mask[(12, 2)]);
+    assert!(bench.state.document.stroke.is_none());
+}
+
+#[test]
+fn strokes_waiting_for_the_disk_become_one_and_survive_the_end() {
+    let mut bench = bench();
+    for y in 0..5 {
+        stroke(&mut bench, Finger::Right, [20.0, y as f32 * 3.0], [21.0, y as f32 * 3.0]);
+    }
+    let drawn = mask(&bench, Finger::Right);
+    let source = bench.services.source.clone();
+    // The program ends before the disk had its turn: what waits to be written is written first.
+    drop(bench);
+    assert_eq!(source.saves.load(Ordering::Relaxed), 1);
+    assert_eq!(*source.labels.lock().unwrap()["tool_a/data_0"].masks[0].as_ref().unwrap().mask, drawn);
+}
+
+#[test]
+fn done_goes_to_the_next_unfinished_and_survives_reopening() {
+    let mut bench = bench();
+    bench.send(Command::DoneAndNext);
+    assert_eq!(bench.state.pair_name(), "tool_a/data_1");
+    bench.settle();
+    bench.send(Command::SetReview(Review::Flagged));
+    bench.settle();
+    bench.send(Command::Reload);
+    bench.settle();
+    assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Done);
+    assert_eq!(bench.state.document.review("tool_a/data_1"), Review::Flagged);
+    bench.send(Command::SetFilter("is:done".into()));
+    assert_eq!(bench.state.library.order, [PairId(0)]);
+    bench.send(Command::NextUnfinished);
+    assert!(bench.log().last().unwrap().contains("done or skipped"));
+}
+
+#[test]
+fn opening_again_brings_the_masks_back() {
+    let mut bench = bench();
+    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
+    let drawn = mask(&bench, Finger::Right);
+    bench.send(Command::Reload);
+    bench.settle();
+    assert_eq!(mask(&bench, Finger::Right), drawn);
+    assert!(Action::Undo.command(&bench.state).is_none(), "what was undone before is not on the list any more");
+}

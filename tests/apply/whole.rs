@@ -1,0 +1,126 @@
+//! With a simulated grasp: masks, clouds, poses; with threads; without models.
+
+use std::sync::{Arc, Condvar, Mutex};
+
+use touch2touch::app::action::Action;
+use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::keys::{ImprintSource, PoseEngine};
+use touch2touch::app::library::Place;
+use touch2touch::app::runtime::Runtime;
+use touch2touch::app::settings::{MaskSource, MaskTool};
+use touch2touch::app::state::{Absent, Lookup, State};
+use touch2touch::domain::sensor::Finger;
+
+use super::double::{Bench, Double, SIMULATED};
+use super::panes;
+
+const MEASURED: ImprintSource = ImprintSource::Measured;
+
+#[test]
+fn the_pose_follows_the_mask() {
+    let mut bench = Bench::open_simulated();
+    bench.send(panes(&[Pane::SceneMeasured, Pane::Measured]));
+    bench.send(Command::SetMaskSource(MaskSource::Cad));
+    bench.send(Command::Select(SIMULATED));
+    bench.settle();
+    let pose = bench.state.pose(MEASURED).ready().unwrap().clone();
+    // The true contact of both fingers: better than the lab's tightest success limit of 5 degrees.
+    assert!(pose.error_rad.unwrap() < 5f64.to_radians(), "{:?}", pose.error_rad);
+    assert!(!pose.iterations.is_empty() && !pose.stop.is_empty() && pose.num_points > 100);
+    let cloud = bench.state.cloud(MEASURED).ready().unwrap();
+    assert_eq!(cloud.contact_points().len(), pose.num_points);
+    // Rubbing out a part: while the pen is down nothing is computed, then cloud and pose are new.
+    bench.send(Command::SetMaskTool(MaskTool::Eraser));
+    let at_px = {
+        let mask = bench.state.mask_in_force(MEASURED, Finger::Right).unwrap().mask.clone();
+        let at = mask.as_slice().iter().position(|v| *v).unwrap();
+        [(at % mask.width()) as f32, (at / mask.width()) as f32]
+    };
+    bench.send(Command::BeginStroke { finger: Finger::Right, source: MEASURED, at_px, erase: false });
+    bench.send(Command::StrokeTo([at_px[0] + 10.0, at_px[1] + 10.0]));
+    assert!(bench.state.wanted().is_empty());
+    assert!(matches!(bench.state.pose(MEASURED), Lookup::Stale(_)), "the old pose stays until the new one is there");
+    bench.send(Command::EndStroke);
+    bench.settle();
+    let after = bench.state.pose(MEASURED).ready().unwrap();
+    assert!(after.num_points < pose.num_points);
+    // The other registration is another result; the first one is still there.
+    bench.send(Command::SetPoseEngine(PoseEngine::LabIcp));
+    bench.settle();
+    let lab = bench.state.pose(MEASURED).ready().unwrap();
+    assert!(lab.error_rad.is_some() && lab.iterations.len() > 1);
+    bench.send(Command::SetPoseEngine(PoseEngine::DistanceField));
+    assert!(bench.state.pose(MEASURED).ready().is_some());
+    // Accepting it is a change of the document like any other.
+    let accept = Action::AcceptMeasuredPose.command(&bench.state).unwrap();
+    bench.send(accept);
+    let name = bench.state.pair_name().to_owned();
+    assert!(bench.state.document.pair(&name).unwrap().accepted(MEASURED).is_some());
+    bench.send(Command::Undo);
+    assert!(bench.state.document.pair(&name).unwrap().accepted(MEASURED).is_none());
+}
+
+#[test]
+fn a_source_without_camera_says_why_there_is_no_pose() {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::SceneMeasured, Pane::ScenePredicted, Pane::Measured]));
+    bench.settle();
+    assert!(matches!(bench.state.cloud(MEASURED), Lookup::Absent(Absent::NoCamera)));
+    assert!(bench.state.tasks.is_idle());
+    for (source, absent) in [(MaskSource::Truth, Absent::NotSimulated), (MaskSource::Cad, Absent::NoTruth)] {
+        bench.send(Command::SetMaskSource(source));
+        bench.settle();
+        match bench.state.mask_in_force(MEASURED, Finger::Right) {
+            Err(Lookup::Absent(found)) => assert_eq!(found, absent),
+            other => panic!("{other:?}"),
+        }
+    }
+    bench.send(Command::SetMaskSource(MaskSource::Unet));
+    bench.settle();
+    assert!(bench.state.mask_in_force(MEASURED, Finger::Right).is_ok());
+}
+
+#[test]
+fn without_models_the_rest_works_and_a_notice_says_what_to_do() {
+    let mut bench = Bench::open_without_models();
+    bench.send(panes(&[Pane::Measured, Pane::Predicted]));
+    bench.settle();
+    assert!(bench.state.log.entries.iter().any(|e| e.text.contains("No generator") && e.hint.is_some()));
+    assert!(Action::Generate.command(&bench.state).is_none());
+    bench.send(Command::Generate);
+    assert_eq!(bench.errors(), 1);
+    assert!(bench.state.mask_in_force(MEASURED, Finger::Right).is_ok());
+}
+
+#[test]
+fn threads_give_the_same_and_wake_the_window() {
+    let services = Arc::new(Double::new(false, true));
+    let woken = Arc::new((Mutex::new(false), Condvar::new()));
+    let bell = woken.clone();
+    let wake = Arc::new(move || {
+        *bell.0.lock().unwrap() = true;
+        bell.1.notify_one();
+    });
+    let mut runtime = Runtime::threads(services.clone(), wake);
+    let mut state = State::default();
+    runtime.start(&mut state, Some(Place::Demo));
+    runtime.tick(&mut state, vec![panes(&[Pane::Measured, Pane::Predicted, Pane::Error])]);
+    let mut asked = false;
+    while state.comparison(Finger::Right).ready().is_none() {
+        if !asked && state.can_generate().is_ok() && state.sample().ready().is_some() {
+            asked = true;
+            runtime.tick(&mut state, vec![Command::Generate]);
+        } else {
+            // Waits for news, not for time: without the bell this test would hang, and that is what it checks.
+            let mut rung = woken.0.lock().unwrap();
+            while !*rung {
+                rung = woken.1.wait(rung).unwrap();
+            }
+            *rung = false;
+            drop(rung);
+            runtime.tick(&mut state, Vec::new());
+        }
+    }
+    assert_eq!(services.source.loads_of(0), 1);
+    assert_eq!(state.chosen(Finger::Right).unwrap().seed, 42);
+}
