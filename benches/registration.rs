@@ -4,7 +4,7 @@
 //! FOLDER holds cases in the form of the reference grasps (`case_*.npz`, `tool_NN.stl`); without one, the folder
 //! `pose-cases` of the reference data is used.
 
-#[allow(dead_code, reason = "shared with the tests, which use more of it")]
+#[allow(dead_code, clippy::unwrap_used, reason = "shared with the tests, which use more of it")]
 #[path = "../tests/support.rs"]
 mod support;
 

@@ -106,12 +106,12 @@ fn eigen_symmetric(mut a: [[f64; 3]; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
             let t = 1f64.copysign(tau) / (tau.abs() + (1.0 + tau * tau).sqrt());
             let c = 1.0 / (1.0 + t * t).sqrt();
             let s = t * c;
-            for k in 0..3 {
-                (a[k][p], a[k][q]) = (c * a[k][p] - s * a[k][q], s * a[k][p] + c * a[k][q]);
+            let turn = |x: f64, y: f64| (c * x - s * y, s * x + c * y);
+            for row in a.iter_mut().chain(&mut v) {
+                (row[p], row[q]) = turn(row[p], row[q]);
             }
-            for k in 0..3 {
-                (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-                (v[k][p], v[k][q]) = (c * v[k][p] - s * v[k][q], s * v[k][p] + c * v[k][q]);
+            for (k, (x, y)) in a[p].into_iter().zip(a[q]).enumerate() {
+                (a[p][k], a[q][k]) = turn(x, y);
             }
         }
     }

@@ -55,10 +55,8 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
     // All starts go through the kernels side by side, so that runs that meet go on as one.
     let mut runs: Vec<Progress> = states.into_iter().map(Progress::new).collect();
     for kernel in &config.kernels_m {
-        for run in 0..runs.len() {
-            if runs[run].merged_into.is_none() {
-                search.descend(run, &mut runs[run], &scouts, *kernel, STEP_COARSE_M);
-            }
+        for (run, progress) in runs.iter_mut().enumerate().filter(|(_, p)| p.merged_into.is_none()) {
+            search.descend(run, progress, &scouts, *kernel, STEP_COARSE_M);
         }
         merge_met(&mut runs);
     }
