@@ -1,28 +1,33 @@
 //! Writes a sheet of simulated tiles in the form of the published ones (128 x 128, difference images
 //! standardised, imprints scaled image by image and rotated by 180 degrees), to compare with real ones by eye.
 //!
-//! `cargo run --release --no-default-features --example contact_sheet -- [OUT.png [COLUMNS [SEED [SENSOR]]]]`
+//! `cargo run --release --no-default-features --example contact_sheet -- [OUT.png [PER_TOOL [SEED [SENSOR]]]]`
+//!
+//! Columns are tools in the order of `sim::tools()`, six to a row; values are rounded to [`STEP`] so that the noise
+//! does not fill the repository.
 
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{Rgb, RgbImage};
 use touch2touch::domain::sim;
 
 const TILE: u32 = 128;
 const GAP: u32 = 3;
+const COLUMNS: u32 = 6;
+/// Grey levels per step of the written values.
+const STEP: f32 = 6.0;
 
 fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().unwrap_or_else(|| "docs/simulated_tiles.png".to_owned());
-    let columns: u32 = arguments.next().map_or(Ok(9), |n| n.parse())?;
+    let per_tool: u32 = arguments.next().map_or(Ok(1), |n| n.parse())?;
     let seed: u64 = arguments.next().map_or(Ok(1), |n| n.parse())?;
     let sensor: Option<u64> = arguments.next().map(|n| n.parse()).transpose()?;
     let config = sensor.map_or_else(sim::SimConfig::default, sim::SimConfig::randomised);
 
     let tools = sim::tools();
-    let per_tool = 3;
     let count = tools.len() as u32 * per_tool;
-    let rows = count.div_ceil(columns);
-    let mut sheet = RgbImage::from_pixel(columns * (TILE + GAP), 2 * rows * (TILE + GAP), Rgb([255; 3]));
-    let start = std::time::Instant::now();
+    let rows = count.div_ceil(COLUMNS);
+    let mut sheet = RgbImage::from_pixel(COLUMNS * (TILE + GAP), 2 * rows * (TILE + GAP), Rgb([255; 3]));
     for n in 0..count {
         let tool = &tools[(n / per_tool) as usize];
         let number = seed * 1000 + u64::from(n);
@@ -30,7 +35,7 @@ fn main() -> anyhow::Result<()> {
         let Some(touch) = &sample.fingers[n as usize % 2] else {
             continue;
         };
-        let (column, row) = (n % columns, n / columns);
+        let (column, row) = (n % COLUMNS, n / COLUMNS);
         if let Some(gelslim) = &touch.gelslim {
             let image = &gelslim.difference;
             let tile = resample(image.width(), image.height(), |x, y| image[(x, y)]);
@@ -42,8 +47,9 @@ fn main() -> anyhow::Result<()> {
             put(&mut sheet, column, rows + row, &scaled(&tile));
         }
     }
-    log::info!("{count} pairs in {:?}", start.elapsed());
-    sheet.save(&path)?;
+    let file = std::io::BufWriter::new(std::fs::File::create(&path)?);
+    let encoder = PngEncoder::new_with_quality(file, CompressionType::Best, FilterType::Adaptive);
+    sheet.write_with_encoder(encoder)?;
     Ok(())
 }
 
@@ -76,7 +82,8 @@ fn scaled(tile: &[[f32; 3]]) -> Vec<[u8; 3]> {
     let value = |p: &[f32; 3], c: usize| if grey { p[c] } else { p[c] / deviation[c] };
     let all = || tile.iter().flat_map(|p| (0..3).map(move |c| value(p, c)));
     let (lo, hi) = all().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
-    tile.iter().map(|p| std::array::from_fn(|c| ((value(p, c) - lo) / (hi - lo).max(1e-9) * 255.0) as u8)).collect()
+    let level = |v: f32| (((v - lo) / (hi - lo).max(1e-9) * 255.0 / STEP).round() * STEP) as u8;
+    tile.iter().map(|p| std::array::from_fn(|c| level(value(p, c)))).collect()
 }
 
 fn put(sheet: &mut RgbImage, column: u32, row: u32, tile: &[[u8; 3]]) {

@@ -4,7 +4,13 @@
 //! [`Grasp`] and returns what the lab's files hold, plus the truth. The same arguments give the same numbers on
 //! every machine and for every number of threads.
 //!
-//! Rough cost of one pair (both fingers) in release: see `cost` below.
+//! What is modelled, and what not: the bubble's membrane solves the obstacle problem of an inflated elastic sheet
+//! (see `membrane`), so it tents between bars and bulges beside them; its camera looks obliquely, hides what lies
+//! behind a bar and adds noise. The gel is a sheet on an elastic foundation under three LEDs. There is no friction
+//! between membrane and tool, no light bouncing in the gel and no lens distortion.
+//!
+//! One pair (both fingers, both sensors) costs about 55 ms of one core in release, a fifth of it for the membrane.
+//! `examples/contact_sheet.rs` draws the tiles of `docs/simulated_tiles.png`.
 
 mod config;
 mod depth_camera;

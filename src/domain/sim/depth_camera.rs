@@ -12,7 +12,7 @@ use crate::domain::sensor::{Finger, Intrinsics, bubble};
 pub const CONTACT_DISTANCE_M: f64 = 0.001;
 
 /// Steepest slope of a membrane: that of the tools' bevels.
-const MAX_SLOPE: f64 = 1.6;
+const MAX_SLOPE: f64 = 1.8;
 
 /// The rays of one camera in the coordinates of its membrane (n, y, z).
 pub(super) struct Rays {
@@ -82,14 +82,14 @@ pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap,
             high += (-f_high / rate).max(1e-4);
             f_high = above(high);
         }
-        // false position: the bracket is short and the surface nearly straight in it
-        for _ in 0..3 {
-            let z = low + (high - low) * (f_low / (f_low - f_high)).clamp(0.0, 1.0);
-            let f = above(z);
-            if f.abs() < 1e-7 || f_low == f_high {
-                high = z;
+        // false position where the surface is straight in the bracket, halving at edges
+        for i in 0..10 {
+            if f_high < 1e-6 || high - low < 1e-6 {
                 break;
             }
+            let part = if i < 3 { (f_low / (f_low - f_high)).clamp(0.0, 1.0) } else { 0.5 };
+            let z = low + (high - low) * part;
+            let f = above(z);
             if f < 0.0 { (low, f_low) = (z, f) } else { (high, f_high) = (z, f) }
         }
         let hit = origin + d * high;

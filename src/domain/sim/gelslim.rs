@@ -13,7 +13,7 @@ use super::tools::ToolSpec;
 use super::{GelSlimConfig, rig};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::RgbGrid;
-use crate::domain::sample::GelSlimTouch;
+use crate::domain::sample::{GelSlimImages, GelSlimTouch};
 use crate::domain::sensor::{Finger, gelslim};
 
 /// Spacing of the grid that the gel is solved on, metres.
@@ -150,9 +150,10 @@ pub(super) fn touch(
         stamp(&mut raw, at, size, config.marker_darkness);
     }
     add_noise(&mut raw, config.noise, &mut Noise::new(seed, Stream::GelNoise, finger.index()));
-    // same size by construction
-    GelSlimTouch::from_images(raw, reference.clone())
-        .unwrap_or_else(|| GelSlimTouch { images: None, difference: reference })
+    let difference = RgbGrid::from_fn(gelslim::WIDTH, gelslim::HEIGHT, |x, y| {
+        std::array::from_fn(|c| raw[(x, y)][c] - reference[(x, y)][c])
+    });
+    GelSlimTouch { images: Some(GelSlimImages { raw, reference }), difference }
 }
 
 /// A colour at every grid node, for effects that are smooth over a few pixels.

@@ -146,7 +146,7 @@ fn tool(name: &str, seen: bool, bars: Vec<Bar>) -> ToolSpec {
         seen,
         bars,
         half_thickness_m: 0.0115,
-        bevel_width_m: 0.0012,
+        bevel_width_m: 0.00125,
         bevel_depth_m: 0.0016,
     }
 }
@@ -164,40 +164,40 @@ fn ring(corners_mm: &[[f64; 2]], width_mm: f64) -> Vec<Bar> {
 
 fn lab_tools() -> Vec<ToolSpec> {
     vec![
-        tool("pattern_01_2_lines_angle_1", true, vec![line(6.0, 23.0, 25.3, 3.6), line(34.0, 19.5, 16.1, 3.6)]),
-        tool("pattern_02_2_lines_angle_2", true, vec![line(-32.0, 24.1, 19.5, 3.6), line(22.0, 17.2, 21.8, 3.6)]),
-        tool("pattern_03_2_lines_angle_3", true, vec![line(-4.0, 21.8, 23.0, 3.6), line(80.0, 16.1, 19.5, 3.6)]),
+        tool("pattern_01_2_lines_angle_1", true, vec![line(6.0, 29.0, 32.0, 3.7), line(34.0, 24.0, 20.0, 3.7)]),
+        tool("pattern_02_2_lines_angle_2", true, vec![line(-32.0, 30.0, 24.0, 3.7), line(22.0, 22.0, 27.0, 3.7)]),
+        tool("pattern_03_2_lines_angle_3", true, vec![line(-4.0, 27.0, 29.0, 3.7), line(80.0, 20.0, 24.0, 3.7)]),
         tool(
             "pattern_04_3_lines_angle_1",
             true,
-            vec![arm(180.0, 25.2, 3.6), arm(62.0, 20.4, 3.6), arm(-58.0, 19.2, 3.6)],
+            vec![arm(180.0, 33.0, 3.7), arm(62.0, 27.0, 3.7), arm(-58.0, 25.0, 3.7)],
         ),
         tool(
             "pattern_06_5_lines_angle_1",
             true,
             vec![
-                arm(0.0, 21.6, 3.6),
-                arm(72.0, 20.4, 3.6),
-                arm(144.0, 20.4, 3.6),
-                arm(-144.0, 21.6, 3.6),
-                arm(-72.0, 13.2, 3.6),
+                arm(0.0, 29.0, 3.7),
+                arm(72.0, 27.0, 3.7),
+                arm(144.0, 27.0, 3.7),
+                arm(-144.0, 29.0, 3.7),
+                arm(-72.0, 17.0, 3.7),
             ],
         ),
-        tool("pattern_31_rod", true, vec![line(0.0, 24.1, 24.1, 4.0)]),
-        tool("pattern_32", true, vec![arm(166.0, 24.0, 3.6), arm(-152.0, 26.4, 3.6)]),
-        tool("pattern_33", true, vec![arm(8.0, 25.2, 3.6), arm(70.0, 21.6, 3.6)]),
+        tool("pattern_31_rod", true, vec![line(0.0, 27.0, 27.0, 4.0)]),
+        tool("pattern_32", true, vec![arm(166.0, 32.0, 3.7), arm(-152.0, 35.0, 3.7)]),
+        tool("pattern_33", true, vec![arm(8.0, 33.0, 3.7), arm(70.0, 29.0, 3.7)]),
         tool(
             "pattern_37",
             true,
-            vec![arm(24.0, 22.8, 3.6), arm(-28.0, 25.2, 3.6), arm(108.0, 15.6, 3.6), arm(-128.0, 19.2, 3.6)],
+            vec![arm(24.0, 30.0, 3.7), arm(-28.0, 33.0, 3.7), arm(108.0, 21.0, 3.7), arm(-128.0, 25.0, 3.7)],
         ),
         tool(
             "pattern_05_3_lines_angle_2",
             false,
-            vec![arm(182.0, 24.0, 3.6), arm(38.0, 21.6, 3.6), arm(-44.0, 19.2, 3.6)],
+            vec![arm(182.0, 32.0, 3.7), arm(38.0, 29.0, 3.7), arm(-44.0, 25.0, 3.7)],
         ),
-        tool("pattern_35", false, vec![arm(140.0, 21.6, 3.6), arm(-138.0, 24.0, 3.6), arm(0.0, 18.0, 3.6)]),
-        tool("pattern_36", false, ring(&[[-14.0, 10.0], [0.0, -15.0], [13.0, 11.0]], 3.6)),
+        tool("pattern_35", false, vec![arm(140.0, 29.0, 3.7), arm(-138.0, 32.0, 3.7), arm(0.0, 24.0, 3.7)]),
+        tool("pattern_36", false, ring(&[[-12.0, 6.0], [1.0, -12.0], [9.0, 10.0]], 3.7)),
     ]
 }
 
@@ -214,8 +214,8 @@ pub fn random_tool(seed: u64) -> ToolSpec {
             let through = noise.unit() < 0.45;
             let mut angle = noise.uniform(-180.0, 180.0);
             for _ in 0..count {
-                let front = noise.uniform(11.0, 27.0);
-                let back = if through || count == 1 { noise.uniform(5.0, 25.0) } else { 0.0 };
+                let front = noise.uniform(12.0, 36.0);
+                let back = if through || count == 1 { noise.uniform(5.0, 32.0) } else { 0.0 };
                 bars.push(line(angle, back, front, width));
                 angle += noise.uniform(22.0, if through { 90.0 } else { 125.0 });
             }
@@ -224,11 +224,11 @@ pub fn random_tool(seed: u64) -> ToolSpec {
             // V, sometimes with a third bar
             let angle = noise.uniform(-180.0, 180.0);
             let half = noise.uniform(14.0, 55.0);
-            bars.push(arm(angle - half, noise.uniform(15.0, 28.0), width));
-            bars.push(arm(angle + half, noise.uniform(15.0, 28.0), width));
+            bars.push(arm(angle - half, noise.uniform(16.0, 36.0), width));
+            bars.push(arm(angle + half, noise.uniform(16.0, 36.0), width));
             if noise.unit() < 0.4 {
                 let turn = if noise.unit() < 0.5 { 0.0 } else { 180.0 };
-                bars.push(arm(angle + turn + noise.uniform(-15.0, 15.0), noise.uniform(11.0, 24.0), width));
+                bars.push(arm(angle + turn + noise.uniform(-15.0, 15.0), noise.uniform(12.0, 32.0), width));
             }
         }
         12..15 => {
@@ -237,7 +237,7 @@ pub fn random_tool(seed: u64) -> ToolSpec {
             let first = noise.uniform(-180.0, 180.0);
             for i in 0..count {
                 let angle = first + 360.0 * i as f64 / count as f64 + noise.uniform(-14.0, 14.0);
-                bars.push(arm(angle, noise.uniform(11.0, 25.0), width));
+                bars.push(arm(angle, noise.uniform(12.0, 34.0), width));
             }
         }
         kind => {
@@ -245,7 +245,7 @@ pub fn random_tool(seed: u64) -> ToolSpec {
             let corners: Vec<[f64; 2]> = (0..3)
                 .map(|i| {
                     let d = direction(angle - 120.0 * f64::from(i) + noise.uniform(-25.0, 25.0));
-                    (d * noise.uniform(9.0, 19.0)).to_array()
+                    (d * noise.uniform(9.0, 22.0)).to_array()
                 })
                 .collect();
             if kind < 18 {
@@ -272,8 +272,8 @@ pub fn random_tool(seed: u64) -> ToolSpec {
         seen: true,
         bars,
         half_thickness_m: noise.uniform(0.0095, 0.0125),
-        bevel_width_m: half_width_m * noise.uniform(0.45, 0.85),
-        bevel_depth_m: noise.uniform(0.0008, 0.002),
+        bevel_width_m: half_width_m * noise.uniform(0.5, 0.85),
+        bevel_depth_m: noise.uniform(0.001, 0.0025),
     }
 }
 
