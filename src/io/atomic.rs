@@ -35,10 +35,10 @@ pub fn write(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> 
     Ok(())
 }
 
-/// [`write`] with the bytes at hand.
+/// [`write()`] with the bytes at hand.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write(path, |file| io::Write::write_all(file, bytes))
 }

@@ -239,7 +239,7 @@ impl Scanner {
         if found.is_empty() {
             self.problems.push(problem(folder, "the folder has no .pt files", "check that the download is complete"));
         }
-        found.sort_by(|a, b| (&a.name, self.path(&a.file)).cmp(&(&b.name, self.path(&b.file))));
+        found.sort_by(|a, b| a.name.cmp(&b.name).then_with(|| self.path(&a.file).cmp(&self.path(&b.file))));
         let mut once: Vec<Found> = Vec::with_capacity(found.len());
         for file in found {
             match once.last() {
