@@ -159,6 +159,7 @@ impl StudioApp {
             _ => None,
         });
         if let Some(workspace) = switched {
+            self.local.scrolled_to = None;
             commands.push(Command::ShowBothFingers(workspace == Workspace::Label));
         }
         requests.extend(self.runtime.tick(&mut self.state, commands));
@@ -327,7 +328,8 @@ impl eframe::App for StudioApp {
         self.local.textures.begin_frame();
         self.local.visible_next = BTreeSet::new();
         self.local.readout = None;
-        let hovered_before = self.local.hovered_pane.take();
+        self.local.hover_claimed = false;
+        self.local.hovered_pane = None;
         let workspace = self.state.settings.workspace;
         let stored = self.state.settings.layouts.get(workspace.name());
         let mut tree = self.trees.remove(&workspace).unwrap_or_else(|| layout::restore(stored, workspace));
@@ -393,7 +395,7 @@ impl eframe::App for StudioApp {
         if edited {
             self.store_layout(workspace);
         }
-        self.after_panes(&ctx, hovered_before, &mut out);
+        self.after_panes(&ctx, &mut out);
         self.inbox.append(&mut out);
         if !self.inbox.is_empty() {
             ctx.request_repaint();
@@ -412,15 +414,13 @@ impl eframe::App for StudioApp {
 
 impl StudioApp {
     /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more.
-    fn after_panes(&mut self, ctx: &egui::Context, hovered_before: Option<Pane>, out: &mut Vec<Command>) {
+    fn after_panes(&mut self, ctx: &egui::Context, out: &mut Vec<Command>) {
         self.local.visible = std::mem::take(&mut self.local.visible_next);
         if self.local.visible != self.state.selection.panes {
             out.push(Command::ShowPanes(self.local.visible.clone()));
         }
-        if self.local.hovered_pane.is_none()
-            && hovered_before.is_some()
-            && ctx.input(|i| i.pointer.hover_pos().is_none())
-        {
+        let left = ctx.input(|i| i.pointer.is_moving() || i.pointer.hover_pos().is_none());
+        if self.state.selection.hover.is_some() && !self.local.hover_claimed && left {
             out.push(Command::HoverPixel(None));
         }
         if self.local.readout != self.local.readout_shown {

@@ -209,10 +209,13 @@ pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
             ui.set_max_width(520.0);
             ui.horizontal(|ui| {
                 ui.vertical(|ui| {
-                    ui.label(
-                        RichText::new("Simulated touches are open; the first prediction is being made.")
-                            .color(cx.p.strong),
-                    );
+                    let made = cx.state.chosen(cx.state.selection.finger).is_some();
+                    let first = if made {
+                        "Simulated touches are open, with a first prediction beside the measurement."
+                    } else {
+                        "Simulated touches are open; a first prediction is being made."
+                    };
+                    ui.label(RichText::new(first).color(cx.p.strong));
                     ui.label("D and A step through the pairs, Ctrl+G predicts the one on screen.");
                     ui.label("Ctrl+P finds everything else. Drop a folder here to open your own data.");
                 });

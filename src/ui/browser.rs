@@ -188,12 +188,13 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.spacing_mut().item_spacing.y = spacing;
     let mut area = ScrollArea::vertical().auto_shrink(false).id_salt("pairs");
     // A step by key may leave the visible rows: follow it, once.
-    if selected_row != cx.local.scrolled_to {
-        cx.local.scrolled_to = selected_row;
+    if Some(selected_row) != cx.local.scrolled_to {
+        let fresh = cx.local.scrolled_to.is_none();
+        cx.local.scrolled_to = Some(selected_row);
         if let Some(row) = selected_row {
             let rows = &library.rows;
             let height = ui.available_height();
-            if !(rows.start < row && row + 2 < rows.end) {
+            if fresh || !(rows.start < row && row + 2 < rows.end) {
                 let offset = row as f32 * (ROW + spacing) - height * 0.5 + ROW * 0.5;
                 area = area.vertical_scroll_offset(offset.max(0.0));
             }

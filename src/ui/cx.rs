@@ -128,8 +128,10 @@ pub(super) struct Local {
     pub filter: String,
     /// Whether the filter wants the keyboard.
     pub focus_filter: bool,
-    /// The row that the list was last scrolled to.
-    pub scrolled_to: Option<usize>,
+    /// The row that the list was last scrolled to; `None` where the list is a new one.
+    pub scrolled_to: Option<Option<usize>>,
+    /// Whether a pane has the pixel under the pointer in this frame.
+    pub hover_claimed: bool,
     /// Dialogs.
     pub dialogs: Dialogs,
     /// The command palette.
@@ -182,6 +184,7 @@ impl Local {
             filter: String::new(),
             focus_filter: false,
             scrolled_to: None,
+            hover_claimed: false,
             dialogs: Dialogs::new(native_dialogs),
             palette: PaletteState::default(),
             maximised: None,

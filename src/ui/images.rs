@@ -323,6 +323,7 @@ fn finger_text(state: &State, finger: Finger) -> String {
 
 /// Tells the other panes where the pointer is.
 fn hover(cx: &mut Cx<'_>, finger: Finger, at_px: [f32; 2]) {
+    cx.local.hover_claimed = true;
     let hover = Some(Hover { finger, at_px });
     if cx.state.selection.hover != hover {
         cx.push(Command::HoverPixel(hover));
@@ -392,6 +393,7 @@ fn depth_pane(
 
 fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
     let text = finger_text(cx.state, finger);
+    output.caption(Align2::LEFT_BOTTOM, scale_note(cx.state), super::theme::DARK.caution);
     output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
     let state = cx.state;
     let right = match pane {

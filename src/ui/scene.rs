@@ -128,7 +128,7 @@ fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {
             let Some(parts) = &cloud.fingers[finger.index()] else { continue };
             // The membrane recedes, the contact stands out.
             let rest = super::theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
-            let looks = [(PointSize::Px(1.6), rest, "membrane"), (PointSize::Metres(0.000_35), CONTACT, "contact")];
+            let looks = [(PointSize::Px(1.6), rest, "membrane"), (PointSize::Metres(0.000_3), CONTACT, "contact")];
             for (part, (size, color, name)) in parts.iter().zip(looks) {
                 scene.clouds.push(CloudItem {
                     name: format!("{name} {}", finger.name()),
@@ -240,8 +240,7 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, c
         }
     }
     let Some((finger, index, _, _)) = best else {
-        if cx.state.selection.hover.is_some() {
-            cx.push(Command::HoverPixel(None));
+        if cx.state.selection.hover_point.is_some() {
             cx.push(Command::HoverPoint(None));
         }
         return;
@@ -250,6 +249,7 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, c
     else {
         return;
     };
+    cx.local.hover_claimed = true;
     let hover = Some(Hover { finger, at_px: [f32::from(pixel[0]), f32::from(pixel[1])] });
     if cx.state.selection.hover != hover {
         cx.push(Command::HoverPixel(hover));

@@ -92,8 +92,9 @@ fn rows(cx: &Cx<'_>) -> Vec<Row> {
         if touch.pair.dataset != open.seq {
             continue;
         }
-        let comparison = state.results.comparisons.get(&(recipe.clone(), state.settings.shift));
-        let image = comparison.map_or([None; 3], |c| [c.psnr_db, c.ssim, Some(c.mae_m * 1e3)]);
+        // A finger that was not on screen was not compared.
+        let Some(c) = state.results.comparisons.get(&(recipe.clone(), state.settings.shift)) else { continue };
+        let image = [c.psnr_db, c.ssim, Some(c.mae_m * 1e3)];
         with_prediction.insert(touch.pair);
         out.extend(row(touch.pair.pair, Some(touch.finger), image));
     }

@@ -2,7 +2,7 @@
 
 use touch2touch::app::command::Command;
 use touch2touch::app::library::Place;
-use touch2touch::app::settings::{Theme, Workspace};
+use touch2touch::app::settings::{MaskSource, Theme, Workspace};
 use touch2touch::domain::dataset::PairId;
 
 use super::rig::Rig;
@@ -46,6 +46,10 @@ fn pictures_for_the_docs() {
         rig.shoot(&format!("{name}-demo-align"));
         rig.send(Command::SetWorkspace(Workspace::Label));
         rig.shoot(&format!("{name}-demo-label"));
+        rig.send(Command::SetMaskSource(MaskSource::Unet));
+        rig.shoot(&format!("{name}-demo-label-unet"));
+        rig.send(Command::SetMaskSource(MaskSource::Cad));
+        rig.shoot(&format!("{name}-demo-label-cad"));
         rig.send(Command::SetWorkspace(Workspace::Evaluate));
         for _ in 0..5 {
             rig.send(Command::Step(7));

@@ -68,7 +68,9 @@ impl Colorbar<'_> {
                 let wide = ui.available_width() >= WIDE;
                 let mut edited = range;
                 let lo = end(ui, &mut edited.lo, &format!("{}, lower end", self.label));
-                let note = if self.note.is_empty() { 0.0 } else { 80.0 };
+                // In a narrow pane the note stands on the picture alone: the colours need the room.
+                let noted = wide && !self.note.is_empty();
+                let note = if noted { 80.0 } else { 0.0 };
                 let buttons = match (wide, self.locked.is_some()) {
                     (true, true) => 76.0,
                     (true, false) => 40.0,
@@ -80,7 +82,7 @@ impl Colorbar<'_> {
                 }
                 let hi = end(ui, &mut edited.hi, &format!("{}, upper end", self.label));
                 ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
-                if !self.note.is_empty() {
+                if noted {
                     ui.add(egui::Label::new(egui::RichText::new(self.note).size(SMALL).color(p.caution)))
                         .on_hover_text("The source lost its scale: the range in millimetres is an assumption");
                 }

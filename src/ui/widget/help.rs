@@ -19,7 +19,7 @@ pub const PAINT: &[(&str, &str)] = &[
     ("[ and ], or Shift + wheel", "brush size"),
     ("Wheel", "zoom at the pointer"),
     ("Middle drag or Space + drag", "move all linked images"),
-    ("Double-click with middle or 0", "fit"),
+    ("0", "fit"),
 ];
 
 /// Mouse controls of the 3D panes.

@@ -147,8 +147,8 @@ impl ImageCanvas<'_> {
                 let drift = drift / after.image_rect.size().max(Vec2::splat(1.0));
                 view.centre = [view.centre[0] + drift.x, view.centre[1] + drift.y];
             }
-            let fit_key = ui.input(|i| i.key_pressed(Key::Num0) && i.modifiers.is_none());
-            if (fit_key && !ui.ctx().egui_wants_keyboard_input()) || response.double_clicked() {
+            // Where the primary button paints, two quick dabs are no double-click.
+            if self.primary == Primary::Pan && response.double_clicked() {
                 *view = ViewTransform::default();
             }
             if pan || space {
