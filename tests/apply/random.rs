@@ -96,8 +96,8 @@ proptest! {
         for (name, masks, review) in &end {
             let stored = bench.services.source.labels.lock().unwrap().get(name).cloned().unwrap_or_default();
             prop_assert_eq!(stored.review, *review);
-            for at in 0..2 {
-                prop_assert_eq!(stored.masks[at].as_ref().map(|h| &*h.mask), masks[at].as_ref());
+            for (stored, shown) in stored.masks.iter().zip(masks) {
+                prop_assert_eq!(stored.as_ref().map(|hand| &*hand.mask), shown.as_ref());
             }
         }
         bench.send(Command::ShowBothFingers(true));

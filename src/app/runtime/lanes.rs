@@ -10,7 +10,7 @@ use strum::IntoEnumIterator as _;
 
 use super::super::command::Command;
 use super::super::error::TaskError;
-use super::super::jobs::prepare::RequestJob;
+use super::super::jobs::prepare::{Body, RequestJob};
 use super::super::jobs::{JobCx, Lane};
 use super::super::keys::Request;
 use super::{JobId, Wake, lock};
@@ -27,7 +27,7 @@ pub(super) struct Job {
     pub(super) what: String,
     pub(super) cx: JobCx,
     /// Computes the answer.
-    pub(super) body: Box<dyn FnOnce(&JobCx) -> Result<Command, TaskError> + Send>,
+    pub(super) body: Body<Command>,
     /// The answer when there is none.
     pub(super) failed: Box<dyn FnOnce(TaskError) -> Command + Send>,
 }

@@ -6,15 +6,13 @@ use std::time::Instant;
 use super::super::command::{Command, UiRequest};
 use super::super::effect::Effect;
 use super::super::error::TaskError;
+use super::super::jobs::prepare::Body;
 use super::super::jobs::{Cancel, JobCx, Lane};
 use super::super::results::Prediction;
 use super::super::tasks::Ticket;
 use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
 use crate::domain::sample::Sample;
-
-/// The body of a job that answers with a command.
-type Body = Box<dyn FnOnce(&JobCx) -> Result<Command, TaskError> + Send>;
 
 impl Runtime {
     pub(super) fn perform(&mut self, effect: Effect, ui: &mut Vec<UiRequest>) {
@@ -43,7 +41,7 @@ impl Runtime {
             Effect::Generate { ticket, recipe, bundle, source, sample } => {
                 let services = self.services.clone();
                 let what = format!("Generate with {}", bundle.name);
-                let body: Body = Box::new(move |cx| {
+                let body: Body<Command> = Box::new(move |cx| {
                     let start = Instant::now();
                     let sample = match sample {
                         Some(sample) => sample,
@@ -101,7 +99,7 @@ impl Runtime {
     }
 
     /// Queues a job that a person started.
-    fn task(&mut self, lane: Lane, ticket: Ticket, what: String, body: Body) {
+    fn task(&mut self, lane: Lane, ticket: Ticket, what: String, body: Body<Command>) {
         let cancel = Cancel::default();
         self.cancels.insert(ticket, cancel.clone());
         let (latest, wake) = (self.progress.clone(), self.wake.clone());
@@ -124,7 +122,7 @@ impl Runtime {
     }
 
     /// Queues a job that shows no progress.
-    fn unwatched(&self, lane: Lane, id: JobId, what: &str, body: Body) {
+    fn unwatched(&self, lane: Lane, id: JobId, what: &str, body: Body<Command>) {
         let failed = Box::new(Command::SaveFailed);
         self.lanes.submit(lane, Job { id, what: what.to_owned(), cx: JobCx::unwatched(), body, failed });
     }

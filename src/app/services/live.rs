@@ -36,12 +36,15 @@ const SETTINGS_FILE: &str = "settings.json";
 /// Where a settings file that cannot be used is put.
 const BAD_SETTINGS_FILE: &str = "settings.bad.json";
 
+/// A model in memory, with the bundle's identity and the runtime it was loaded for.
+type Loaded<T> = Option<((Arc<str>, RuntimeChoice), T)>;
+
 /// The program's services. Models stay loaded between calls.
 #[derive(Debug, Default)]
 pub struct LiveServices {
     config_folder: Option<PathBuf>,
-    generator: Mutex<Option<((Arc<str>, RuntimeChoice), Generator)>>,
-    mask_model: Mutex<Option<((Arc<str>, RuntimeChoice), MaskModel)>>,
+    generator: Mutex<Loaded<Generator>>,
+    mask_model: Mutex<Loaded<MaskModel>>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
