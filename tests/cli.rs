@@ -1,1 +1,148 @@
-//! (filled by its layer)
+//! The program as a user runs it: one JSON object on standard output, exit codes that mean what they say.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+use crate::support;
+
+fn run(args: &[&str], data: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_touch2touch"))
+        .args(args)
+        // Nothing of the user's may be read or written by a test.
+        .env("TOUCH2TOUCH_DATA", data)
+        .env("XDG_DATA_HOME", data)
+        .output()
+        .unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    let text = String::from_utf8(output.stdout.clone()).unwrap();
+    assert_eq!(text.trim().lines().count(), 1, "one line of JSON, got {text:?}");
+    serde_json::from_str(&text).unwrap()
+}
+
+fn error_text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
+    let dir = tempfile::tempdir().unwrap();
+    let data = dir.path().join("data");
+    let set = dir.path().join("set");
+    let (set_text, data_path) = (set.to_str().unwrap(), data.as_path());
+
+    let tools = "pattern_04_3_lines_angle_1,pattern_36";
+    let made = run(&["simulate", "--out", set_text, "--tools", tools, "--grasps", "2", "--seed", "7", "--json"], data_path);
+    assert!(made.status.success(), "{}", error_text(&made));
+    assert_eq!(json(&made)["pairs"], 4);
+
+    let doctor = run(&["doctor", set_text, "--json"], data_path);
+    assert!(doctor.status.success(), "{}", error_text(&doctor));
+    assert_eq!(json(&doctor)["pairs"], 4);
+    assert_eq!(json(&doctor)["problems"], Value::Array(vec![]), "our own files are sound");
+
+    let pose = run(&["pose", set_text, "--engine", "all", "--json"], data_path);
+    assert!(pose.status.success(), "{}", error_text(&pose));
+    let report = json(&pose);
+    let cases = report["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 8, "four pairs, two engines");
+    for case in cases {
+        for key in ["name", "angle_deg", "truth_deg", "error_deg", "y_m", "z_m", "ms", "stop"] {
+            assert!(!case[key].is_null(), "{key} is missing in {case}");
+        }
+        // The CAD mask at the true pose leaves well under two degrees on simulated data.
+        assert!(case["error_deg"].as_f64().unwrap() < 2.0, "{case}");
+    }
+    for engine in ["distance_field", "lab_icp"] {
+        for key in ["mean_deg", "median_deg", "success_5", "success_10", "median_ms"] {
+            assert!(report["summary"]["engines"][engine][key].is_number(), "{engine} {key}");
+        }
+    }
+
+    let masks = dir.path().join("masks");
+    let nothing = run(&["masks", "export", "--input", set_text, "--out", masks.to_str().unwrap()], data_path);
+    assert_eq!(nothing.status.code(), Some(2), "nothing was corrected by hand yet");
+    assert!(error_text(&nothing).contains("--pairs all"));
+    let all = ["masks", "export", "--input", set_text, "--out", masks.to_str().unwrap(), "--pairs", "all", "--json"];
+    let exported = run(&all, data_path);
+    assert!(exported.status.success(), "{}", error_text(&exported));
+    let counts = json(&exported);
+    let total: i64 = ["train", "val", "test"].iter().map(|k| counts[k].as_i64().unwrap()).sum();
+    assert_eq!(total, 8, "two fingers of four pairs");
+    assert!(touch2touch::io::export_unet::check_folder(&masks).problems.is_empty());
+}
+
+#[test]
+fn the_same_seed_writes_the_same_bytes() {
+    let dir = tempfile::tempdir().unwrap();
+    let files: Vec<Vec<u8>> = ["a", "b"]
+        .iter()
+        .map(|name| {
+            let out = dir.path().join(name);
+            let args = ["simulate", "--out", out.to_str().unwrap(), "--tools", "pattern_31_rod", "--grasps", "1"];
+            assert!(run(&args, dir.path()).status.success());
+            std::fs::read(out.join("test/test_only/bubbles/pattern_31_rod_data_0.pt")).unwrap()
+        })
+        .collect();
+    assert!(files[0] == files[1]);
+}
+
+#[test]
+fn what_cannot_be_done_is_said_and_is_no_success() {
+    let dir = tempfile::tempdir().unwrap();
+    let absent = run(&["doctor", "/no/such/folder", "--json"], dir.path());
+    assert_eq!(absent.status.code(), Some(2));
+    assert!(absent.stdout.is_empty(), "no JSON where there is no report");
+    assert!(error_text(&absent).contains("/no/such/folder"), "{}", error_text(&absent));
+
+    let tool = run(&["simulate", "--out", "x", "--tools", "hammer"], dir.path());
+    assert_eq!(tool.status.code(), Some(2));
+    assert!(error_text(&tool).contains("pattern_31_rod"), "the message names what there is");
+
+    let bundle = run(&["bundle", "check", dir.path().to_str().unwrap(), "--json"], dir.path());
+    assert_eq!(bundle.status.code(), Some(1), "checked, but not sound");
+    assert!(!json(&bundle)["problems"].as_array().unwrap().is_empty());
+}
+
+#[cfg(feature = "onnx")]
+#[test]
+fn predictions_are_written_scored_and_equal_for_equal_seeds() {
+    let dir = tempfile::tempdir().unwrap();
+    let predict = |name: &str, seed: &str| {
+        let out = dir.path().join(name);
+        let args = ["generate", "--input", "demo", "--limit", "1", "--steps", "2", "--seed", seed, "--runtime", "rten"];
+        let done = run(&[&args[..], &["--out", out.to_str().unwrap(), "--json"]].concat(), dir.path());
+        assert!(done.status.success(), "{}", error_text(&done));
+        let report = json(&done);
+        let pair = &report["pairs"][0];
+        for key in ["psnr_db", "ssim", "seconds"] {
+            assert!(pair[key].is_number() && report["mean"][key].is_number(), "{key}: {report}");
+        }
+        let arrays: Vec<_> = std::fs::read_dir(&out)
+            .unwrap()
+            .map(|e| e.unwrap().path())
+            .filter(|p| p.extension().is_some_and(|e| e == "npy"))
+            .collect();
+        assert_eq!(arrays.len(), 1);
+        std::fs::read(&arrays[0]).unwrap()
+    };
+    let first = predict("a", "1");
+    assert!(first == predict("b", "1"), "the same seed gives the same bytes");
+    assert!(first != predict("c", "2"), "another seed gives another imprint");
+}
+
+#[test]
+fn the_lab_sample_is_within_two_degrees() {
+    let Some(shared) = support::shared() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let pose = run(&["pose", shared.join("lab-sample").to_str().unwrap(), "--json"], dir.path());
+    assert!(pose.status.success(), "{}", error_text(&pose));
+    let report = json(&pose);
+    assert_eq!(report["cases"].as_array().unwrap().len(), 4);
+    for case in report["cases"].as_array().unwrap() {
+        assert!(case["error_deg"].as_f64().unwrap() < 2.0, "{case}");
+    }
+}
