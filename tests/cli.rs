@@ -35,7 +35,8 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let (set_text, data_path) = (set.to_str().unwrap(), data.as_path());
 
     let tools = "pattern_04_3_lines_angle_1,pattern_36";
-    let made = run(&["simulate", "--out", set_text, "--tools", tools, "--grasps", "2", "--seed", "7", "--json"], data_path);
+    let made =
+        run(&["simulate", "--out", set_text, "--tools", tools, "--grasps", "2", "--seed", "7", "--json"], data_path);
     assert!(made.status.success(), "{}", error_text(&made));
     assert_eq!(json(&made)["pairs"], 4);
 

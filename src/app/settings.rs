@@ -269,7 +269,7 @@ impl Default for MaskSettings {
             tool: MaskTool::Brush,
             last_tool: MaskTool::Eraser,
             radius_px: 4.0,
-            source: MaskSource::Threshold,
+            source: MaskSource::Unet,
             // The middle of the thresholds that the lab used for its tools (0.0048 to 0.0053 m).
             threshold_m: 0.005,
             top_percent: 15.0,
@@ -322,13 +322,13 @@ impl MaskTool {
 #[serde(rename_all = "snake_case")]
 pub enum MaskSource {
     /// Imprint above a depth.
-    #[default]
     Threshold,
     /// The deepest share of the pixels.
     TopPercent,
     /// Near the CAD model at the true pose: the lab's labels.
     Cad,
     /// The mask model.
+    #[default]
     Unet,
     /// The simulator's truth.
     Truth,

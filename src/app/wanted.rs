@@ -160,7 +160,10 @@ impl State {
                 }
                 Ok(MaskRecipe::Cad(mask.cad_distance_m.into()))
             }
-            MaskSource::Unet => Ok(MaskRecipe::Unet(self.bundle(BundleKind::Mask)?.id.clone())),
+            // Without a model the threshold serves: the recipe, and with it the name on screen, says so.
+            MaskSource::Unet => Ok(self
+                .bundle(BundleKind::Mask)
+                .map_or(MaskRecipe::Threshold(mask.threshold_m.into()), |bundle| MaskRecipe::Unet(bundle.id.clone()))),
             MaskSource::Truth => {
                 if bubble.is_some_and(|b| b.truth.is_none()) {
                     return Err(Absent::NotSimulated);

@@ -13,6 +13,7 @@ use crate::app::command::Command;
 use crate::app::keys::{ImprintSource, PoseEngine};
 use crate::app::state::{Absent, Lookup};
 use crate::domain::postprocess::Stats;
+use crate::domain::sample::Scale;
 use crate::domain::sensor::Finger;
 use crate::domain::units;
 use strum::IntoEnumIterator as _;
@@ -113,7 +114,8 @@ fn absent_short(absent: Absent) -> &'static str {
 fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(4.0);
     ui.label(section("Prediction against truth", cx.p)).on_hover_text(
-        "PSNR and SSIM as the lab computes them: both images scaled to 0..1 one by one (min-max), data range 1",
+        "PSNR and SSIM of the imprints in metres with the lab's peak of 22.5 mm as range; where the source lost its \
+         scale, both images are scaled to 0..1 one by one (min-max)",
     );
     let fingers = Finger::BOTH.into_iter().filter(|f| cx.state.selection.fingers().contains(f));
     for finger in fingers {
@@ -126,9 +128,13 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
                 if cx.state.selection.both_fingers {
                     ui.label(caption(format!("{} finger", finger.name()), cx.p));
                 }
+                let (psnr, ssim) = match c.scale {
+                    Scale::Measured => ("PSNR (peak 22.5 mm)", "SSIM (range 22.5 mm)"),
+                    Scale::Assumed => ("PSNR (min-max 0..1)", "SSIM (min-max 0..1)"),
+                };
                 for (name, number) in [
-                    ("PSNR (min-max 0..1)", number(c.psnr_db, 1, " dB")),
-                    ("SSIM (min-max 0..1)", number(c.ssim, 3, "")),
+                    (psnr, number(c.psnr_db, 1, " dB")),
+                    (ssim, number(c.ssim, 3, "")),
                     ("Mean |error|", units::text_mm(c.mae_m)),
                 ] {
                     line(ui, (name, cx.p.weak), &[(number, cx.p.strong)], 0.0);

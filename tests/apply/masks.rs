@@ -44,6 +44,8 @@ fn count(mask: &Mask) -> usize {
 #[test]
 fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     let mut bench = bench();
+    bench.send(Command::SetMaskSource(MaskSource::Threshold));
+    bench.settle();
     let automatic = mask(&bench, Finger::Right);
     assert_eq!(count(&automatic), 35 + 4, "the ring and the spot");
     begin(&mut bench, Finger::Right, [12.0, 2.0]);
