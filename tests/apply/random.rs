@@ -101,7 +101,7 @@ proptest! {
             }
         }
         bench.send(Command::ShowBothFingers(true));
-        let mut steps = vec![0u32; 12];
+        let mut steps = [0u32; 12];
         for pair in 0..12 {
             bench.send(Command::Select(PairId(pair)));
             let name = bench.state.pair_name().to_owned();
@@ -111,9 +111,9 @@ proptest! {
             }
         }
         prop_assert_eq!(said(&bench.state.document), Said::new());
-        for pair in 0..12 {
+        for (pair, count) in (0..).zip(steps) {
             bench.send(Command::Select(PairId(pair)));
-            for _ in 0..steps[pair as usize] {
+            for _ in 0..count {
                 bench.send(Command::Redo);
             }
         }

@@ -40,14 +40,8 @@ fn the_pose_follows_the_mask() {
     bench.send(Command::StrokeTo([at_px[0] + 10.0, at_px[1] + 10.0]));
     assert!(bench.state.wanted().is_empty());
     assert!(matches!(bench.state.pose(MEASURED), Lookup::Stale(_)), "the old pose stays until the new one is there");
-    let t = std::time::Instant::now();
     bench.send(Command::EndStroke);
     bench.settle();
-    eprintln!(
-        "TIMING stroke end to pose {:?}, pose itself {} ms",
-        t.elapsed(),
-        bench.state.pose(MEASURED).ready().unwrap().ms
-    );
     let after = bench.state.pose(MEASURED).ready().unwrap();
     assert!(after.num_points < pose.num_points);
     // The other registration is another result; the first one is still there.
