@@ -10,6 +10,8 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
+from . import diffusion
+
 LATENT = 4
 CONDITION = 64
 
@@ -133,8 +135,26 @@ def time_embedding(t, dim=96):
     return torch.cat([torch.cos(angles), torch.sin(angles)], dim=1)
 
 
+# Variance assumed around the condition encoder's own estimate of the latent.
+ESTIMATE_VARIANCE = 0.05
+
+
+def base_weights():
+    """Weights (1000,2) of the noisy latent and of the encoder's estimate in the best linear prediction of v.
+
+    With the latent drawn from N(estimate, variance), its posterior mean is estimate + k (x - a estimate).
+    """
+    bars = torch.from_numpy(diffusion.alpha_bar())
+    a, s = bars.sqrt(), (1 - bars).sqrt()
+    k = a * ESTIMATE_VARIANCE / (a * a * ESTIMATE_VARIANCE + s * s)
+    return torch.stack([(a - k) / s, (k * a - 1) / s], dim=1).float()
+
+
 class Denoiser(nn.Module):
-    """UNet on the latent (16, 8, 4 cells wide), conditioned by concatenation; predicts v."""
+    """UNet on the latent (16, 8, 4 cells wide), conditioned by concatenation.
+
+    Predicts v as a correction of what follows from the condition's estimate of the latent alone.
+    """
 
     def __init__(self, widths=(96, 144, 160), embedding=160):
         super().__init__()
@@ -151,8 +171,11 @@ class Denoiser(nn.Module):
         self.norm, self.out = norm(a), nn.Conv2d(a, LATENT, 3, padding=1)
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
+        self.register_buffer("base", base_weights(), persistent=False)
 
     def forward(self, latent, timestep, condition):
+        weights = self.base[timestep][:, :, None, None]
+        base = weights[:, :1] * latent + weights[:, 1:] * condition[:, :LATENT]
         e = self.time(time_embedding(timestep))
         h1 = self.d1(self.enter(torch.cat([latent, condition], dim=1)), e)
         h2 = self.d2(self.down1(h1), e)
@@ -162,7 +185,7 @@ class Denoiser(nn.Module):
         h = self.m2(h, e)
         h = self.u2(torch.cat([F.interpolate(self.up2(h), scale_factor=2.0, mode="nearest"), h2], dim=1), e)
         h = self.u1(torch.cat([F.interpolate(self.up1(h), scale_factor=2.0, mode="nearest"), h1], dim=1), e)
-        return self.out(F.silu(self.norm(h)))
+        return base + self.out(F.silu(self.norm(h)))
 
 
 class Autoencoder(nn.Module):

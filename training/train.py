@@ -163,7 +163,7 @@ def generator(args):
         randomised = torch.from_numpy(shards.meta[batch, 6] == 0)
         # A turned or mirrored pair is a sensor with its lights elsewhere: only for the randomised ones. The symmetry
         # changes from batch to batch, so that most passes meet most samples in the plain orientation.
-        k = int(rng.integers(1, 8)) if rng.random() < 0.35 else 0
+        k = int(rng.integers(1, 8)) if rng.random() < 0.15 else 0
         gelslim = shards.gelslim(batch)
         z = latents.take(batch, 0)
         if k and randomised.any():
