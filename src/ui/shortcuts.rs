@@ -149,7 +149,7 @@ mod tests {
         let mut raw = egui::RawInput::default();
         raw.events.push(egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers });
         let mut got = Vec::new();
-        let _ = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), false)));
+        drop(ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), false))));
         got
     }
 
