@@ -1,4 +1,4 @@
-#![allow(clippy::print_stdout, reason = "a bench prints its table")]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its table")]
 //! Time and error of the registration engines side by side: `cargo bench --no-default-features [-- FOLDER]`.
 //!
 //! FOLDER holds cases in the form of the reference grasps (`case_*.npz`, `tool_NN.stl`); without one, the folder
