@@ -419,8 +419,7 @@ impl StudioApp {
         if self.local.visible != self.state.selection.panes {
             out.push(Command::ShowPanes(self.local.visible.clone()));
         }
-        let left = ctx.input(|i| i.pointer.is_moving() || i.pointer.hover_pos().is_none());
-        if self.state.selection.hover.is_some() && !self.local.hover_claimed && left {
+        if self.state.selection.hover.is_some() && !self.local.hover_claimed {
             out.push(Command::HoverPixel(None));
         }
         if self.local.readout != self.local.readout_shown {

@@ -128,7 +128,7 @@ fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {
             let Some(parts) = &cloud.fingers[finger.index()] else { continue };
             // The membrane recedes, the contact stands out.
             let rest = super::theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
-            let looks = [(PointSize::Px(1.6), rest, "membrane"), (PointSize::Metres(0.000_3), CONTACT, "contact")];
+            let looks = [(PointSize::Px(1.2), rest, "membrane"), (PointSize::Metres(0.000_3), CONTACT, "contact")];
             for (part, (size, color, name)) in parts.iter().zip(looks) {
                 scene.clouds.push(CloudItem {
                     name: format!("{name} {}", finger.name()),
@@ -222,7 +222,9 @@ fn grid(p: &Palette) -> Vec<crate::gpu::lines::Segment> {
 /// The point under the pointer becomes the pixel under the pointer of all images.
 fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let Some(pointer) = output.pointer else { return };
-    if !ui.input(|i| i.pointer.is_moving()) || output.moved {
+    if ui.input(|i| i.pointer.delta() == egui::Vec2::ZERO) || output.moved {
+        // At rest, or while the view turns, the mark stays where it is.
+        cx.local.hover_claimed = true;
         return;
     }
     let camera = &cx.local.scenes[source as usize].camera;
