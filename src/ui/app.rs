@@ -151,6 +151,14 @@ impl StudioApp {
             // The pen is not to be followed into another state.
             self.local.painting = None;
         }
+        let other_poses = |c: &Command| {
+            use Command::{ResetSettings, SetMask, SetMaskSource, SetPoseEngine, SetShift};
+            matches!(c, SetMask(_) | SetMaskSource(_) | SetPoseEngine(_) | SetShift(_) | ResetSettings)
+        };
+        if commands.iter().any(other_poses) {
+            // Figures made in another way do not belong into the same table.
+            self.local.seen.clear();
+        }
         if commands.iter().any(|c| matches!(c, Command::ResetSettings)) {
             self.trees.clear();
         }
