@@ -39,10 +39,11 @@ class Bundle:
         feed = {i.name: t.numpy() for i, t in zip(graph.get_inputs(), inputs)}
         return torch.from_numpy(graph.run(None, feed)[0])
 
-    def predict(self, gelslim, steps=20, seed=42):
+    def predict(self, gelslim, steps=None, seed=42):
         """Model images (N,1,128,128) in [-1,1] for standardised GelSlim images."""
         condition = self.run("condition_encoder", gelslim)
-        latent = diffusion.ddim(lambda x, t, c: self.run("denoiser", x, t, c), condition, steps, seed)
+        latent = diffusion.ddim(lambda x, t, c: self.run("denoiser", x, t, c), condition,
+                                steps or self.manifest["defaults"]["steps"], seed)
         return self.run("decoder", latent)
 
     def mask(self, metres):

@@ -43,7 +43,7 @@ def load_generator(run):
     return encoder.eval(), denoiser.eval(), decoder.eval(), ae, state
 
 
-def predict(nets, gelslim, steps=20, seed=42):
+def predict(nets, gelslim, steps=10, seed=42):
     """Imprints in metres, raw orientation, for standardised GelSlim images."""
     encoder, denoiser, decoder = nets
     with torch.no_grad():
@@ -116,7 +116,7 @@ def generator(args, out):
         "shift": {"pred_mean": (predicted.mean().item() + data.RANGE_M[1]) / 2,
                   "pred_std": predicted.std(correction=0).item() / 2,
                   "gt_mean": measured.mean().item(), "gt_std": measured.std(correction=0).item()},
-        "defaults": {"steps": 20, "sampler": "ddim", "spacing": "trailing", "eta": 0.0, "seed": 42},
+        "defaults": {"steps": 10, "sampler": "ddim", "spacing": "trailing", "eta": 0.0, "seed": 42},
         "provenance": provenance(shards, {"autoencoder": ae, "generator": state}, differences),
     }
 
