@@ -12,7 +12,7 @@ use super::error::TaskError;
 use super::keys::{DatasetSeq, ImprintSource, PoseEngine, Recipe, Request, ShiftMode};
 use super::library::{BundleInfo, Place, Sort};
 use super::results::{Clouds, Comparison, PoseResult, Prediction};
-use super::services::{DataSource, ToolModel};
+use super::services::{DataSource, NamedTool};
 use super::settings::{
     ColourMap, ColourRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, RuntimeChoice, Settings, Theme,
     Workspace,
@@ -320,7 +320,7 @@ pub enum Computed {
     /// Of [`Request::Labels`].
     Labels(Box<PairLabels>),
     /// Of [`Request::Tool`].
-    Tool(Arc<ToolModel>),
+    Tool(Arc<NamedTool>),
     /// Of [`Request::Imprint`] and [`Request::Thumbnail`].
     Depth(Arc<DepthMap>),
     /// Of [`Request::Comparison`].

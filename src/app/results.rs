@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::DVec3;
 
 use super::keys::{CloudKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, ShiftMode, TouchKey};
-use super::services::{Generated, ToolModel};
+use super::services::{Generated, NamedTool};
 use crate::domain::align::AlignReport;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
@@ -194,13 +194,9 @@ pub struct PoseResult {
     pub stop: String,
     /// Whether it stopped because nothing moved any more.
     pub converged: bool,
-    /// `grasp_from_object` after each iteration of the winning start, the start first.
-    pub iterations: Vec<PlanarPose>,
-    /// Distance of each contact point to the model at the pose, metres, in the order of [`Clouds::contact_points`].
-    pub residuals_m: Vec<f64>,
     /// Time it took, milliseconds.
     pub ms: f64,
-    /// Everything the registration says about itself, recorded.
+    /// Everything the registration says about itself; no trace.
     pub report: AlignReport,
 }
 
@@ -224,7 +220,7 @@ pub struct Results {
     /// Poses.
     pub poses: Cache<PoseKey, PoseResult>,
     /// Tools.
-    pub tools: Cache<String, ToolModel>,
+    pub tools: Cache<String, NamedTool>,
     /// The prediction shown for each touch: the last one generated, or the one chosen.
     pub chosen: BTreeMap<TouchKey, Recipe>,
     /// All predictions made for each touch, oldest first.

@@ -15,10 +15,10 @@ use super::jobs::JobCx;
 use super::keys::{Recipe, ShiftMode};
 use super::library::{BundleInfo, Place};
 use super::settings::{RuntimeChoice, Settings};
-use crate::domain::align::DistanceField;
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
-use crate::domain::mesh::{MeshDistance, TriMesh};
+use crate::domain::mesh::TriMesh;
+use crate::domain::pose::ToolModel;
 use crate::domain::postprocess::{DepthChain, RawPrediction};
 use crate::domain::sample::Sample;
 
@@ -80,19 +80,13 @@ pub struct Generated {
     pub runtime: String,
 }
 
-/// A tool, and what the registration derives from its CAD model.
+/// A tool's name and its CAD model with what the registration derives from it.
 #[derive(Clone, Debug)]
-pub struct ToolModel {
+pub struct NamedTool {
     /// The tool's name.
     pub name: String,
-    /// The CAD model, metres, object frame.
-    pub mesh: TriMesh,
-    /// Distance to the silhouette in the y-z plane.
-    pub field: DistanceField,
-    /// Distance to the surface in space, for masks from the CAD model.
-    pub distance: MeshDistance,
-    /// The lab's model points: uniform on the surface, `(y, z)` in metres.
-    pub points_yz: Vec<glam::DVec2>,
+    /// The CAD model, ready for registration.
+    pub model: ToolModel,
 }
 
 /// Files and models, as the lanes use them.

@@ -8,7 +8,7 @@ use super::keys::{
 };
 use super::library::{BundleInfo, BundleKind};
 use super::results::{Clouds, Comparison, PoseResult};
-use super::services::ToolModel;
+use super::services::NamedTool;
 use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use crate::domain::grid::{DepthMap, Mask};
@@ -248,7 +248,7 @@ impl State {
     }
 
     /// The tool of the selected pair, with its CAD model.
-    pub fn tool(&self) -> Lookup<'_, ToolModel> {
+    pub fn tool(&self) -> Lookup<'_, NamedTool> {
         match self.tool_request() {
             Err(absent) => Lookup::Absent(absent),
             Ok(request) => match self.tool_name().ok().and_then(|name| self.results.tools.get(&name.to_owned())) {

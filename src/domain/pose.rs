@@ -166,6 +166,22 @@ pub fn contact_cloud(fingers: &Fingers<'_>) -> Result<ContactCloud, PoseError> {
     if cloud.counts == [None, None] { Err(PoseError::NoFinger) } else { Ok(cloud) }
 }
 
+/// Contact points (`(y, z)` in the grasp frame, metres) to the tool's pose: what every caller ends in.
+///
+/// # Errors
+/// [`AlignError`] for too few points or none near the tool.
+pub fn register(points: &[DVec2], tool: &ToolModel, engine: Engine, record: bool) -> Result<AlignReport, AlignError> {
+    match engine {
+        Engine::DistanceField => align(points, &tool.field, &AlignConfig { record, ..AlignConfig::default() }),
+        Engine::LabIcp => {
+            let config = LabIcpConfig { record, ..LabIcpConfig::default() };
+            let mut report = lab_icp(points, &tool.model_points, &config)?;
+            report.observability = Some(observability(points, &tool.field, report.grasp_from_object));
+            Ok(report)
+        }
+    }
+}
+
 /// Imprints, cameras and masks to the tool's pose in the hand. `record` keeps per-iteration states and per-point
 /// residuals (see [`AlignReport`]).
 ///
@@ -180,16 +196,7 @@ pub fn estimate(
     record: bool,
 ) -> Result<PoseReport, PoseError> {
     let cloud = contact_cloud(fingers)?;
-    let points = cloud.yz();
-    let report = match engine {
-        Engine::DistanceField => align(&points, &tool.field, &AlignConfig { record, ..AlignConfig::default() })?,
-        Engine::LabIcp => {
-            let config = LabIcpConfig { record, ..LabIcpConfig::default() };
-            let mut report = lab_icp(&points, &tool.model_points, &config)?;
-            report.observability = Some(observability(&points, &tool.field, report.grasp_from_object));
-            report
-        }
-    };
+    let report = register(&cloud.yz(), tool, engine, record)?;
     Ok(PoseReport {
         engine,
         grasp_from_object: report.grasp_from_object,

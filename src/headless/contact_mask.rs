@@ -3,7 +3,9 @@
 use clap::{Args, ValueEnum};
 
 use super::predict::Predictor;
-use crate::domain::contact;
+use crate::app::jobs::compute;
+use crate::app::keys::MaskRecipe;
+use crate::domain::contact::LAB_CAD_DISTANCE_M;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::pose::ToolModel;
@@ -49,7 +51,7 @@ impl MaskFrom {
     }
 }
 
-/// The mask of one imprint. `truth` is `grasp_from_object`; `auto` means the mask model here.
+/// The mask of one imprint, by the studio's own functions. `truth` is `grasp_from_object`; `auto` means the mask model here.
 ///
 /// # Errors
 /// In words, if what the source needs is not there.
@@ -62,23 +64,11 @@ pub(super) fn contact_mask(
     truth: Option<PlanarPose>,
     predictor: &mut Predictor,
 ) -> anyhow::Result<Mask> {
-    match source {
-        MaskFrom::Threshold => Ok(contact::threshold(imprint, args.threshold_mm / 1e3)),
-        MaskFrom::Unet | MaskFrom::Auto => predictor.mask(imprint),
-        MaskFrom::Truth => {
-            let truth = bubble.truth.as_ref();
-            let contact = truth.map(|t| t.contact.clone());
-            contact.ok_or_else(|| anyhow::anyhow!("only pairs of the built-in demo know their true contact mask"))
-        }
-        MaskFrom::Cad => {
-            let truth =
-                truth.ok_or_else(|| anyhow::anyhow!("no true pose is known; use --mask unet or --mask threshold"))?;
-            let camera = bubble.camera.as_ref();
-            let camera =
-                camera.ok_or_else(|| anyhow::anyhow!("no camera data; the imprint cannot be lifted to points"))?;
-            let tool = tool.ok_or_else(|| anyhow::anyhow!("no CAD model of the tool"))?;
-            let max_m = contact::LAB_CAD_DISTANCE_M;
-            Ok(contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), max_m)?)
-        }
-    }
+    let recipe = match source {
+        MaskFrom::Unet | MaskFrom::Auto => return predictor.mask(imprint),
+        MaskFrom::Threshold => MaskRecipe::Threshold((args.threshold_mm / 1e3).into()),
+        MaskFrom::Truth => MaskRecipe::Truth,
+        MaskFrom::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
+    };
+    compute::mask(&recipe, imprint, Some(bubble), tool, truth).map_err(|err| anyhow::anyhow!("{err}"))
 }

@@ -116,7 +116,7 @@ fn update_mesh(cx: &mut Cx<'_>) {
     }
     cx.local.revision += 1;
     let key = (open.seq, tool.name.clone());
-    cx.local.mesh = Some(SceneMesh { key, revision: cx.local.revision, mesh: Arc::new(tool.mesh.clone()) });
+    cx.local.mesh = Some(SceneMesh { key, revision: cx.local.revision, mesh: Arc::new(tool.model.mesh.clone()) });
 }
 
 fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {

@@ -26,7 +26,7 @@ fn the_pose_follows_the_mask() {
     let pose = bench.state.pose(MEASURED).ready().unwrap().clone();
     // The true contact of both fingers: better than the lab's tightest success limit of 5 degrees.
     assert!(pose.error_rad.unwrap() < 5f64.to_radians(), "{:?}", pose.error_rad);
-    assert!(!pose.iterations.is_empty() && !pose.stop.is_empty() && pose.num_points > 100);
+    assert!(pose.report.iterations > 0 && !pose.stop.is_empty() && pose.num_points > 100);
     let cloud = bench.state.cloud(MEASURED).ready().unwrap();
     assert_eq!(cloud.contact_points().len(), pose.num_points);
     // Rubbing out a part: while the pen is down nothing is computed, then cloud and pose are new.
@@ -48,7 +48,7 @@ fn the_pose_follows_the_mask() {
     bench.send(Command::SetPoseEngine(PoseEngine::LabIcp));
     bench.settle();
     let lab = bench.state.pose(MEASURED).ready().unwrap();
-    assert!(lab.error_rad.is_some() && lab.iterations.len() > 1);
+    assert!(lab.error_rad.is_some() && lab.report.iterations > 1);
     bench.send(Command::SetPoseEngine(PoseEngine::DistanceField));
     assert!(bench.state.pose(MEASURED).ready().is_some());
     // Accepting it is a change of the document like any other.

@@ -141,7 +141,7 @@ fn store(state: &mut State, request: Request, computed: Computed) {
             results.thumbnails.insert(key, depth, size);
         }
         (Request::Tool(_, name), Computed::Tool(tool)) => {
-            let mesh = tool.mesh.vertices.len() * 24 + tool.mesh.triangles.len() * 12;
+            let mesh = tool.model.mesh.vertices.len() * 24 + tool.model.mesh.triangles.len() * 12;
             // The registration's field and tree are of the mesh's order, at least a few MB.
             results.tools.insert(name.to_string(), tool, 8 * mesh + (4 << 20));
         }
@@ -168,7 +168,7 @@ fn store(state: &mut State, request: Request, computed: Computed) {
             if let Some(at) = place_of(&key.cloud.parts) {
                 results.latest.entry(at).or_default().1 = Some(PoseKey::clone(&key));
             }
-            let size = std::mem::size_of_val(&*pose) + pose.residuals_m.len() * 24 + pose.iterations.len() * 128;
+            let size = std::mem::size_of_val(&*pose);
             results.poses.insert(key, pose, size);
         }
         (request, _) => log::error!("the result of {request:?} is of another kind"),

@@ -7,13 +7,12 @@ use glam::DVec2;
 use super::super::error::TaskError;
 use super::super::keys::{MaskRecipe, PoseEngine, ShiftMode};
 use super::super::results::{Clouds, Comparison, FingerCloud, PoseResult, Prediction};
-use super::super::services::ToolModel;
-use crate::domain::align::lab_icp::LAB_MODEL_POINTS;
-use crate::domain::align::{AlignConfig, DistanceField, LabIcpConfig, align, lab_icp};
+use super::super::services::NamedTool;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
-use crate::domain::mesh::{MeshDistance, TriMesh};
+use crate::domain::mesh::TriMesh;
 use crate::domain::metrics::{self, SsimRange};
+use crate::domain::pose::{Engine, ToolModel, register};
 use crate::domain::resample::bilinear;
 use crate::domain::sample::{BubbleCamera, BubbleTouch, Sample, Scale};
 use crate::domain::sensor::Finger;
@@ -21,8 +20,6 @@ use crate::domain::{cloud, contact, units};
 
 /// The peak of the lab's PSNR, metres.
 pub const LAB_PEAK_M: f64 = 0.0225;
-/// Seed of the lab ICP's model points; the lab does not seed its own, so its results differ from run to run.
-const MODEL_POINTS_SEED: u64 = 0;
 /// Longest side of a thumbnail, pixels.
 const THUMBNAIL_PX: usize = 44;
 
@@ -156,13 +153,9 @@ pub fn clouds(sample: &Sample, parts: [Option<(&DepthMap, Option<&Mask>)>; 2]) -
 ///
 /// # Errors
 /// If the mesh has no area or is not finite.
-pub fn tool_model(name: &str, mesh: TriMesh) -> Result<ToolModel, TaskError> {
-    let what = format!("CAD model of {name}");
-    let field = DistanceField::from_mesh(&mesh).map_err(|err| TaskError::from_error(&what, &err))?;
-    let distance = MeshDistance::new(&mesh).map_err(|err| TaskError::from_error(&what, &err))?;
-    let points_yz =
-        mesh.sample_surface(LAB_MODEL_POINTS, MODEL_POINTS_SEED).into_iter().map(|p| DVec2::new(p.y, p.z)).collect();
-    Ok(ToolModel { name: name.to_owned(), mesh, field, distance, points_yz })
+pub fn named_tool(name: &str, mesh: TriMesh) -> Result<NamedTool, TaskError> {
+    let model = ToolModel::new(mesh).map_err(|err| TaskError::from_error(&format!("CAD model of {name}"), &err))?;
+    Ok(NamedTool { name: name.to_owned(), model })
 }
 
 /// The pose of the tool from contact points. `truth` is `grasp_from_object`, where known.
@@ -177,15 +170,11 @@ pub fn pose(
 ) -> Result<PoseResult, TaskError> {
     let start = Instant::now();
     let points: Vec<DVec2> = clouds.contact_points().into_iter().map(|p| DVec2::new(p.y, p.z)).collect();
-    let report = match engine {
-        PoseEngine::DistanceField => {
-            align(&points, &tool.field, &AlignConfig { record: true, ..AlignConfig::default() })
-        }
-        PoseEngine::LabIcp => {
-            lab_icp(&points, &tool.points_yz, &LabIcpConfig { record: true, ..LabIcpConfig::default() })
-        }
-    }
-    .map_err(|err| TaskError::from_error("Pose", &err))?;
+    let engine = match engine {
+        PoseEngine::DistanceField => Engine::DistanceField,
+        PoseEngine::LabIcp => Engine::LabIcp,
+    };
+    let report = register(&points, tool, engine, false).map_err(|err| TaskError::from_error("Pose", &err))?;
     let ms = start.elapsed().as_secs_f64() * 1e3;
     let angle_rad = report.lab_angle_rad();
     let truth_rad = truth.map(|t| t.inverse().theta_rad);
@@ -198,13 +187,6 @@ pub fn pose(
         num_points: points.len(),
         stop: report.stop.to_string(),
         converged: report.converged,
-        iterations: report
-            .trace
-            .iter()
-            .filter(|step| step.run == report.winner)
-            .map(|step| step.grasp_from_object)
-            .collect(),
-        residuals_m: report.fits.iter().map(|fit| f64::from(fit.residual_m)).collect(),
         ms,
         report,
     })

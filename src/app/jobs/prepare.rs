@@ -96,7 +96,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             job(
                 Lane::Compute,
                 what,
-                Box::new(move |_| Ok(Computed::Tool(Arc::new(compute::tool_model(&name, source.tool_mesh(&name)?)?)))),
+                Box::new(move |_| Ok(Computed::Tool(Arc::new(compute::named_tool(&name, source.tool_mesh(&name)?)?)))),
             )
         }
         Request::Imprint(recipe, shift) => {
@@ -150,7 +150,13 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Box::new(move |_| {
                     let bubble = sample.finger(touch.finger).and_then(|t| t.bubble.as_ref());
                     let imprint = imprint.get().ok_or_else(gone)?;
-                    let mask = compute::mask(&recipe, imprint, bubble, tool.as_deref(), sample.grasp_from_object)?;
+                    let mask = compute::mask(
+                        &recipe,
+                        imprint,
+                        bubble,
+                        tool.as_deref().map(|t| &t.model),
+                        sample.grasp_from_object,
+                    )?;
                     Ok(Computed::Mask(Arc::new(mask)))
                 }),
             )
@@ -188,7 +194,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             job(
                 Lane::Compute,
                 "Pose".into(),
-                Box::new(move |_| Ok(Computed::Pose(Arc::new(compute::pose(&clouds, &tool, engine, truth)?)))),
+                Box::new(move |_| Ok(Computed::Pose(Arc::new(compute::pose(&clouds, &tool.model, engine, truth)?)))),
             )
         }
     }
