@@ -72,8 +72,9 @@ def write(net, path, inputs, output, examples):
     return {"path": path.name, "sha256": data.sha256(path)}, worst
 
 
-def provenance(shards, states, differences):
+def provenance(note, shards, states, differences):
     return {
+        "note": note,
         "data": "simulated touches (examples/training_data.rs); the unseen tools are not among them",
         "shards": shards.record(),
         "runs": {name: {k: s[k] for k in ("step", "samples", "minutes", "losses", "seed")} for name, s in states.items()},
@@ -117,7 +118,7 @@ def generator(args, out):
                   "pred_std": predicted.std(correction=0).item() / 2,
                   "gt_mean": measured.mean().item(), "gt_std": measured.std(correction=0).item()},
         "defaults": {"steps": 10, "sampler": "ddim", "spacing": "trailing", "eta": 0.0, "seed": 42},
-        "provenance": provenance(shards, {"autoencoder": ae, "generator": state}, differences),
+        "provenance": provenance(args.note, shards, {"autoencoder": ae, "generator": state}, differences),
     }
 
 
@@ -132,7 +133,7 @@ def mask(args, out):
         "input": {"sensor": "bubble", "size": [175, 140], "range_m": list(data.MASK_RANGE_M), "cast": "saturate",
                   "rotation_deg": 0},
         "output": {"classes": 2, "threshold": 0.5},
-        "provenance": provenance(data.Shards(args.data), {"mask": state}, {"mask_unet": difference}),
+        "provenance": provenance(args.note, data.Shards(args.data), {"mask": state}, {"mask_unet": difference}),
     }
 
 
@@ -142,6 +143,7 @@ def main():
     parser.add_argument("--run", default="training/runs/demo", help="folder of checkpoints")
     parser.add_argument("--data", default="training/data/train", help="folder of the training shards")
     parser.add_argument("--out", required=True, help="bundle folder to write")
+    parser.add_argument("--note", default="", help="free text for the provenance")
     parser.add_argument("--seed", type=int, default=7, help="which training touches the shift statistics come from")
     args = parser.parse_args()
     torch.set_num_threads(1)
