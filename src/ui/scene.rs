@@ -358,7 +358,9 @@ pub(super) fn error_color(p: &Palette, error_rad: f64) -> Color32 {
 
 /// Points, residual, stop reason, time.
 pub(super) fn pose_details(pose: &PoseResult) -> String {
-    format!("{} points · residual {} · {} · {:.0} ms", pose.num_points, units::text_mm(pose.rms_m), pose.stop, pose.ms)
+    // The unit stays with its number where the line wraps.
+    let ms = pose.ms;
+    format!("{} points · residual {} · {} · {ms:.1}\u{a0}ms", pose.num_points, units::text_mm(pose.rms_m), pose.stop)
 }
 
 fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output: &SceneOutput, rect: Rect) {

@@ -154,7 +154,7 @@ pub fn clouds(sample: &Sample, parts: [Option<(&DepthMap, Option<&Mask>)>; 2]) -
 /// # Errors
 /// If the mesh has no area or is not finite.
 pub fn named_tool(name: &str, mesh: TriMesh) -> Result<NamedTool, TaskError> {
-    let model = ToolModel::new(mesh).map_err(|err| TaskError::from_error(&format!("CAD model of {name}"), &err))?;
+    let model = ToolModel::new(mesh).map_err(|err| TaskError::from_error(format!("CAD model of {name}"), &err))?;
     Ok(NamedTool { name: name.to_owned(), model })
 }
 
