@@ -88,7 +88,7 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     row(ui, cx.p.weak, "Steps", |ui| {
         let drag = egui::DragValue::new(&mut new.steps).speed(0.2).range(STEPS);
         let tip = "Denoising steps: more take longer and add detail";
-        reset(ui.add(drag).accessible_name("Steps"), tip, "20", || new.steps = GenerateSettings::default().steps);
+        reset(ui.add(drag).accessible_name("Steps"), tip, "10", || new.steps = GenerateSettings::default().steps);
         let both = ui.checkbox(&mut new.both_fingers, "both fingers");
         both.on_hover_text("Generate for both fingers: the pose needs both. Off: only the active finger");
     });
