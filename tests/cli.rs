@@ -63,6 +63,12 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
         }
     }
 
+    let traced = run(&["pose", set_text, "--limit", "1", "--trace", "--json"], data_path);
+    let report = &json(&traced)["cases"][0]["report"];
+    assert!(report["trace"].as_array().unwrap().len() > 3, "the start and some iterations");
+    assert!(report["fits"].as_array().unwrap().len() > 100, "each point's residual");
+    assert!(cases[0].get("report").is_none(), "nothing is recorded unless asked for");
+
     let masks = dir.path().join("masks");
     let nothing = run(&["masks", "export", "--input", set_text, "--out", masks.to_str().unwrap()], data_path);
     assert_eq!(nothing.status.code(), Some(2), "nothing was corrected by hand yet");

@@ -180,7 +180,7 @@ pub struct Run {
 }
 
 /// A registration's answer with its reasons.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AlignReport {
     /// The tool's pose in the hand.
     pub grasp_from_object: PlanarPose,

@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
+use crate::domain::align::AlignReport;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::AngleSummary;
@@ -38,6 +39,10 @@ pub(super) struct PoseArgs {
     /// Take only this many pairs, spread evenly over the dataset.
     #[arg(long)]
     limit: Option<usize>,
+    /// Add the whole registration report to each case of the JSON: every start and iteration, and each point's
+    /// residual, weight and fate.
+    #[arg(long)]
+    trace: bool,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -74,6 +79,8 @@ struct Case {
     z_m: Option<f64>,
     ms: f64,
     stop: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    report: Option<AlignReport>,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -196,7 +203,7 @@ fn pose_cases(
         .iter()
         .map(|&engine| {
             let start = Instant::now();
-            let result = pose::estimate(&fingers, tool, engine, false);
+            let result = pose::estimate(&fingers, tool, engine, args.trace);
             let ms = start.elapsed().as_secs_f64() * 1e3;
             let found = result.as_ref().ok().map(|r| r.object_from_grasp);
             Case {
@@ -214,6 +221,7 @@ fn pose_cases(
                     Ok(r) => r.report.stop.to_string(),
                     Err(err) => err.to_string(),
                 },
+                report: result.ok().map(|r| r.report).filter(|_| args.trace),
             }
         })
         .collect())

@@ -15,7 +15,7 @@ const REACH_M: f64 = 0.002;
 const MIN_TELLING: usize = 8;
 
 /// Curvature of the fit at its end, per telling point.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Observability {
     /// Eigenvalues of the mean outer product of the residuals' slopes, ascending. Angles are scaled by
     /// [`ANGLE_SCALE_M`], so all are comparable; the two shifts alone would add up to 1.
