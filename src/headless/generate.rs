@@ -9,10 +9,9 @@ use serde::Serialize;
 
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::domain::contact::LAB_IMPRINT_MAX_M;
+use crate::app::jobs::compute;
 use crate::domain::dataset::PairId;
-use crate::domain::grid::{DepthMap, Grid};
-use crate::domain::metrics::{self, SsimRange};
+use crate::domain::grid::DepthMap;
 use crate::domain::resample;
 use crate::domain::sample::Scale;
 use crate::domain::sensor::Finger;
@@ -168,18 +167,16 @@ fn score(
     match scale {
         Scale::Measured => {
             if let Some(measured) = measured {
-                pair.psnr_db = metrics::psnr(imprint, measured, f64::from(LAB_IMPRINT_MAX_M))?.db();
-                pair.ssim =
-                    Some(metrics::ssim(imprint, measured, SsimRange::Explicit(f64::from(LAB_IMPRINT_MAX_M)))?.mean);
+                (pair.psnr_db, pair.ssim) = scores(imprint, measured, scale)?;
             }
         }
         Scale::Assumed => {
             // Compared on the tile's own pixels and in its orientation, so that the lab's prediction is not resampled.
             if let Some(tile) = dataset.bubble_tile(id)? {
                 let ours = resample::bilinear(&imprint.rotated_180(), tile.width(), tile.height());
-                (pair.psnr_db, pair.ssim) = unit_scores(&ours, &tile)?;
+                (pair.psnr_db, pair.ssim) = scores(&ours, &tile, scale)?;
                 if let Some(vqvae) = dataset.vqvae_tile(id)? {
-                    (pair.vqvae_psnr_db, pair.vqvae_ssim) = unit_scores(&vqvae, &tile)?;
+                    (pair.vqvae_psnr_db, pair.vqvae_ssim) = scores(&vqvae, &tile, scale)?;
                 }
             }
         }
@@ -187,10 +184,10 @@ fn score(
     Ok(())
 }
 
-/// PSNR and SSIM of two images, both scaled to 0..1.
-fn unit_scores(a: &Grid<f32>, b: &Grid<f32>) -> anyhow::Result<(Option<f64>, Option<f64>)> {
-    let (a, b) = (metrics::unit_range(a), metrics::unit_range(b));
-    Ok((metrics::psnr(&a, &b, 1.0)?.db(), Some(metrics::ssim(&a, &b, SsimRange::Explicit(1.0))?.mean)))
+/// PSNR and SSIM as the studio computes them.
+fn scores(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> anyhow::Result<(Option<f64>, Option<f64>)> {
+    let found = compute::compare(predicted, measured, scale).map_err(|err| anyhow::anyhow!("{err}"))?;
+    Ok((found.psnr_db, found.ssim))
 }
 
 /// Writes `NAME_FINGER.npy` (metres, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
