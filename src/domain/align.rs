@@ -164,6 +164,97 @@ impl Stop {
     }
 }
 
+/// How much was searched for an answer: the rungs of the ladder, cheapest first.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, strum::Display, strum::EnumIter,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Rung {
+    /// The caller chose the starts, or the engine has no ladder.
+    #[strum(to_string = "given starts")]
+    Fixed,
+    /// One start in the middle of the prior.
+    #[strum(to_string = "one start")]
+    Single,
+    /// A few starts over the angle.
+    #[strum(to_string = "five starts")]
+    Several,
+    /// A start at every knot of a grid over the prior.
+    #[strum(to_string = "grid")]
+    Grid,
+    /// Branch and bound over the prior: nothing in it is better by more than the gap.
+    #[strum(to_string = "certified search")]
+    Certified,
+}
+
+/// Whether the answer of a rung was good enough to stop there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// It passes all tests.
+    #[strum(to_string = "accepted")]
+    Accepted,
+    /// It fails a test that more searching cannot make it pass, or no further rung is allowed.
+    #[strum(to_string = "taken: no further search")]
+    Last,
+    /// The run had not come to an end.
+    #[strum(to_string = "refused: still moving at the iteration limit")]
+    NotConverged,
+    /// The pose is not where the gripper can hold a tool.
+    #[strum(to_string = "refused: outside the prior")]
+    OutsidePrior,
+    /// The points lie too far from the silhouette.
+    #[strum(to_string = "refused: cost too high")]
+    Cost,
+    /// Too few points lie on the silhouette.
+    #[strum(to_string = "refused: too few inliers")]
+    Inliers,
+    /// The points do not determine the pose there, though they may elsewhere.
+    #[strum(to_string = "refused: weakest direction not determined")]
+    Observability,
+}
+
+/// One rung that was tried.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RungAttempt {
+    /// Which one.
+    pub rung: Rung,
+    /// Cost per point of its answer, square metres; comparable between attempts with the same `points`.
+    pub cost_m2: f64,
+    /// Points it used.
+    pub points: usize,
+    /// Share of them within the narrowest kernel.
+    pub inlier_share: f64,
+    /// Smallest eigenvalue of [`Observability`] there.
+    pub weakest: f64,
+    /// Nearest-surface questions it asked.
+    pub lookups: usize,
+    /// Why the search went on, or did not.
+    pub verdict: Verdict,
+}
+
+/// What branch and bound has proved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// Whether no pose in the box is cheaper by more than the gap. `false`: the budget was used up first.
+    pub certified: bool,
+    /// Cost per point of the answer, square metres.
+    pub cost_m2: f64,
+    /// No pose in the box costs less than this per point, square metres; proved even where `certified` is false.
+    pub lower_bound_m2: f64,
+    /// Boxes looked at.
+    pub nodes: usize,
+    /// Nearest-surface questions asked for them.
+    pub lookups: usize,
+}
+
+impl Certificate {
+    /// By which share of its cost the answer could at most be improved, 0 to 1.
+    pub fn gap(&self) -> f64 {
+        if self.cost_m2 > 0.0 { ((self.cost_m2 - self.lower_bound_m2) / self.cost_m2).clamp(0.0, 1.0) } else { 0.0 }
+    }
+}
+
 /// One start and where it led.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
@@ -194,6 +285,12 @@ pub struct AlignReport {
     pub runs: Vec<Run>,
     /// Position of the winner in `runs`.
     pub winner: usize,
+    /// Which rung of the ladder answered.
+    pub rung: Rung,
+    /// Every rung that was tried, in order, with the reason why the search went on; empty for an engine without one.
+    pub ladder: Vec<RungAttempt>,
+    /// What was proved, if branch and bound was asked.
+    pub certificate: Option<Certificate>,
     /// Steps of all runs together.
     pub iterations: usize,
     /// Nearest-surface questions asked: the work done.
@@ -270,6 +367,8 @@ pub enum Fate {
     Inside,
     /// Beyond three kernel widths; its pull is negligible.
     BeyondGate,
+    /// Left out by a rejector (farthest pairs, pairs that are not mutual); it does not pull.
+    Trimmed,
     /// Outside the stored field.
     OutOfField,
     /// A coordinate is NaN or infinite.

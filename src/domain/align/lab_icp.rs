@@ -10,7 +10,7 @@ use glam::DVec2;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use serde::{Deserialize, Serialize};
 
-use super::{AlignError, AlignReport, Fate, PointFit, Prior, Run, Stop, TraceStep};
+use super::{AlignError, AlignReport, Fate, PointFit, Prior, Run, Rung, Stop, TraceStep};
 use crate::domain::frames::PlanarPose;
 
 /// Fewest contact points the lab's loop works with.
@@ -89,6 +89,9 @@ pub fn lab_icp(points_yz: &[DVec2], model_points: &[DVec2], config: &LabIcpConfi
         start: config.start,
         runs: vec![run],
         winner: 0,
+        rung: Rung::Fixed,
+        ladder: Vec::new(),
+        certificate: None,
         iterations,
         lookups,
         offered: points_yz.len(),

@@ -7,7 +7,7 @@
 use glam::DVec2;
 
 use super::{
-    ANGLE_SCALE_M, AlignConfig, AlignError, AlignReport, DistanceField, Fate, MIN_POINTS, PointFit, Run, Stop,
+    ANGLE_SCALE_M, AlignConfig, AlignError, AlignReport, DistanceField, Fate, MIN_POINTS, PointFit, Run, Rung, Stop,
     TraceStep, clean, observability,
 };
 use crate::domain::frames::PlanarPose;
@@ -102,6 +102,9 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
             })
             .collect(),
         winner,
+        rung: Rung::Fixed,
+        ladder: Vec::new(),
+        certificate: None,
         iterations: runs.iter().map(|r| r.iterations).sum(),
         lookups: search.lookups,
         offered: points_yz.len(),
