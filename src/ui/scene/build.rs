@@ -1,0 +1,171 @@
+//! What a 3D pane shows, as data for the renderer.
+
+use std::sync::Arc;
+
+use eframe::egui::Color32;
+use glam::{DAffine3, DVec3};
+
+use crate::app::keys::{CloudKey, ImprintSource};
+use crate::app::results::{Clouds, FingerCloud};
+use crate::domain::sensor::Finger;
+use crate::gpu::guides;
+use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
+use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
+use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
+use crate::gpu::scene::SceneData;
+use crate::ui::cx::{Cx, SceneCloud, SceneMesh, side_color};
+use crate::ui::images::CONTACT;
+use crate::ui::theme::{self, Palette};
+
+pub(super) fn rgb(c: Color32) -> [f32; 3] {
+    [f32::from(c.r()) / 255.0, f32::from(c.g()) / 255.0, f32::from(c.b()) / 255.0]
+}
+
+/// Points for the renderer, made again only for another cloud.
+pub(super) fn update_cloud(cx: &mut Cx<'_>, source: ImprintSource, key: CloudKey, clouds: &Clouds) {
+    let held = &mut cx.local.scene_clouds[source as usize];
+    if held.as_ref().is_some_and(|h| h.key == key) {
+        return;
+    }
+    let part = |f: &FingerCloud, contact: bool| {
+        let indices: Vec<usize> = (0..f.points.len()).filter(|i| f.contact.get(*i) == Some(&contact)).collect();
+        // The membrane only has to be seen, and seen through: every other pixel of every other row.
+        let kept = |i: &usize| contact || f.pixels.get(*i).is_some_and(|p| p[0] % 2 == 0 && p[1] % 2 == 0);
+        indices.into_iter().filter(kept).filter_map(|i| f.points.get(i).copied()).collect::<Arc<[DVec3]>>()
+    };
+    let convert = |f: &FingerCloud| [part(f, false), part(f, true)];
+    cx.local.revision += 1;
+    let fingers = [clouds.fingers[0].as_ref().map(convert), clouds.fingers[1].as_ref().map(convert)];
+    *held = Some(SceneCloud { key, revision: cx.local.revision, fingers });
+}
+
+pub(super) fn update_mesh(cx: &mut Cx<'_>) {
+    let Some(tool) = cx.state.tool().shown() else { return };
+    let Some(open) = &cx.state.library.open else { return };
+    if cx.local.mesh.as_ref().is_some_and(|m| m.key.0 == open.seq && m.key.1 == tool.name) {
+        return;
+    }
+    cx.local.revision += 1;
+    let key = (open.seq, tool.name.clone());
+    cx.local.mesh = Some(SceneMesh { key, revision: cx.local.revision, mesh: Arc::new(tool.model.mesh.clone()) });
+}
+
+/// Everything one side shows.
+pub(super) fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {
+    let mut scene = SceneData { background: rgb(cx.p.canvas), ..SceneData::default() };
+    clouds(cx, source, &mut scene);
+    pointed(cx, source, &mut scene);
+    meshes(cx, source, &mut scene);
+    guides(cx, &mut scene);
+    scene
+}
+
+/// Membrane and contact points of both fingers.
+fn clouds(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
+    if let Some(cloud) = &cx.local.scene_clouds[source as usize] {
+        for finger in Finger::BOTH {
+            let Some(parts) = &cloud.fingers[finger.index()] else { continue };
+            // The membrane recedes, the contact stands out.
+            let rest = theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
+            let looks = [(PointSize::Px(1.2), rest, "membrane"), (PointSize::Metres(0.000_3), CONTACT, "contact")];
+            for (part, (size, color, name)) in parts.iter().zip(looks) {
+                scene.clouds.push(CloudItem {
+                    name: format!("{name} {}", finger.name()),
+                    revision: cloud.revision,
+                    points: part.clone(),
+                    colors: PointColors::One,
+                    style: CloudStyle { color: rgb(color), size, ..CloudStyle::default() },
+                });
+            }
+        }
+    }
+}
+
+/// The pixel under the pointer, as a point of its own: it must not drown among the others.
+fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
+    let state = cx.state;
+    let pointed = state.selection.hover.and_then(|h| {
+        let cloud = state.cloud(source).ready()?.finger(h.finger)?;
+        let (x, y) = (h.at_px[0].round().max(0.0) as usize, h.at_px[1].round().max(0.0) as usize);
+        cloud.points.get(cloud.at_pixel(x, y)?).copied()
+    });
+    if let Some(point) = pointed {
+        let bits = point.to_array().map(f64::to_bits);
+        scene.clouds.push(CloudItem {
+            name: "pointer".into(),
+            revision: bits[0] ^ bits[1].rotate_left(21) ^ bits[2].rotate_left(42),
+            points: [point].into(),
+            colors: PointColors::One,
+            style: CloudStyle { color: rgb(cx.p.strong), size: PointSize::Px(9.0), ..CloudStyle::default() },
+        });
+    }
+}
+
+/// The CAD model at the registered and at the true pose.
+fn meshes(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
+    let state = cx.state;
+    let tool_now = state.tool().ready().map(|t| t.name.as_str());
+    if let Some(mesh) = cx.local.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) {
+        let item = |name: &str, style: MeshStyle| MeshItem {
+            name: name.into(),
+            revision: mesh.revision,
+            mesh: mesh.mesh.clone(),
+            shading: Shading::Smooth,
+            style,
+        };
+        if let Some(pose) = state.pose(source).shown() {
+            scene.meshes.push(item(
+                "CAD",
+                MeshStyle {
+                    world_from_mesh: pose.grasp_from_object.to_affine(),
+                    color: rgb(cx.p.cad),
+                    opacity: 0.9,
+                    look: Look::Solid,
+                },
+            ));
+        }
+        if let Some(truth) = state.sample().ready().and_then(|s| s.grasp_from_object) {
+            scene.meshes.push(item(
+                "CAD at the true pose",
+                MeshStyle {
+                    world_from_mesh: truth.to_affine(),
+                    color: rgb(cx.p.truth),
+                    opacity: 0.6,
+                    look: Look::XRay,
+                },
+            ));
+        }
+    }
+}
+
+/// Floor grid and axes.
+fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
+    scene.lines.push(LinesItem {
+        name: "grid".into(),
+        revision: u64::from(*cx.p == theme::DARK),
+        segments: grid(cx.p).into(),
+        style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.0, opacity: 1.0, overlay: false },
+    });
+    scene.lines.push(LinesItem {
+        name: "axes".into(),
+        revision: 1,
+        segments: guides::axes(axes_origin(), AXIS).into(),
+        style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 2.0, opacity: 1.0, overlay: true },
+    });
+}
+
+/// Length of the drawn axes, metres.
+pub(super) const AXIS: f64 = 0.01;
+
+/// A corner of the floor grid: in the middle the axes would hide the contact.
+pub(super) fn axes_origin() -> DVec3 {
+    DVec3::new(-0.05, -0.05, FLOOR)
+}
+
+/// Height of the floor grid, metres along +z (down).
+const FLOOR: f64 = 0.045;
+
+fn grid(p: &Palette) -> Vec<Segment> {
+    let c = theme::mix(p.canvas, p.weak, 0.45);
+    guides::grid(DVec3::new(0.0, 0.0, FLOOR), [DVec3::X, DVec3::Y], 0.01, 5, [c.r(), c.g(), c.b()])
+}
