@@ -153,3 +153,31 @@ fn the_lab_sample_is_within_two_degrees() {
         assert!(case["error_deg"].as_f64().unwrap() < 2.0, "{case}");
     }
 }
+
+#[test]
+fn the_five_faults_are_written_and_told_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("faults");
+    let set_text = set.to_str().unwrap();
+    let made = run(&["simulate", "--faults", "--out", set_text, "--json"], dir.path());
+    assert!(made.status.success(), "{}", error_text(&made));
+    assert_eq!(json(&made)["faults"].as_object().unwrap().len(), 5);
+
+    let doctor = json(&run(&["doctor", set_text, "--json"], dir.path())).to_string();
+    assert!(doctor.contains("multiply by 0.001") && doctor.contains("left imprint is 0 everywhere"), "{doctor}");
+
+    let pose = run(&["pose", set_text, "--mask", "truth", "--json"], dir.path());
+    assert_eq!(pose.status.code(), Some(1), "one tool cannot be aligned");
+    assert!(error_text(&pose).contains("scale it by 0.001"), "{}", error_text(&pose));
+    let report = json(&pose);
+    let error = |name: &str| {
+        let cases = report["cases"].as_array().unwrap();
+        let case = cases.iter().find(|c| c["name"].as_str().unwrap().contains(name));
+        case.and_then(|c| c["error_deg"].as_f64())
+    };
+    assert!(error("wrong_cad").unwrap() > 10.0, "the wrong model cannot fit");
+    for name in ["blob_in_mask", "blank_finger", "straight_rod"] {
+        assert!(error(name).unwrap() < 2.0, "{name} with the true mask");
+    }
+    assert_eq!(error("stl_in_millimetres"), None);
+}

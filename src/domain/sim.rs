@@ -14,6 +14,7 @@
 
 mod config;
 mod depth_camera;
+mod faults;
 mod gelslim;
 mod grasp;
 mod membrane;
@@ -27,6 +28,7 @@ use glam::{DAffine3, DQuat, DVec3};
 
 pub use config::{BubbleConfig, GelSlimConfig, SimConfig};
 pub use depth_camera::CONTACT_DISTANCE_M;
+pub use faults::Fault;
 pub use grasp::{GRID_GRASPS, Grasp, POSITION_RANGE_M, THETA_RANGE_RAD, grid_grasp, random_grasp};
 pub use membrane::{Dome, Membrane};
 pub use rig::{INTRINSICS, RANGE_M, gelslim_pixel, gelslim_yz, grasp_from_camera, outward};

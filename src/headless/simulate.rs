@@ -1,12 +1,14 @@
 //! `touch2touch simulate`: a dataset in the lab's format, with its truth.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use strum::IntoEnumIterator;
 
 use super::{Common, Output, VerbResult};
-use crate::domain::sim::{self, SimConfig};
+use crate::domain::sim::{self, Fault, SimConfig};
 use crate::io::simulated::{self, Layout};
 
 /// Arguments of `simulate`.
@@ -24,6 +26,10 @@ pub(super) struct SimulateArgs {
     /// Seed of grasps and noise: the same seed writes the same files.
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Writes five touches with one known fault each (wrong CAD, foreign body, blank finger, straight rod, STL in
+    /// millimetres) instead: to learn what each looks like in the studio.
+    #[arg(long, conflicts_with_all = ["tools", "grasps", "seed"])]
+    faults: bool,
     /// Which of the lab's layouts.
     #[arg(long, value_enum, default_value_t = Part::Test)]
     part: Part,
@@ -39,6 +45,15 @@ enum Part {
     Test,
 }
 
+impl Part {
+    fn layout(self) -> Layout {
+        match self {
+            Self::Train => Layout::Train,
+            Self::Test => Layout::Test,
+        }
+    }
+}
+
 #[derive(Serialize)]
 struct Written {
     out: PathBuf,
@@ -49,13 +64,13 @@ struct Written {
 }
 
 pub(super) fn run(args: &SimulateArgs) -> VerbResult {
+    if args.faults {
+        return write_faults(args);
+    }
     let tools = chosen_tools(&args.tools)?;
     let start = std::time::Instant::now();
     let output = Output::new(args.common, "simulating", tools.len() * args.grasps as usize);
-    let layout = match args.part {
-        Part::Train => Layout::Train,
-        Part::Test => Layout::Test,
-    };
+    let layout = args.part.layout();
     let models: Vec<_> = tools.iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
     simulated::write_tools(&args.out, &models)?;
     let config = SimConfig::default();
@@ -77,6 +92,32 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
     };
     output.finish(&written, || {
         format!("{} pairs of {} tools in {}", written.pairs, written.tools.len(), written.out.display())
+    })?;
+    Ok(true)
+}
+
+#[derive(Serialize)]
+struct WrittenFaults {
+    out: PathBuf,
+    /// What is wrong with each tool's touch.
+    faults: BTreeMap<String, &'static str>,
+}
+
+/// One touch per fault, each under a tool of its own that is named after the fault.
+fn write_faults(args: &SimulateArgs) -> VerbResult {
+    let names: Vec<(Fault, String)> = Fault::iter().map(|f| (f, f.to_string())).collect();
+    let output = Output::new(args.common, "simulating", names.len());
+    let models: Vec<_> = names.iter().map(|(f, name)| (name.as_str(), false, f.mesh())).collect();
+    simulated::write_tools(&args.out, &models)?;
+    for (fault, name) in &names {
+        simulated::write_pair(&args.out, args.part.layout(), name, 0, &fault.sample())?;
+        output.step(name);
+    }
+    let faults = names.iter().map(|(f, name)| (name.clone(), f.what())).collect();
+    let written = WrittenFaults { out: args.out.clone(), faults };
+    output.finish(&written, || {
+        let lines: Vec<String> = written.faults.iter().map(|(name, what)| format!("  {name}: {what}")).collect();
+        format!("{} touches with a fault each in {}\n{}", lines.len(), written.out.display(), lines.join("\n"))
     })?;
     Ok(true)
 }
