@@ -10,6 +10,8 @@
 //!
 //! Source of the method: Fitzgibbon, Robust registration of 2D and 3D point sets, 2003.
 
+pub mod basin;
+pub mod correspond;
 pub mod field;
 pub mod lab_icp;
 mod observability;
