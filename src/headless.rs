@@ -3,6 +3,7 @@
 //! With `--json`, standard output carries exactly one JSON object; progress, notes and errors go to standard error.
 //! The exit code is 0 only when everything asked for was done.
 
+mod bench;
 mod contact_mask;
 mod doctor;
 mod generate;
@@ -48,6 +49,9 @@ enum Verb {
     Masks(masks::MasksVerb),
     /// Open a dataset and list what is wrong with it.
     Doctor(doctor::DoctorArgs),
+    /// Time and error of the registration engines, side by side.
+    #[command(subcommand)]
+    Bench(bench::BenchVerb),
     /// Model bundles.
     #[command(subcommand)]
     Bundle(models::BundleVerb),
@@ -77,6 +81,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
+        Some(Verb::Bench(verb)) => bench::run(&verb),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
         Some(Verb::Runtime(args)) => models::runtime(&args),
     };

@@ -3,6 +3,7 @@
 //! Every error names the file, what is wrong with it, and (`hint`) what to do about it.
 
 pub mod atomic;
+pub mod cases;
 pub mod dataset;
 pub mod doctor;
 pub mod export_unet;

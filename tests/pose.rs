@@ -1,5 +1,6 @@
 //! Depth to pose on synthetic grasps with known truth, made by an independent membrane model.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use touch2touch::domain::contact::{LAB_CAD_DISTANCE_M, cad_signed_distance};
@@ -8,10 +9,9 @@ use touch2touch::domain::grid::Mask;
 use touch2touch::domain::pose::{Engine, FingerInput, ToolModel, estimate, fingers_of};
 use touch2touch::domain::sensor::Finger;
 use touch2touch::domain::units::angle_error;
+use touch2touch::io::cases::CaseSet;
 use touch2touch::io::dataset::Dataset;
-use touch2touch::io::stl;
 
-use crate::support::cases::{Case, case_files, read_case};
 use crate::support::shared;
 
 fn percent(values: &[f64], below: f64) -> f64 {
@@ -30,20 +30,19 @@ fn forty_known_grasps_with_spoilt_masks() {
     let Some(folder) = shared().map(|s| s.join("pose-cases")) else {
         return;
     };
-    let mut tools: Vec<Option<ToolModel>> = (0..12).map(|_| None).collect();
-    let names = case_files(&folder);
-    assert_eq!(names.len(), 40);
+    let set = CaseSet::open(&folder).unwrap();
+    assert_eq!(set.cases.len(), 40);
     let mut build_ms = Vec::new();
-    let cases: Vec<Case> = names.iter().map(|p| read_case(p)).collect();
-    for case in &cases {
-        tools[case.tool].get_or_insert_with(|| {
-            let mesh = stl::read(&folder.join(format!("tool_{:02}.stl", case.tool))).unwrap().mesh;
+    let tools: BTreeMap<usize, ToolModel> = set
+        .tools
+        .into_iter()
+        .map(|(number, mesh)| {
             let begin = Instant::now();
             let tool = ToolModel::new(mesh).unwrap();
             build_ms.push(begin.elapsed().as_secs_f64() * 1e3);
-            tool
-        });
-    }
+            (number, tool)
+        })
+        .collect();
     eprintln!(
         "tool models: median {:.1} ms, most {:.1} ms",
         median(&build_ms),
@@ -51,8 +50,8 @@ fn forty_known_grasps_with_spoilt_masks() {
     );
     for engine in [Engine::DistanceField, Engine::LabIcp] {
         let (mut errors, mut shifts, mut ms, mut flags, mut lookups) = (vec![], vec![], vec![], vec![], vec![]);
-        for (name, case) in names.iter().zip(&cases) {
-            let tool = tools[case.tool].as_ref().unwrap();
+        for (name, case) in &set.cases {
+            let tool = &tools[&case.tool];
             let fingers = [0, 1].map(|f| {
                 Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&case.masks[f]) })
             });
@@ -61,14 +60,13 @@ fn forty_known_grasps_with_spoilt_masks() {
             ms.push(begin.elapsed().as_secs_f64() * 1e3);
             lookups.push(pose.report.lookups as f64);
             let found = pose.grasp_from_object;
-            let error = angle_error(found.theta_rad, case.theta_rad).to_degrees();
+            let error = angle_error(found.theta_rad, case.grasp_from_object.theta_rad).to_degrees();
             let weakest = pose.report.observability.unwrap().eigenvalues[0];
-            let shift = (found.y_m - case.yz[0]).hypot(found.z_m - case.yz[1]) * 1e3;
+            let shift = (found.y_m - case.grasp_from_object.y_m).hypot(found.z_m - case.grasp_from_object.z_m) * 1e3;
             let straight = matches!(case.tool, 0 | 11);
             if std::env::var_os("TOUCH2TOUCH_VERBOSE").is_some() {
                 eprintln!(
-                    "{} tool {:2} stratum {} error {error:5.2} deg {shift:5.2} mm weakest {weakest:.4} inliers {:.2} of {} {} it {}",
-                    name.file_stem().unwrap().to_string_lossy(),
+                    "{name} tool {:2} stratum {} error {error:5.2} deg {shift:5.2} mm weakest {weakest:.4} inliers {:.2} of {} {} it {}",
                     case.tool,
                     case.stratum,
                     pose.report.inlier_share,

@@ -2,9 +2,6 @@
 
 use std::path::PathBuf;
 
-#[path = "support/cases.rs"]
-pub(crate) mod cases;
-
 /// The folder with real and reference data that only some machines have: `TOUCH2TOUCH_SHARED`, else `../shared`
 /// beside the checkout. `None` (with a note) where it is absent: the product's tests pass without it.
 pub(crate) fn shared() -> Option<PathBuf> {

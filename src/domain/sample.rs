@@ -80,7 +80,7 @@ pub struct BubbleTouch {
 }
 
 /// A bubble's depth camera: untouched depth, intrinsics and its place in the rig.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BubbleCamera {
     /// Depth without contact, metres, same size as the imprint.
     pub depth_reference: DepthMap,

@@ -21,6 +21,7 @@ mod membrane;
 mod noise;
 mod relax;
 mod rig;
+mod spoil;
 mod tool_mesh;
 mod tools;
 
@@ -32,6 +33,7 @@ pub use faults::Fault;
 pub use grasp::{GRID_GRASPS, Grasp, POSITION_RANGE_M, THETA_RANGE_RAD, grid_grasp, random_grasp};
 pub use membrane::{Dome, Membrane};
 pub use rig::{INTRINSICS, RANGE_M, gelslim_pixel, gelslim_yz, grasp_from_camera, outward};
+pub use spoil::{Spoil, spoil_mask};
 pub use tools::{Bar, ToolSpec, random_tool, tools};
 
 use super::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, Sample, Scale};

@@ -58,6 +58,53 @@ pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
     .map_err(|source| NpzError::Io { file: file.to_owned(), source })
 }
 
+/// Writes arrays of numbers under their names, compressed, row-major.
+///
+/// # Errors
+/// [`NpzError::Array`] if an array's shape and values disagree, [`NpzError::Io`] if the file cannot be written.
+pub fn write(path: &Path, arrays: &[(&str, Tensor)]) -> Result<(), NpzError> {
+    for (name, tensor) in arrays {
+        let shape = &tensor.shape;
+        let len = match &tensor.values {
+            Values::F32(v) => v.len(),
+            Values::F64(v) => v.len(),
+            Values::U8(v) => v.len(),
+            Values::I64(v) => v.len(),
+        };
+        if shape.iter().product::<usize>() != len {
+            let reason = format!("{len} values do not fill the shape {shape:?}");
+            return Err(NpzError::Array { file: path.to_owned(), name: (*name).to_owned(), reason });
+        }
+    }
+    atomic::write(path, |out| {
+        let mut zip = zip::ZipWriter::new(out);
+        for (name, tensor) in arrays {
+            zip.start_file(format!("{name}.npy"), zip::write::SimpleFileOptions::default())?;
+            zip.write_all(&npy_bytes(tensor)?)?;
+        }
+        zip.finish()?;
+        Ok(())
+    })
+    .map_err(|source| NpzError::Io { file: path.to_owned(), source })
+}
+
+fn npy_bytes(tensor: &Tensor) -> std::io::Result<Vec<u8>> {
+    fn bytes<T: npyz::AutoSerialize>(shape: &[usize], values: &[T]) -> std::io::Result<Vec<u8>> {
+        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
+        let mut bytes = Vec::with_capacity(128 + size_of_val(values));
+        let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
+        writer.extend(values)?;
+        writer.finish()?;
+        Ok(bytes)
+    }
+    match &tensor.values {
+        Values::F32(v) => bytes(&tensor.shape, v),
+        Values::F64(v) => bytes(&tensor.shape, v),
+        Values::U8(v) => bytes(&tensor.shape, v),
+        Values::I64(v) => bytes(&tensor.shape, v),
+    }
+}
+
 /// An array larger than this is refused: a damaged header must not ask for all memory.
 const MAX_BYTES: u64 = 1 << 31;
 

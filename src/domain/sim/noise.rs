@@ -18,6 +18,8 @@ pub(super) enum Stream {
     Gel = 7,
     GelNoise = 8,
     GelReference = 9,
+    Mask = 10,
+    Dropped = 11,
 }
 
 /// A source of random numbers for one purpose and one finger.

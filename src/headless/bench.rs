@@ -1,0 +1,71 @@
+//! `touch2touch bench`: time and error of the registration engines, on known grasps, side by side.
+
+mod canvas;
+mod cases;
+mod figures;
+mod front;
+mod peers;
+mod registration;
+mod strokes;
+
+use clap::Subcommand;
+use serde::Serialize;
+
+use super::VerbResult;
+
+/// What is measured.
+#[derive(Debug, Subcommand)]
+pub(super) enum BenchVerb {
+    /// Every registration engine, and Open3D and small_gicp where Python has them, on a folder of known grasps.
+    Registration(registration::RegistrationArgs),
+    /// Write fresh known grasps of the built-in simulator, for `bench registration`.
+    Cases(cases::CasesArgs),
+}
+
+pub(super) fn run(verb: &BenchVerb) -> VerbResult {
+    match verb {
+        BenchVerb::Registration(args) => registration::run(args),
+        BenchVerb::Cases(args) => cases::run(args),
+    }
+}
+
+/// Where and under what load the figures were taken: without it no time means anything.
+#[derive(Clone, Debug, Serialize)]
+struct Machine {
+    /// The processor's name, where the system tells.
+    cpu: Option<String>,
+    /// Hardware threads that this process may use.
+    threads: usize,
+    /// Average number of runnable tasks in the last minute when the measurement began, where the system tells.
+    load_1min: Option<f64>,
+    /// `linux x86_64`.
+    system: String,
+    /// Whether the program was built without optimisation, which makes its times meaningless.
+    debug_build: bool,
+}
+
+impl Machine {
+    fn now() -> Self {
+        let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let cpu = cpuinfo.lines().find_map(|l| l.strip_prefix("model name")?.split_once(':'));
+        let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+        Self {
+            cpu: cpu.map(|(_, name)| name.trim().to_owned()),
+            threads: std::thread::available_parallelism().map_or(1, usize::from),
+            load_1min: load.split(' ').next().and_then(|v| v.parse().ok()),
+            system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
+            debug_build: cfg!(debug_assertions),
+        }
+    }
+
+    fn text(&self) -> String {
+        format!(
+            "{}, {} threads, load {}, {}{}",
+            self.cpu.as_deref().unwrap_or("unknown processor"),
+            self.threads,
+            self.load_1min.map_or("unknown".into(), |l| format!("{l:.1}")),
+            self.system,
+            if self.debug_build { ", DEBUG BUILD: its times mean nothing" } else { "" }
+        )
+    }
+}

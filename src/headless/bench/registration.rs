@@ -1,0 +1,418 @@
+//! `touch2touch bench registration`: every engine on every case, one thread, one table.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use glam::{DVec2, DVec3};
+use serde::Serialize;
+use strum::IntoEnumIterator as _;
+
+use super::figures::{Outcome, Summary, quantile};
+use super::front::{self, FrontPoint};
+use super::{Machine, peers};
+use crate::domain::align::{AlignError, AlignReport, DistanceField};
+use crate::domain::frames::PlanarPose;
+use crate::domain::mesh::TriMesh;
+use crate::domain::pose::{Engine, FingerInput, ToolModel, contact_cloud, estimate, register};
+use crate::domain::units::angle_error;
+use crate::headless::{Common, Output, VerbResult, spread};
+use crate::io::atomic;
+use crate::io::cases::{Case, CaseSet, Stratum};
+
+/// Repetitions of one case go on until this much time is spent, milliseconds, or there are [`MAX_REPETITIONS`].
+const REPEAT_MS: f64 = 8.0;
+const MAX_REPETITIONS: usize = 15;
+
+/// Arguments of `bench registration`.
+#[derive(Debug, Args)]
+pub(in crate::headless) struct RegistrationArgs {
+    /// Folder with `case_*.npz` and `tool_KK.stl` (`touch2touch bench cases` writes one).
+    #[arg(long)]
+    cases: PathBuf,
+    /// Write everything measured to this file, and the error-against-time front beside it as .svg and .png.
+    #[arg(long, value_name = "OUT")]
+    json: Option<PathBuf>,
+    /// Only these engines, separated by commas.
+    #[arg(long, value_delimiter = ',')]
+    engines: Vec<Engine>,
+    /// Which contact masks.
+    #[arg(long, value_enum, default_value_t = Masks::Spoilt)]
+    masks: Masks,
+    /// Take only this many cases, spread evenly.
+    #[arg(long)]
+    limit: Option<usize>,
+    /// Python that may have Open3D and small_gicp; they then run on the same points.
+    #[arg(long, default_value = "python3")]
+    python: PathBuf,
+    /// Cases for the Python peers, spread evenly: each takes about a second per pose.
+    #[arg(long, default_value_t = 40)]
+    peer_limit: usize,
+    /// Leave the Python peers out.
+    #[arg(long)]
+    no_peers: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Masks {
+    /// As a learned mask has them.
+    Spoilt,
+    /// As they are.
+    Clean,
+}
+
+/// A case ready to be registered.
+pub(super) struct Prepared {
+    pub(super) name: String,
+    pub(super) stratum: Stratum,
+    pub(super) tool: usize,
+    pub(super) straight: bool,
+    pub(super) truth: PlanarPose,
+    /// Contact points, grasp frame, metres.
+    pub(super) points: Vec<DVec3>,
+    pub(super) points_yz: Vec<DVec2>,
+}
+
+/// One row of the table.
+#[derive(Debug, Serialize)]
+pub(super) struct EngineRow {
+    pub(super) name: String,
+    pub(super) label: String,
+    /// Whether it is another project's library.
+    pub(super) peer: bool,
+    #[serde(flatten)]
+    pub(super) summary: Summary,
+    /// One value per case in the order of `cases`, `null` where there is no pose or the case was not run.
+    pub(super) error_deg: Vec<Option<f64>>,
+    pub(super) ms: Vec<Option<f64>>,
+}
+
+#[derive(Debug, Serialize)]
+struct ToolRow {
+    tool: usize,
+    triangles: usize,
+    /// A straight bar, along which a pose is free.
+    straight: bool,
+    /// Building the distance field, shortest of three.
+    field_ms: f64,
+    /// Building everything that a tool needs, shortest of three.
+    build_ms: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Quantiles {
+    median_ms: Option<f64>,
+    p95_ms: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+struct CaseRow {
+    name: String,
+    stratum: String,
+    tool: usize,
+    points: usize,
+    truth_deg: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    /// The engine that the studio and `touch2touch pose` use.
+    default: String,
+    machine: Machine,
+    folder: PathBuf,
+    masks: Masks,
+    /// Depth and mask of both fingers to contact points.
+    depth_to_points: Quantiles,
+    /// Depth and mask to the pose with the default engine.
+    depth_to_pose: Quantiles,
+    engines: Vec<EngineRow>,
+    /// Median time and mean error of each engine; `on_front` where no other is both faster and better.
+    front: Vec<FrontPoint>,
+    /// What could not be measured, and why.
+    notes: Vec<String>,
+    tools: Vec<ToolRow>,
+    cases: Vec<CaseRow>,
+}
+
+/// Times of one repeated call, milliseconds.
+struct Timed<T> {
+    first: f64,
+    median: f64,
+    best: f64,
+    value: T,
+}
+
+fn timed<T>(mut f: impl FnMut() -> T) -> Timed<T> {
+    let mut run = || {
+        let begin = Instant::now();
+        let value = std::hint::black_box(f());
+        (begin.elapsed().as_secs_f64() * 1e3, value)
+    };
+    let (first, value) = run();
+    let mut all = vec![first];
+    let mut spent = first;
+    while spent < REPEAT_MS && all.len() < MAX_REPETITIONS {
+        let (ms, _) = run();
+        spent += ms;
+        all.push(ms);
+    }
+    let median = quantile(all.iter().copied(), 0.5).unwrap_or(first);
+    Timed { first, median, best: all.iter().copied().fold(f64::INFINITY, f64::min), value }
+}
+
+pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
+    let mut set = CaseSet::open(&args.cases)?;
+    let chosen = spread(set.cases.len(), args.limit);
+    set.cases = chosen.into_iter().map(|i| set.cases[i].clone()).collect();
+    let engines: Vec<Engine> = if args.engines.is_empty() { Engine::iter().collect() } else { args.engines.clone() };
+    let output = Output::new(Common { json: false }, "measuring", set.cases.len() * engines.len());
+    let machine = Machine::now();
+    // One thread, whatever an engine would like to use: the figures are the work, not the machine.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let mut report = pool.install(|| measure(args, &set, &engines, machine, &output))?;
+    if !args.no_peers {
+        let prepared = prepare(&set, args.masks)?;
+        output.note("asking Python for Open3D and small_gicp ...");
+        match peers::run(&args.python, &prepared, &set.tools, &spread(prepared.len(), Some(args.peer_limit))) {
+            Ok(found) => {
+                report.engines.extend(found.rows);
+                report.notes.extend(found.notes);
+            }
+            Err(err) => report.notes.push(format!("Open3D and small_gicp were not run: {err:#}")),
+        }
+    }
+    report.front = front::front(&report.engines);
+    if let Some(file) = &args.json {
+        write(file, &report)?;
+        output.note(&format!("written: {} (.svg and .png beside it)", file.display()));
+    }
+    output.finish(&report, || text(&report))?;
+    Ok(true)
+}
+
+/// Whether the mesh is one straight bar: its outline is more than six times as long as wide, by second moments.
+pub(super) fn is_straight(mesh: &TriMesh) -> bool {
+    let points = mesh.sample_surface(2000, 1);
+    let mean = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
+    let (mut yy, mut zz, mut yz) = (0.0, 0.0, 0.0);
+    for p in &points {
+        let p = *p - mean;
+        (yy, zz, yz) = (yy + p.y * p.y, zz + p.z * p.z, yz + p.y * p.z);
+    }
+    let (half, root) = (0.5 * (yy + zz), (0.25 * (yy - zz) * (yy - zz) + yz * yz).sqrt());
+    half - root < (half + root) / 36.0
+}
+
+fn fingers(case: &Case, masks: Masks) -> [Option<FingerInput<'_>>; 2] {
+    let masks = match masks {
+        Masks::Spoilt => &case.masks,
+        Masks::Clean => &case.masks_clean,
+    };
+    [0, 1].map(|f| Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&masks[f]) }))
+}
+
+fn prepare(set: &CaseSet, masks: Masks) -> anyhow::Result<Vec<Prepared>> {
+    let straight: BTreeMap<usize, bool> = set.tools.iter().map(|(&n, mesh)| (n, is_straight(mesh))).collect();
+    set.cases
+        .iter()
+        .map(|(name, case)| {
+            let cloud = contact_cloud(&fingers(case, masks)).map_err(|err| anyhow::anyhow!("{name}: {err}"))?;
+            Ok(Prepared {
+                name: name.clone(),
+                stratum: case.stratum,
+                tool: case.tool,
+                straight: straight[&case.tool],
+                truth: case.grasp_from_object,
+                points_yz: cloud.yz(),
+                points: cloud.points,
+            })
+        })
+        .collect()
+}
+
+fn measure(
+    args: &RegistrationArgs,
+    set: &CaseSet,
+    engines: &[Engine],
+    machine: Machine,
+    output: &Output,
+) -> anyhow::Result<Report> {
+    let mut models = BTreeMap::new();
+    let mut tools = Vec::new();
+    for (&number, mesh) in &set.tools {
+        let fastest = |f: &dyn Fn() -> bool| {
+            (0..3)
+                .map(|_| Instant::now())
+                .map(|t| (f(), t.elapsed().as_secs_f64() * 1e3).1)
+                .fold(f64::INFINITY, f64::min)
+        };
+        let model = ToolModel::new(mesh.clone()).map_err(|err| anyhow::anyhow!("tool {number}: {err}"))?;
+        tools.push(ToolRow {
+            tool: number,
+            triangles: mesh.triangles.len(),
+            straight: is_straight(mesh),
+            field_ms: fastest(&|| DistanceField::from_mesh(mesh).is_ok()),
+            build_ms: fastest(&|| ToolModel::new(mesh.clone()).is_ok()),
+        });
+        models.insert(number, model);
+    }
+    let prepared = prepare(set, args.masks)?;
+    let (mut lift_ms, mut whole_ms) = (Vec::new(), Vec::new());
+    for (_, case) in &set.cases {
+        let fingers = fingers(case, args.masks);
+        let model = &models[&case.tool];
+        lift_ms.push(timed(|| contact_cloud(&fingers).map(|c| c.yz())).median);
+        whole_ms.push(timed(|| estimate(&fingers, model, Engine::default(), false)).median);
+    }
+    let quantiles = |ms: &[f64]| Quantiles {
+        median_ms: quantile(ms.iter().copied(), 0.5),
+        p95_ms: quantile(ms.iter().copied(), 0.95),
+    };
+    let mut rows = Vec::new();
+    for &engine in engines {
+        let mut outcomes = Vec::new();
+        for case in &prepared {
+            output.step(&engine.to_string());
+            let model = &models[&case.tool];
+            let result = timed(|| register(&case.points_yz, model, engine, false));
+            outcomes.push(outcome(case, result));
+        }
+        rows.push(EngineRow {
+            name: engine.to_string(),
+            label: engine.label().to_owned(),
+            peer: false,
+            error_deg: outcomes.iter().map(|o| Some(o.error_deg).filter(|e| e.is_finite())).collect(),
+            ms: outcomes.iter().map(|o| Some(o.ms)).collect(),
+            summary: Summary::new(&outcomes),
+        });
+    }
+    Ok(Report {
+        default: Engine::default().to_string(),
+        machine,
+        folder: args.cases.clone(),
+        masks: args.masks,
+        depth_to_points: quantiles(&lift_ms),
+        depth_to_pose: quantiles(&whole_ms),
+        engines: rows,
+        front: Vec::new(),
+        notes: Vec::new(),
+        tools,
+        cases: prepared
+            .iter()
+            .map(|c| CaseRow {
+                name: c.name.clone(),
+                stratum: c.stratum.to_string(),
+                tool: c.tool,
+                points: c.points.len(),
+                truth_deg: c.truth.theta_rad.to_degrees(),
+            })
+            .collect(),
+    })
+}
+
+fn outcome(case: &Prepared, timed: Timed<Result<AlignReport, AlignError>>) -> Outcome {
+    let pose = timed.value.as_ref().ok().map(|r| r.grasp_from_object);
+    Outcome {
+        stratum: case.stratum,
+        straight: case.straight,
+        error_deg: pose.map_or(f64::NAN, |p| angle_error(p.theta_rad, case.truth.theta_rad).to_degrees()),
+        position_mm: pose.map_or(f64::NAN, |p| position_error_mm(p, case.truth)),
+        ms: timed.median,
+        best_ms: timed.best,
+        first_ms: timed.first,
+        lookups: timed.value.as_ref().map_or(0.0, |r| r.lookups as f64),
+        flagged: timed.value.as_ref().ok().map(AlignReport::is_degenerate),
+        rung: None,
+    }
+}
+
+/// Distance between the two places, millimetres.
+pub(super) fn position_error_mm(a: PlanarPose, b: PlanarPose) -> f64 {
+    (a.y_m - b.y_m).hypot(a.z_m - b.z_m) * 1e3
+}
+
+fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
+    let failed = |path: &Path| {
+        let path = path.display().to_string();
+        move |err: std::io::Error| anyhow::anyhow!("cannot write {path}: {err}")
+    };
+    atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes()).map_err(failed(file))?;
+    let title = format!(
+        "Registration: error against time, {} cases, one thread ({})",
+        report.cases.len(),
+        report.machine.cpu.as_deref().unwrap_or("unknown processor")
+    );
+    let picture = front::draw(&title, &report.front, &report.default);
+    let svg = file.with_extension("svg");
+    atomic::write_bytes(&svg, picture.svg().as_bytes()).map_err(failed(&svg))?;
+    crate::io::images::write_rgb8(&file.with_extension("png"), &picture.pixels(1.5))?;
+    Ok(())
+}
+
+fn text(report: &Report) -> String {
+    let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
+    let mut text = format!("{}\n{} cases, {:?} masks\n", report.machine.text(), report.cases.len(), report.masks);
+    let slowest = |of: &dyn Fn(&ToolRow) -> f64| report.tools.iter().map(of).fold(0.0, f64::max);
+    text += &format!(
+        "tools: field at most {:.1} ms, everything at most {:.1} ms; depth and mask to points {} ms, to pose {} ms\n\n",
+        slowest(&|t| t.field_ms),
+        slowest(&|t| t.build_ms),
+        number(report.depth_to_points.median_ms, 3),
+        number(report.depth_to_pose.median_ms, 3),
+    );
+    let width = report.engines.iter().map(|e| e.name.len()).max().unwrap_or(6).max(6);
+    text += &format!(
+        "{:width$} {:>4} {:>10} {:>10} {:>7} {:>8} {:>7} {:>7} {:>7} {:>7} {:>9}\n",
+        "engine",
+        "n",
+        "median ms",
+        "p95 ms",
+        "mean °",
+        "median °",
+        "<=5° %",
+        "<=10° %",
+        ">20° %",
+        "pos. mm",
+        "look-ups"
+    );
+    for row in &report.engines {
+        let f = &row.summary.all;
+        text += &format!(
+            "{:width$} {:>4} {:>10} {:>10} {:>7} {:>8} {:>7.1} {:>7.1} {:>7.1} {:>7} {:>9}{}\n",
+            row.name,
+            f.angles.count,
+            number(f.median_ms, 3),
+            number(f.p95_ms, 3),
+            number(f.angles.mean_deg, 2),
+            number(f.angles.median_deg, 2),
+            f.angles.success_5,
+            f.angles.success_10,
+            f.gross_20,
+            number(f.position_median_mm, 2),
+            number(f.lookups_median, 0),
+            if row.name == report.default { "  <- default" } else { "" },
+        );
+    }
+    text += "\nper stratum: mean °, <=5° %, <=10° %\n";
+    for row in &report.engines {
+        let strata: Vec<String> = row
+            .summary
+            .strata
+            .iter()
+            .map(|(name, f)| {
+                let mean = number(f.angles.mean_deg, 2);
+                format!("{name} {mean} {:.1} {:.1}", f.angles.success_5, f.angles.success_10)
+            })
+            .collect();
+        let flags = if row.peer { String::new() } else { format!(" | {}", row.summary.all.flags_text()) };
+        let rungs = &row.summary.all.rungs;
+        let rungs = if rungs.is_empty() { String::new() } else { format!(" | rungs {rungs:?}") };
+        text += &format!("{:width$} {}{flags}{rungs}\n", row.name, strata.join(" | "));
+    }
+    for note in &report.notes {
+        text += &format!("note: {note}\n");
+    }
+    text
+}
