@@ -19,7 +19,6 @@ pub(super) enum Stream {
     GelNoise = 8,
     GelReference = 9,
     Mask = 10,
-    Dropped = 11,
 }
 
 /// A source of random numbers for one purpose and one finger.

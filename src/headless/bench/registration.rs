@@ -313,7 +313,8 @@ fn measure(
 }
 
 fn outcome(case: &Prepared, timed: Timed<Result<AlignReport, AlignError>>) -> Outcome {
-    let pose = timed.value.as_ref().ok().map(|r| r.grasp_from_object);
+    let report = timed.value.as_ref().ok();
+    let pose = report.map(|r| r.grasp_from_object);
     Outcome {
         stratum: case.stratum,
         straight: case.straight,
@@ -322,9 +323,9 @@ fn outcome(case: &Prepared, timed: Timed<Result<AlignReport, AlignError>>) -> Ou
         ms: timed.median,
         best_ms: timed.best,
         first_ms: timed.first,
-        lookups: timed.value.as_ref().map_or(0.0, |r| r.lookups as f64),
-        flagged: timed.value.as_ref().ok().map(AlignReport::is_degenerate),
-        rung: None,
+        lookups: report.map_or(0.0, |r| r.lookups as f64),
+        flagged: report.and_then(|r| Some(r.observability?.degenerate)),
+        rung: report.filter(|r| !r.ladder.is_empty()).map(|r| r.rung.to_string()),
     }
 }
 
