@@ -21,4 +21,5 @@ pub mod resample;
 pub mod sample;
 pub mod sensor;
 pub mod sim;
+pub mod tool;
 pub mod units;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use strum::IntoEnumIterator as _;
 use touch2touch::domain::contact::{LAB_CAD_DISTANCE_M, cad_signed_distance};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
@@ -48,7 +49,7 @@ fn forty_known_grasps_with_spoilt_masks() {
         median(&build_ms),
         build_ms.iter().copied().fold(0.0, f64::max)
     );
-    for engine in [Engine::DistanceField, Engine::LabIcp] {
+    for engine in Engine::iter() {
         let (mut errors, mut shifts, mut ms, mut flags, mut lookups) = (vec![], vec![], vec![], vec![], vec![]);
         for (name, case) in &set.cases {
             let tool = &tools[&case.tool];
@@ -97,9 +98,11 @@ fn forty_known_grasps_with_spoilt_masks() {
             // A prototype of the same method reached mean 0.93, median 0.58, 100 % on these cases.
             assert!(mean <= 1.1 && s5 >= 95.0, "mean {mean} deg, within 5 deg {s5} %");
             assert!(median(&shifts) <= 0.6, "position {} mm", median(&shifts));
-        } else {
+        } else if engine == Engine::LabIcp {
             // One start at the identity and a squared cost: worse, as it should be, but no nonsense.
             assert!(s5 >= 50.0, "within 5 deg {s5} %");
+        } else if matches!(engine, Engine::PlanarPointToPoint | Engine::PlanarPointToPlane) {
+            assert!(s5 >= 95.0, "{engine}: within 5 deg {s5} %");
         }
     }
 }

@@ -169,34 +169,7 @@ pub struct CloudKey {
     pub parts: [Option<(ImprintKey, Option<MaskVersion>)>; 2],
 }
 
-/// The registration.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum PoseEngine {
-    /// The studio's: least squares on a distance field, from several starts.
-    #[default]
-    DistanceField,
-    /// The lab's planar ICP, reproduced for comparison.
-    LabIcp,
-}
-
-impl PoseEngine {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::DistanceField => "Distance field",
-            Self::LabIcp => "Lab ICP",
-        }
-    }
-
-    /// What it does, for the tooltip.
-    pub fn tooltip(self) -> &'static str {
-        match self {
-            Self::DistanceField => "Least squares on the tool's distance field, from several starts (default)",
-            Self::LabIcp => "The lab's planar point-to-point ICP with 200 iterations from one start, for comparison",
-        }
-    }
-}
+pub use crate::domain::pose::Engine as PoseEngine;
 
 /// A pose of a cloud.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -13,21 +13,26 @@
 pub mod basin;
 pub mod correspond;
 pub mod field;
+pub mod icp;
 pub mod lab_icp;
+mod linear;
 mod observability;
 mod planar;
+mod register;
 #[cfg(test)]
 pub(crate) mod testing;
 
-use glam::DVec2;
+use glam::{DAffine3, DVec2};
 use serde::{Deserialize, Serialize};
 
 use super::frames::PlanarPose;
 
 pub use field::{DistanceField, FieldError, FieldSample};
+pub use icp::IcpConfig;
 pub use lab_icp::{LabIcpConfig, lab_icp};
 pub use observability::{DEGENERATE_BELOW, Observability, observability};
 pub use planar::align;
+pub use register::{Ask, Register, Scene};
 
 /// Length that makes an angle comparable with a shift: one radian counts as this many metres.
 ///
@@ -260,6 +265,8 @@ impl Certificate {
 /// One start and where it led.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {
+    /// The start that was asked for, `grasp_from_object`. Only a registration that applies it wrongly differs.
+    pub requested: PlanarPose,
     /// Where it started, `grasp_from_object`.
     pub start: PlanarPose,
     /// Where it ended, `grasp_from_object`.
@@ -277,6 +284,9 @@ pub struct Run {
 pub struct AlignReport {
     /// The tool's pose in the hand.
     pub grasp_from_object: PlanarPose,
+    /// The same with all six degrees of freedom, from the registrations that find them. The planar pose is then the
+    /// nearest to it.
+    pub grasp_from_object_6dof: Option<DAffine3>,
     /// Whether the winning run reached an end point.
     pub converged: bool,
     /// Why the winning run ended.
@@ -311,6 +321,8 @@ pub struct AlignReport {
     pub within_prior: bool,
     /// How well the points determine the pose; `None` if the engine had no field to tell from.
     pub observability: Option<Observability>,
+    /// Distances both ways at the answer; only if recorded.
+    pub directions: Option<Directions>,
     /// Per-iteration states of all runs; empty unless recorded.
     pub trace: Vec<TraceStep>,
     /// Fate of every offered point, in order; empty unless recorded.
@@ -349,6 +361,8 @@ pub struct TraceStep {
     pub iteration: usize,
     /// The pose, `grasp_from_object`.
     pub grasp_from_object: PlanarPose,
+    /// The same with all six degrees of freedom where the registration has them.
+    pub grasp_from_object_6dof: Option<DAffine3>,
     /// Cost per point, square metres; comparable only at the same kernel width and number of points.
     pub cost_m2: f64,
     /// Share of the points within the kernel's width.
@@ -386,6 +400,31 @@ pub struct PointFit {
     pub weight: f32,
     /// What it counts as.
     pub fate: Fate,
+}
+
+/// Distances between contacts and model points, seen along the closing axis, at the final pose.
+///
+/// The two directions answer different questions: contacts far from the model are a wrong mask or a wrong pose; model
+/// points far from every contact are mostly parts that nothing touched.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Directions {
+    /// From every contact to its nearest model point.
+    pub scene_to_model: Distances,
+    /// From every model point to its nearest contact.
+    pub model_to_scene: Distances,
+}
+
+/// One direction of [`Directions`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Distances {
+    /// Root mean square of all distances, metres.
+    pub rms_m: f64,
+    /// Share of the distances up to 1 mm.
+    pub overlap: f64,
+    /// Share of the distances up to 15 mm: the "fitness" that the lab computes and does not use.
+    pub fitness_15mm: f64,
+    /// Root mean square of those, metres; from model to scene it is by this that the lab chooses among starts.
+    pub rms_15mm_m: f64,
 }
 
 /// Centroid and size of the finite points, computed about a local origin in f64.

@@ -1,21 +1,16 @@
 //! Depth to pose in one call: what the command line and the studio both use.
 
-use glam::DVec2;
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::align::{
-    AlignConfig, AlignError, AlignReport, DistanceField, FieldError, LabIcpConfig, align, lab_icp, observability,
-};
+use super::align::{AlignConfig, AlignError, AlignReport, Ask, IcpConfig, LabIcpConfig, Register, Scene};
 use super::cloud::{CloudError, ContactCloud, FingerCloud, lift};
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Mask};
-use super::mesh::distance::MeshError;
-use super::mesh::{MeshDistance, TriMesh};
 use super::sample::{BubbleCamera, Sample};
 use super::sensor::Finger;
 
-/// Seed of the model points, so that every run compares with the same ones.
-const MODEL_SEED: u64 = 0;
+pub use super::tool::{ToolError, ToolModel};
 
 /// Which registration answers.
 #[derive(
@@ -25,71 +20,86 @@ const MODEL_SEED: u64 = 0;
     Default,
     PartialEq,
     Eq,
+    PartialOrd,
+    Ord,
     Hash,
     Serialize,
     Deserialize,
     strum::EnumIter,
     strum::Display,
     strum::EnumString,
+    strum::IntoStaticStr,
 )]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Engine {
     /// Robust registration on the distance field of the tool's silhouette.
     #[default]
     DistanceField,
     /// The lab's planar point-to-point loop.
     LabIcp,
+    /// Point to point on the silhouette.
+    PlanarPointToPoint,
+    /// Point to plane on the silhouette.
+    PlanarPointToPlane,
+    /// Generalized-ICP in the plane.
+    PlanarGicp,
+    /// Point to point in space.
+    PointToPoint,
+    /// Point to plane in space.
+    PointToPlane,
+    /// Generalized-ICP in space.
+    Gicp,
 }
 
 impl Engine {
+    /// Name in settings, files and on the command line, such as `distance_field`.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
     /// Name for people.
     pub fn label(self) -> &'static str {
         match self {
             Self::DistanceField => "ICP (distance field)",
             Self::LabIcp => "ICP (paper)",
+            Self::PlanarPointToPoint => "ICP point-point, planar",
+            Self::PlanarPointToPlane => "ICP point-plane, planar",
+            Self::PlanarGicp => "GICP, planar",
+            Self::PointToPoint => "ICP point-point, 6 DoF",
+            Self::PointToPlane => "ICP point-plane, 6 DoF",
+            Self::Gicp => "GICP, 6 DoF",
         }
     }
-}
 
-/// Why a CAD model cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ToolError {
-    /// No silhouette.
-    #[error(transparent)]
-    Field(#[from] FieldError),
-    /// No surface.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-}
+    /// What it does, in one line.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::DistanceField => "Robust least squares on the distance field of the silhouette: the default",
+            Self::LabIcp => "The paper's loop: planar point to point, one start, up to 200 iterations, no rejection",
+            Self::PlanarPointToPoint => {
+                "Planar, nearest model points, far pairs left out, closed-form steps, ten starts"
+            }
+            Self::PlanarPointToPlane => "Planar, distance along the outline's normals, robust kernel, ten starts",
+            Self::PlanarGicp => "Planar, surface to surface with both sides' normals, robust kernel, ten starts",
+            Self::PointToPoint => "Six degrees of freedom, nearest model points, far pairs left out, ten starts",
+            Self::PointToPlane => "Six degrees of freedom, distance along the surface's normals, robust, ten starts",
+            Self::Gicp => "Six degrees of freedom, surface to surface with both sides' normals, robust, ten starts",
+        }
+    }
 
-/// A tool's CAD model with everything that registration and labelling derive from it, built once.
-#[derive(Clone, Debug)]
-pub struct ToolModel {
-    /// The model, metres, object frame.
-    pub mesh: TriMesh,
-    /// Distance to its silhouette along the closing axis.
-    pub field: DistanceField,
-    /// Distance to its surface.
-    pub distance: MeshDistance,
-    /// 5000 points of its surface, `(y, z)`, metres: what the lab's loop compares with.
-    pub model_points: Vec<DVec2>,
-}
-
-impl ToolModel {
-    /// Builds everything: some 10 to 30 ms.
-    ///
-    /// # Errors
-    /// [`ToolError`] if the mesh is empty or damaged, or its size cannot be metres (with the scale that would be).
-    pub fn new(mesh: TriMesh) -> Result<Self, ToolError> {
-        let field = DistanceField::from_mesh(&mesh)?;
-        let distance = MeshDistance::new(&mesh)?;
-        let model_points = mesh
-            .sample_surface(super::align::lab_icp::LAB_MODEL_POINTS, MODEL_SEED)
-            .iter()
-            .map(|p| DVec2::new(p.y, p.z))
-            .collect();
-        Ok(Self { mesh, field, distance, model_points })
+    /// The registration with the settings that the product uses.
+    pub fn registration(self) -> Box<dyn Register> {
+        match self {
+            Self::DistanceField => Box::new(AlignConfig::default()),
+            Self::LabIcp => Box::new(LabIcpConfig::default()),
+            Self::PlanarPointToPoint => Box::new(IcpConfig::planar_point_to_point()),
+            Self::PlanarPointToPlane => Box::new(IcpConfig::planar_point_to_plane()),
+            Self::PlanarGicp => Box::new(IcpConfig::planar_gicp()),
+            Self::PointToPoint => Box::new(IcpConfig::point_to_point()),
+            Self::PointToPlane => Box::new(IcpConfig::point_to_plane()),
+            Self::Gicp => Box::new(IcpConfig::gicp()),
+        }
     }
 }
 
@@ -166,20 +176,40 @@ pub fn contact_cloud(fingers: &Fingers<'_>) -> Result<ContactCloud, PoseError> {
     if cloud.counts == [None, None] { Err(PoseError::NoFinger) } else { Ok(cloud) }
 }
 
-/// Contact points (`(y, z)` in the grasp frame, metres) to the tool's pose: what every caller ends in.
+/// Contact points (grasp frame, metres) to the tool's pose: what every caller ends in. `record` keeps per-iteration
+/// states, per-point residuals and the distances both ways.
 ///
 /// # Errors
 /// [`AlignError`] for too few points or none near the tool.
-pub fn register(points: &[DVec2], tool: &ToolModel, engine: Engine, record: bool) -> Result<AlignReport, AlignError> {
-    match engine {
-        Engine::DistanceField => align(points, &tool.field, &AlignConfig { record, ..AlignConfig::default() }),
-        Engine::LabIcp => {
-            let config = LabIcpConfig { record, ..LabIcpConfig::default() };
-            let mut report = lab_icp(points, &tool.model_points, &config)?;
-            report.observability = Some(observability(points, &tool.field, report.grasp_from_object));
-            Ok(report)
-        }
-    }
+pub fn register(points: &[DVec3], tool: &ToolModel, engine: Engine, record: bool) -> Result<AlignReport, AlignError> {
+    register_with(&*engine.registration(), points, tool, Ask { starts: None, record })
+}
+
+/// The same from one start, `grasp_from_object`, instead of the engine's own.
+///
+/// # Errors
+/// As [`register`], and for a start that is not finite.
+pub fn register_from(
+    points: &[DVec3],
+    tool: &ToolModel,
+    engine: Engine,
+    start: PlanarPose,
+    record: bool,
+) -> Result<AlignReport, AlignError> {
+    register_with(&*engine.registration(), points, tool, Ask { starts: Some(&[start]), record })
+}
+
+/// The same with a registration of other settings.
+///
+/// # Errors
+/// As [`register`], and for settings that make no sense.
+pub fn register_with(
+    registration: &dyn Register,
+    points: &[DVec3],
+    tool: &ToolModel,
+    ask: Ask<'_>,
+) -> Result<AlignReport, AlignError> {
+    registration.run(&Scene::new(points), tool, ask)
 }
 
 /// Imprints, cameras and masks to the tool's pose in the hand. `record` keeps per-iteration states and per-point
@@ -196,7 +226,7 @@ pub fn estimate(
     record: bool,
 ) -> Result<PoseReport, PoseError> {
     let cloud = contact_cloud(fingers)?;
-    let report = register(&cloud.yz(), tool, engine, record)?;
+    let report = register(&cloud.points, tool, engine, record)?;
     Ok(PoseReport {
         engine,
         grasp_from_object: report.grasp_from_object,
@@ -212,7 +242,9 @@ mod tests {
     use crate::domain::align::testing::cross;
     use crate::domain::cloud::testing::camera;
     use crate::domain::contact::{LAB_CAD_DISTANCE_M, cad_signed_distance};
-    use glam::{DAffine3, DQuat, DVec3};
+    use crate::domain::mesh::TriMesh;
+    use glam::{DAffine3, DQuat};
+    use strum::IntoEnumIterator as _;
 
     /// A flat pad through the grasp origin that carries the cross: the label at the true pose gives the pose back.
     #[test]
@@ -278,7 +310,9 @@ mod tests {
         let error = estimate(&fingers, &tool, Engine::default(), false).unwrap_err();
         assert!(error.to_string().starts_with("left finger: the reference depth is"), "{error}");
         assert!(ToolModel::new(TriMesh::default()).is_err());
-        assert_eq!("lab-icp".parse(), Ok(Engine::LabIcp));
-        assert_eq!(Engine::DistanceField.to_string(), "distance-field");
+        for engine in Engine::iter() {
+            assert_eq!(engine.key().parse(), Ok(engine));
+            assert_eq!(serde_json::to_value(engine).unwrap(), engine.key());
+        }
     }
 }

@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use strum::IntoEnumIterator as _;
 
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::{ModelArgs, Predictor};
@@ -33,9 +35,9 @@ pub(super) struct PoseArgs {
     imprint: Imprints,
     #[command(flatten)]
     mask: MaskArgs,
-    /// The registration.
-    #[arg(long, value_enum, default_value_t = Registration::Default)]
-    engine: Registration,
+    /// The registration: the key of one, `default`, `lab` (the paper's), or `all`, one after the other.
+    #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = parse_engines())]
+    engine: Engines,
     /// Take only this many pairs, spread evenly over the dataset.
     #[arg(long)]
     limit: Option<usize>,
@@ -56,14 +58,26 @@ enum Imprints {
     Both,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Registration {
-    /// The distance field with a robust cost.
-    Default,
-    /// The lab's planar ICP.
-    Lab,
-    /// Both, one after the other.
-    All,
+/// The registrations to run, in this order.
+#[derive(Debug, Clone)]
+pub(super) struct Engines(pub(super) Vec<Engine>);
+
+/// Reads the key of a registration, or one of the short names; lists them all in the help.
+pub(super) fn parse_engines() -> impl TypedValueParser<Value = Engines> {
+    let mut names = vec![
+        PossibleValue::new("default").help("The same as distance_field"),
+        PossibleValue::new("lab").help("The same as lab_icp"),
+        PossibleValue::new("all").help("All of the following, one after the other"),
+    ];
+    names.extend(Engine::iter().map(|e| PossibleValue::new(e.key()).help(e.description())));
+    PossibleValuesParser::new(names).map(|name| {
+        Engines(match name.as_str() {
+            "default" => vec![Engine::default()],
+            "lab" => vec![Engine::LabIcp],
+            "all" => Engine::iter().collect(),
+            key => key.parse().into_iter().collect(),
+        })
+    })
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -109,11 +123,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let path = args.path.as_ref().or(args.input.as_ref()).expect("clap asks for one of the two");
     let dataset = super::open(path)?;
     let ids = super::spread(dataset.index.pairs.len(), args.limit);
-    let engines: &[Engine] = match args.engine {
-        Registration::Default => &[Engine::DistanceField],
-        Registration::Lab => &[Engine::LabIcp],
-        Registration::All => &[Engine::DistanceField, Engine::LabIcp],
-    };
+    let engines: &[Engine] = &args.engine.0;
     let imprints: &[&'static str] = match args.imprint {
         Imprints::Measured => &["measured"],
         Imprints::Predicted => &["predicted"],
@@ -208,7 +218,7 @@ fn pose_cases(
             let found = result.as_ref().ok().map(|r| r.object_from_grasp);
             Case {
                 name: name.to_owned(),
-                engine: engine_key(engine),
+                engine: engine.key(),
                 imprint,
                 mask: mask_name,
                 angle_deg: found.map(|p| p.theta_rad.to_degrees()),
@@ -225,14 +235,6 @@ fn pose_cases(
             }
         })
         .collect())
-}
-
-/// The key of an engine in the JSON.
-fn engine_key(engine: Engine) -> &'static str {
-    match engine {
-        Engine::DistanceField => "distance_field",
-        Engine::LabIcp => "lab_icp",
-    }
 }
 
 /// The contact masks and the name of their source.
@@ -287,7 +289,7 @@ fn summary(cases: &[Case], first_imprint: &str, first_engine: Engine) -> Summary
             engines.insert(key, figures);
         }
     }
-    Summary { first: of(engine_key(first_engine), first_imprint), engines }
+    Summary { first: of(first_engine.key(), first_imprint), engines }
 }
 
 fn text(report: &Report) -> String {

@@ -51,22 +51,23 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.label(section("Pose", cx.p));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let engine = cx.state.settings.pose_engine;
-            let combo = eframe::egui::ComboBox::from_id_salt("engine").width(104.0).selected_text(engine.name());
+            let combo =
+                eframe::egui::ComboBox::from_id_salt("engine").width(150.0).truncate().selected_text(engine.label());
             let response = combo.show_ui(ui, |ui| {
                 for e in PoseEngine::iter() {
-                    if ui.selectable_label(e == engine, e.name()).on_hover_text(e.tooltip()).clicked() {
+                    if ui.selectable_label(e == engine, e.label()).on_hover_text(e.description()).clicked() {
                         cx.out.push(Command::SetPoseEngine(e));
                     }
                 }
             });
-            response.response.accessible_name("Registration").on_hover_text(engine.tooltip());
+            response.response.accessible_name("Registration").on_hover_text(engine.description());
         });
     });
     for source in [ImprintSource::Measured, ImprintSource::Predicted] {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 6.0;
             images::side_mark(ui, cx.p, source);
-            ui.label(source.name());
+            ui.label(source.label());
             match cx.state.pose(source) {
                 Lookup::Ready(pose) | Lookup::Stale(pose) => {
                     let (text, color) = scene::angle_text(cx.p, pose);

@@ -2,8 +2,6 @@
 
 use std::time::Instant;
 
-use glam::DVec2;
-
 use super::super::error::TaskError;
 use super::super::keys::{MaskRecipe, PoseEngine, ShiftMode};
 use super::super::results::{Clouds, Comparison, FingerCloud, PoseResult, Prediction};
@@ -12,7 +10,7 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::mesh::TriMesh;
 use crate::domain::metrics::{self, SsimRange};
-use crate::domain::pose::{Engine, ToolModel, register};
+use crate::domain::pose::{ToolModel, register};
 use crate::domain::resample::bilinear;
 use crate::domain::sample::{BubbleCamera, BubbleTouch, Sample, Scale};
 use crate::domain::sensor::Finger;
@@ -169,11 +167,7 @@ pub fn pose(
     truth: Option<PlanarPose>,
 ) -> Result<PoseResult, TaskError> {
     let start = Instant::now();
-    let points: Vec<DVec2> = clouds.contact_points().into_iter().map(|p| DVec2::new(p.y, p.z)).collect();
-    let engine = match engine {
-        PoseEngine::DistanceField => Engine::DistanceField,
-        PoseEngine::LabIcp => Engine::LabIcp,
-    };
+    let points = clouds.contact_points();
     let report = register(&points, tool, engine, false).map_err(|err| TaskError::from_error("Pose", &err))?;
     let ms = start.elapsed().as_secs_f64() * 1e3;
     let angle_rad = report.lab_angle_rad();

@@ -10,8 +10,10 @@ use glam::DVec2;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use serde::{Deserialize, Serialize};
 
-use super::{AlignError, AlignReport, Fate, PointFit, Prior, Run, Rung, Stop, TraceStep};
+use super::register::{Ask, Register, Scene};
+use super::{AlignError, AlignReport, Fate, PointFit, Prior, Run, Rung, Stop, TraceStep, observability};
 use crate::domain::frames::PlanarPose;
+use crate::domain::tool::ToolModel;
 
 /// Fewest contact points the lab's loop works with.
 pub const LAB_MIN_POINTS: usize = 4;
@@ -34,6 +36,21 @@ pub struct LabIcpConfig {
 impl Default for LabIcpConfig {
     fn default() -> Self {
         Self { iterations: 200, start: PlanarPose::default(), record: false }
+    }
+}
+
+impl Register for LabIcpConfig {
+    fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError> {
+        let mut config = self.clone();
+        config.record = ask.record;
+        match ask.starts {
+            Some([start]) => config.start = *start,
+            Some(_) => return Err(AlignError::Config { what: "starts" }),
+            None => {}
+        }
+        let mut report = lab_icp(scene.yz(), &tool.model_points, &config)?;
+        report.observability = Some(observability(scene.yz(), &tool.field, report.grasp_from_object));
+        Ok(report)
     }
 }
 
@@ -81,9 +98,17 @@ pub fn lab_icp(points_yz: &[DVec2], model_points: &[DVec2], config: &LabIcpConfi
         note(config, &mut trace, iterations, pose, &matched, count);
     }
     let fits = if config.record { fits(&tree, points_yz, pose) } else { Vec::new() };
-    let run = Run { start: config.start, end: pose, cost_m2: matched.squares / count as f64, iterations, stop };
+    let run = Run {
+        requested: config.start,
+        start: config.start,
+        end: pose,
+        cost_m2: matched.squares / count as f64,
+        iterations,
+        stop,
+    };
     Ok(AlignReport {
         grasp_from_object: pose,
+        grasp_from_object_6dof: None,
         converged: stop.converged(),
         stop,
         start: config.start,
@@ -101,6 +126,7 @@ pub fn lab_icp(points_yz: &[DVec2], model_points: &[DVec2], config: &LabIcpConfi
         inlier_rms_m: (matched.inlier_squares / (matched.inliers as f64).max(1.0)).sqrt(),
         within_prior: Prior::default().allows(pose),
         observability: None,
+        directions: None,
         trace,
         fits,
     })
@@ -166,6 +192,7 @@ fn note(
             run: 0,
             iteration,
             grasp_from_object,
+            grasp_from_object_6dof: None,
             cost_m2: matched.squares / points as f64,
             inlier_share: matched.inliers as f64 / points as f64,
             kernel_m: f64::INFINITY,

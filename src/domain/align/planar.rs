@@ -84,6 +84,7 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
     let absolute: Vec<DVec2> = chosen.iter().map(|p| *p + c).collect();
     Ok(AlignReport {
         grasp_from_object: pose,
+        grasp_from_object_6dof: None,
         converged: best.stop.converged(),
         stop: best.stop,
         start: config.starts[winner],
@@ -93,6 +94,7 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
             .map(|(run, start)| {
                 let last = run.merged_into.map_or(run, |other| &runs[other]);
                 Run {
+                    requested: *start,
                     start: *start,
                     end: last.state.to_pose(c),
                     cost_m2: last.cost,
@@ -114,6 +116,7 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
         inlier_rms_m: (best.inlier_squares / (best.inliers as f64).max(1.0)).sqrt(),
         within_prior: config.prior.allows(pose),
         observability: Some(observability(&absolute, field, pose)),
+        directions: None,
         trace: search.trace,
         fits,
     })
@@ -332,6 +335,7 @@ impl Search<'_> {
                 run,
                 iteration: at.iterations,
                 grasp_from_object: at.state.to_pose(self.centroid),
+                grasp_from_object_6dof: None,
                 cost_m2: n.cost / points as f64,
                 inlier_share: n.inliers as f64 / points as f64,
                 kernel_m,

@@ -87,6 +87,17 @@ impl MeshDistance {
         if p.is_finite() { self.nearest_below(p, f64::INFINITY).sqrt() } else { f64::NAN }
     }
 
+    /// The nearest point of the surface within `limit_m` (metres, may be infinite) and the unit normal of its
+    /// triangle, as the mesh is wound. `None` if there is none, or `p` is not finite.
+    pub fn closest(&self, p: DVec3, limit_m: f64) -> Option<(DVec3, DVec3)> {
+        if !p.is_finite() {
+            return None;
+        }
+        let (_, triangle) = self.search(p, limit_m * limit_m);
+        let t @ [a, b, c] = self.triangles.get(triangle?)?;
+        Some((nearest_on_triangle(t, p), (*b - *a).cross(*c - *a).try_normalize()?))
+    }
+
     /// Signed distance, metres, negative inside. NaN for a point that is not finite.
     pub fn signed(&self, p: DVec3) -> f64 {
         let distance = self.unsigned(p);
@@ -133,7 +144,13 @@ impl MeshDistance {
 
     /// Squared distance to the nearest triangle, or `limit` if none is nearer than that.
     fn nearest_below(&self, p: DVec3, limit: f64) -> f64 {
+        self.search(p, limit).0
+    }
+
+    /// Squared distance to the nearest triangle and its position; `limit` and `None` if none is nearer than that.
+    fn search(&self, p: DVec3, limit: f64) -> (f64, Option<usize>) {
         let mut best = limit;
+        let mut triangle = None;
         let mut stack = vec![(0u32, self.nodes[0].distance_squared(p))];
         while let Some((index, distance)) = stack.pop() {
             if distance >= best {
@@ -152,12 +169,16 @@ impl MeshDistance {
                     stack.push((b, db));
                 }
             } else {
-                for t in self.leaf(node) {
-                    best = best.min((nearest_on_triangle(t, p) - p).length_squared());
+                for (i, t) in self.leaf(node).iter().enumerate() {
+                    let distance = (nearest_on_triangle(t, p) - p).length_squared();
+                    if distance < best {
+                        best = distance;
+                        triangle = Some(node.start as usize + i);
+                    }
                 }
             }
         }
-        best
+        (best, triangle)
     }
 }
 
@@ -250,6 +271,12 @@ mod tests {
         q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
     }
 
+    /// Whether a normal is one of the six of an axis-aligned box.
+    fn exact_axis(normal: DVec3) -> bool {
+        let n = normal.abs();
+        (n.max_element() - 1.0).abs() < 1e-12 && (n.element_sum() - 1.0).abs() < 1e-12
+    }
+
     proptest! {
         #[test]
         fn agrees_with_the_exact_box(x in -0.03..0.03f64, y in -0.03..0.03f64, z in -0.03..0.03f64) {
@@ -259,6 +286,9 @@ mod tests {
             let exact = cuboid_distance(c, h, p);
             prop_assert!((distance.signed(p) - exact).abs() < 1e-12, "{} for {exact}", distance.signed(p));
             prop_assert_eq!(distance.within(p, 0.001), exact <= 0.001);
+            let (foot, normal) = distance.closest(p, f64::INFINITY).unwrap();
+            prop_assert!((foot.distance(p) - exact.abs()).abs() < 1e-12);
+            prop_assert!(exact_axis(normal) && distance.closest(p, 0.5 * exact.abs()).is_none());
         }
     }
 

@@ -12,6 +12,11 @@ impl TriMesh {
     /// The same seed gives the same points on every machine. Triangles without an area or with corners that are
     /// not finite get none; a mesh without any area gives an empty list.
     pub fn sample_surface(&self, count: usize, seed: u64) -> Vec<DVec3> {
+        self.sample_surface_with_normals(count, seed).into_iter().map(|(point, _)| point).collect()
+    }
+
+    /// The same points as [`Self::sample_surface`], each with the unit normal of its triangle.
+    pub fn sample_surface_with_normals(&self, count: usize, seed: u64) -> Vec<(DVec3, DVec3)> {
         let mut upto = Vec::with_capacity(self.triangles.len());
         let mut total = 0.0;
         for i in 0..self.triangles.len() {
@@ -32,7 +37,9 @@ impl TriMesh {
                 let [a, b, c] = self.corners(triangle);
                 // The square root makes the density uniform over the triangle instead of denser at one corner.
                 let (r, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
-                a * (1.0 - r) + b * (r * (1.0 - v)) + c * (r * v)
+                let point = a * (1.0 - r) + b * (r * (1.0 - v)) + c * (r * v);
+                // Only triangles with an area are drawn, so the product has a direction; its size may be tiny.
+                (point, (b - a).cross(c - a).try_normalize().unwrap_or(DVec3::X))
             })
             .collect()
     }
