@@ -6,10 +6,10 @@ use glam::{DVec2, DVec3};
 
 use super::align::basin::{Basin, BasinConfig, basin};
 use super::align::correspond::{Matches, ModelPoints, Surface, correspondences};
-use super::align::{AlignConfig, AlignError, AlignReport, LabIcpConfig, TraceStep, align, lab_icp, observability};
+use super::align::{AlignError, AlignReport, TraceStep};
 use super::frames::PlanarPose;
 use super::mesh::sampling::spread;
-use super::pose::{Engine, ToolModel, register};
+use super::pose::{Engine, ToolModel, register, register_from};
 
 /// Contact points per run of a basin map with the distance field: as many as the answer is computed from.
 const MAP_POINTS: usize = 512;
@@ -28,25 +28,9 @@ pub fn recorded(
     engine: Engine,
     start: Option<PlanarPose>,
 ) -> Result<AlignReport, AlignError> {
-    let yz = in_plane(points);
     match start {
-        None => register(&yz, tool, engine, true),
-        Some(start) => register_from(&yz, tool, engine, start),
-    }
-}
-
-/// One recorded run from one start.
-fn register_from(yz: &[DVec2], tool: &ToolModel, engine: Engine, start: PlanarPose) -> Result<AlignReport, AlignError> {
-    match engine {
-        Engine::DistanceField => {
-            align(yz, &tool.field, &AlignConfig { starts: vec![start], record: true, ..AlignConfig::default() })
-        }
-        Engine::LabIcp => {
-            let config = LabIcpConfig { start, record: true, ..LabIcpConfig::default() };
-            let mut report = lab_icp(yz, &tool.model_points, &config)?;
-            report.observability = Some(observability(yz, &tool.field, report.grasp_from_object));
-            Ok(report)
-        }
+        None => register(points, tool, engine, true),
+        Some(start) => register_from(points, tool, engine, start, true),
     }
 }
 
@@ -60,10 +44,10 @@ pub fn basin_map(
     config: &BasinConfig,
     cancelled: impl Fn() -> bool + Sync,
 ) -> Option<Basin> {
-    let finite: Vec<DVec2> = in_plane(points).into_iter().filter(|p| p.is_finite()).collect();
+    let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
     let most = if uses_field(engine) { MAP_POINTS } else { MAP_POINTS_COSTLY };
-    let yz: Vec<DVec2> = spread(finite.len(), most).into_iter().map(|i| finite[i]).collect();
-    basin(config, points.len(), |start| register_from(&yz, tool, engine, start), cancelled)
+    let thinned: Vec<DVec3> = spread(finite.len(), most).into_iter().map(|i| finite[i]).collect();
+    basin(config, points.len(), |start| register_from(&thinned, tool, engine, start, true), cancelled)
 }
 
 /// Whether the registration compares with the silhouette's field rather than with model points.
@@ -119,7 +103,7 @@ mod tests {
         let start = PlanarPose { theta_rad: 0.12, y_m: 0.0, z_m: 0.001 };
         for engine in Engine::iter() {
             let own = recorded(&points, &tool, engine, None).unwrap();
-            let plain = register(&in_plane(&points), &tool, engine, false).unwrap();
+            let plain = register(&points, &tool, engine, false).unwrap();
             assert_eq!(own.grasp_from_object, plain.grasp_from_object, "{engine}: looking changes nothing");
             assert!(!own.trace.is_empty() && plain.trace.is_empty(), "{engine}");
             let told = recorded(&points, &tool, engine, Some(start)).unwrap();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::{Args, ValueEnum};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
@@ -72,7 +72,6 @@ pub(super) struct Prepared {
     pub(super) truth: PlanarPose,
     /// Contact points, grasp frame, metres.
     pub(super) points: Vec<DVec3>,
-    pub(super) points_yz: Vec<DVec2>,
 }
 
 /// One row of the table.
@@ -225,7 +224,6 @@ fn prepare(set: &CaseSet, masks: Masks) -> anyhow::Result<Vec<Prepared>> {
                 tool: case.tool,
                 straight: straight[&case.tool],
                 truth: case.grasp_from_object,
-                points_yz: cloud.yz(),
                 points: cloud.points,
             })
         })
@@ -276,7 +274,7 @@ fn measure(
         for case in &prepared {
             output.step(&engine.to_string());
             let model = &models[&case.tool];
-            let result = timed(|| register(&case.points_yz, model, engine, false));
+            let result = timed(|| register(&case.points, model, engine, false));
             outcomes.push(outcome(case, result));
         }
         rows.push(EngineRow {
