@@ -47,7 +47,7 @@ pub fn basin_map(
     let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
     let most = if uses_field(engine) { MAP_POINTS } else { MAP_POINTS_COSTLY };
     let thinned: Vec<DVec3> = spread(finite.len(), most).into_iter().map(|i| finite[i]).collect();
-    basin(config, points.len(), |start| register_from(&thinned, tool, engine, start, true), cancelled)
+    basin(config, points.len(), |start| register_from(&thinned, tool, engine, start, false), cancelled)
 }
 
 /// Whether the registration compares with the silhouette's field rather than with model points.

@@ -239,7 +239,7 @@ pub fn basin(
 fn arrival(requested: PlanarPose, report: &AlignReport) -> Arrival {
     let run = report.runs.get(report.winner);
     Arrival {
-        applied: report.trace.first().map_or(requested, |step| step.grasp_from_object),
+        applied: run.map_or(requested, |r| r.start),
         end: report.grasp_from_object,
         cost_m2: run.map_or(f64::NAN, |r| r.cost_m2),
         inlier_share: report.inlier_share,

@@ -128,7 +128,7 @@ impl IcpConfig {
     fn check(&self) -> Result<(), AlignError> {
         let bad = |what| Err(AlignError::Config { what });
         let length = |l: f64| l.is_finite() && l > 0.0;
-        if self.kernels.is_empty() || self.kernels.iter().any(|k| !(k.width_m() > 1e-6)) {
+        if self.kernels.is_empty() || self.kernels.iter().any(|k| k.width_m().is_nan() || k.width_m() <= 1e-6) {
             return bad("kernels");
         }
         match self.rejector {

@@ -91,12 +91,10 @@ mod tests {
         #[test]
         fn eigenvectors_rebuild_the_matrix(m in proptest::array::uniform10(-1.0..1.0f64)) {
             let mut a = [[0.0; 4]; 4];
-            let mut next = m.iter();
-            for i in 0..4 {
-                for j in 0..=i {
-                    a[i][j] = *next.next().unwrap();
-                    a[j][i] = a[i][j];
-                }
+            let pairs = (0..4).flat_map(|i| (0..=i).map(move |j| (i, j)));
+            for ((i, j), value) in pairs.zip(m) {
+                a[i][j] = value;
+                a[j][i] = value;
             }
             let (values, vectors) = eigen_symmetric(a).unwrap();
             prop_assert!(values.is_sorted());
