@@ -67,7 +67,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 6.0;
             images::side_mark(ui, cx.p, source);
-            ui.label(source.label());
+            ui.label(source.name());
             match cx.state.pose(source) {
                 Lookup::Ready(pose) | Lookup::Stale(pose) => {
                     let (text, color) = scene::angle_text(cx.p, pose);
