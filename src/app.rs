@@ -25,3 +25,4 @@ pub mod settings;
 pub mod state;
 pub mod tasks;
 pub mod wanted;
+pub mod workbench;

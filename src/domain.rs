@@ -11,6 +11,7 @@ pub mod dataset;
 pub mod diffusion;
 pub mod frames;
 pub mod grid;
+pub mod hand;
 pub mod inspect;
 pub mod label;
 pub mod mesh;

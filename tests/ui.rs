@@ -8,3 +8,4 @@ mod look;
 mod rig;
 
 mod job;
+mod workbench;

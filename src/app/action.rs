@@ -8,6 +8,8 @@ use super::keys::{ImprintSource, PoseEngine, ShiftMode};
 use super::library::Place;
 use super::settings::{ColourRange, MaskTool, Theme, Workspace};
 use super::state::State;
+use super::workbench::{Layer, SceneTool, WorkbenchCommand};
+use crate::domain::hand::HandAxis;
 use crate::domain::sensor::Finger;
 
 /// A key, by what is printed on it.
@@ -50,6 +52,10 @@ pub enum Key {
     Num7,
     Num8,
     Num9,
+    ArrowLeft,
+    ArrowRight,
+    ArrowUp,
+    ArrowDown,
     F1,
     F5,
     F11,
@@ -77,6 +83,10 @@ impl Key {
         let name = format!("{self:?}");
         match self {
             Self::Escape => "Esc".into(),
+            Self::ArrowLeft => "Left".into(),
+            Self::ArrowRight => "Right".into(),
+            Self::ArrowUp => "Up".into(),
+            Self::ArrowDown => "Down".into(),
             Self::PageUp => "PgUp".into(),
             Self::PageDown => "PgDn".into(),
             Self::OpenBracket => "[".into(),
@@ -120,6 +130,12 @@ const fn plain(key: Key) -> Shortcut {
 }
 const fn shift(key: Key) -> Shortcut {
     Shortcut { shift: true, ..plain(key) }
+}
+const fn alt(key: Key) -> Shortcut {
+    Shortcut { alt: true, ..plain(key) }
+}
+const fn alt_shift(key: Key) -> Shortcut {
+    Shortcut { alt: true, ..shift(key) }
 }
 const fn ctrl(key: Key) -> Shortcut {
     Shortcut { ctrl: true, ..plain(key) }
@@ -251,6 +267,19 @@ actions! {
     RunPose, Pose, "Compute again", "Tries again what could not be computed", [ctrl(K::R)];
     AcceptMeasuredPose, Pose, "Accept the measured pose", "Stores the pose of the measured imprint with the pair", [];
     AcceptPredictedPose, Pose, "Accept the predicted pose", "Stores the pose of the predicted imprint with the pair", [];
+    PoseTool, Pose, "Pose tool", "Moves the tool by hand in the 3D panes: arrow keys, or the handles", [plain(K::Z)];
+    SixDof, Pose, "6-DoF", "Lets the pose tool leave the plane: x, pitch and yaw as well", [];
+    NudgeLeft, Pose, "Nudge -y", "Moves the tool by 0.1 mm along -y; Shift 1 mm, Ctrl 0.01 mm", [plain(K::ArrowLeft), shift(K::ArrowLeft), ctrl(K::ArrowLeft)];
+    NudgeRight, Pose, "Nudge +y", "Moves the tool by 0.1 mm along +y; Shift 1 mm, Ctrl 0.01 mm", [plain(K::ArrowRight), shift(K::ArrowRight), ctrl(K::ArrowRight)];
+    NudgeUp, Pose, "Nudge -z", "Moves the tool by 0.1 mm along -z, to the wrist; Shift 1 mm, Ctrl 0.01 mm", [plain(K::ArrowUp), shift(K::ArrowUp), ctrl(K::ArrowUp)];
+    NudgeDown, Pose, "Nudge +z", "Moves the tool by 0.1 mm along +z; Shift 1 mm, Ctrl 0.01 mm", [plain(K::ArrowDown), shift(K::ArrowDown), ctrl(K::ArrowDown)];
+    TurnLeft, Pose, "Turn -", "Turns the tool by -0.5° about x; Shift 5°, Ctrl 0.05°", [alt(K::ArrowLeft), alt_shift(K::ArrowLeft), ctrl_alt(K::ArrowLeft)];
+    TurnRight, Pose, "Turn +", "Turns the tool by 0.5° about x; Shift 5°, Ctrl 0.05°", [alt(K::ArrowRight), alt_shift(K::ArrowRight), ctrl_alt(K::ArrowRight)];
+    IcpFromHere, Pose, "Start ICP from here", "Registers from the pose set by hand, with the chosen registration", [shift(K::Z)];
+    AcceptHand, Pose, "Accept the pose by hand", "Stores the pose set by hand with the pair", [plain(K::Enter)];
+    RevertHand, Pose, "Revert the pose by hand", "Gives the pose set by hand up (Esc)", [];
+    MeasureDistance, Pose, "Measure distance", "Measures between two points clicked in 3D", [plain(K::Y)];
+    MeasureAngle, Pose, "Measure angle", "Measures the angle at the second of three points clicked in 3D", [shift(K::Y)];
     NextPoseEngine, Pose, "Other registration", "Goes through the registrations", [];
 
     LockRange, View, "Lock the colour range", "Keeps the colours from pair to pair, or fits them to each", [plain(K::O)];
@@ -261,6 +290,9 @@ actions! {
     CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl_alt(K::Num2)];
     CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl_alt(K::Num3)];
     CameraTop, View, "View from the top", "Looks along the tool", [ctrl_alt(K::Num4)];
+    NextLayer, View, "Next layer", "Goes through the layers of the 3D panes: none, residuals, reasons, lines", [plain(K::V)];
+    AnimateWeakest, View, "Animate weak direction", "Moves the tool to and fro by at most 2 mm and 2° in the direction that the contact determines least", [];
+    BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [];
     LinkCameras, View, "Link cameras", "Moves both 3D views together", [];
     Footprint, View, "GelSlim window", "Draws the GelSlim's window on bubble images", [];
     SwitchTheme, View, "Dark or light", "Switches between the dark and the light theme", [];
@@ -291,6 +323,14 @@ const BRUSH_STEP: f32 = 1.25;
 const OPACITY_STEP: f32 = 0.1;
 
 impl Action {
+    /// Whether it moves the tool in hand: Shift and Ctrl make its steps larger and smaller.
+    pub fn is_nudge(self) -> bool {
+        matches!(
+            self,
+            Self::NudgeLeft | Self::NudgeRight | Self::NudgeUp | Self::NudgeDown | Self::TurnLeft | Self::TurnRight
+        )
+    }
+
     /// Its main shortcut.
     pub fn shortcut(self) -> Option<Shortcut> {
         self.shortcuts().first().copied()
@@ -352,6 +392,8 @@ impl Action {
             Self::CancelJobs => {
                 if state.document.stroke.is_some() {
                     Some(Command::CancelStroke)
+                } else if let Some(command) = escape(state) {
+                    Some(Command::Workbench(command))
                 } else {
                     when(!state.tasks.running.is_empty(), Command::CancelAll)
                 }
@@ -385,6 +427,19 @@ impl Action {
             Self::RunPose => when(selected, Command::Retry),
             Self::AcceptMeasuredPose => accept(state, ImprintSource::Measured),
             Self::AcceptPredictedPose => accept(state, ImprintSource::Predicted),
+            Self::PoseTool => toggle(state, SceneTool::Pose),
+            Self::MeasureDistance => toggle(state, SceneTool::Distance),
+            Self::MeasureAngle => toggle(state, SceneTool::Angle),
+            Self::SixDof => bench(true, WorkbenchCommand::SetSixDof(!state.workbench.six_dof)),
+            Self::NudgeLeft => nudge(state, HandAxis::Y, -1.0),
+            Self::NudgeRight => nudge(state, HandAxis::Y, 1.0),
+            Self::NudgeUp => nudge(state, HandAxis::Z, -1.0),
+            Self::NudgeDown => nudge(state, HandAxis::Z, 1.0),
+            Self::TurnLeft => nudge(state, HandAxis::Theta, -1.0),
+            Self::TurnRight => nudge(state, HandAxis::Theta, 1.0),
+            Self::IcpFromHere => bench(in_hand(state), WorkbenchCommand::StartIcp),
+            Self::AcceptHand => bench(editable && state.workbench.hand.is_some(), WorkbenchCommand::AcceptHand),
+            Self::RevertHand => bench(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand),
             Self::NextPoseEngine => next_of::<PoseEngine>(&settings.pose_engine).map(Command::SetPoseEngine),
 
             Self::LockRange => {
@@ -397,6 +452,11 @@ impl Action {
             Self::CameraRight => ui(UiRequest::Camera(CameraPreset::Right)),
             Self::CameraFront => ui(UiRequest::Camera(CameraPreset::Front)),
             Self::CameraTop => ui(UiRequest::Camera(CameraPreset::Top)),
+            Self::NextLayer => {
+                next_of::<Layer>(&state.workbench.layer).and_then(|l| bench(true, WorkbenchCommand::SetLayer(l)))
+            }
+            Self::AnimateWeakest => bench(true, WorkbenchCommand::SetAnimateWeakest(!state.workbench.animate_weakest)),
+            Self::BothClouds => bench(true, WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds)),
             Self::LinkCameras => Some(Command::SetCamerasLinked(!settings.cameras_linked)),
             Self::Footprint => Some(Command::SetFootprintVisible(!settings.footprint_visible)),
             Self::SwitchTheme => next_of::<Theme>(&settings.theme).map(Command::SetTheme),
@@ -417,12 +477,45 @@ impl Action {
     }
 }
 
+fn bench(possible: bool, command: WorkbenchCommand) -> Option<Command> {
+    possible.then_some(Command::Workbench(command))
+}
+
+/// Whether the pose tool is in hand and there is a tool to be moved.
+fn in_hand(state: &State) -> bool {
+    state.workbench.tool == SceneTool::Pose && state.tool().ready().is_some()
+}
+
+/// Takes a tool of the 3D panes, or puts it away.
+fn toggle(state: &State, tool: SceneTool) -> Option<Command> {
+    let next = if state.workbench.tool == tool { SceneTool::Look } else { tool };
+    bench(state.entry().is_some(), WorkbenchCommand::SetTool(next))
+}
+
+fn nudge(state: &State, axis: HandAxis, steps: f64) -> Option<Command> {
+    bench(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
+}
+
+/// What Escape gives up in the 3D panes: the pose in hand, then a measurement, then the point read.
+fn escape(state: &State) -> Option<WorkbenchCommand> {
+    let bench = &state.workbench;
+    if bench.hand.is_some() {
+        Some(WorkbenchCommand::RevertHand)
+    } else if !bench.marks.is_empty() {
+        Some(WorkbenchCommand::ClearMarks)
+    } else if bench.tool != SceneTool::Look {
+        Some(WorkbenchCommand::SetTool(SceneTool::Look))
+    } else {
+        bench.picked.map(|_| WorkbenchCommand::Pick(None))
+    }
+}
+
 /// Accepts the pose shown, or withdraws it if it is the accepted one.
 fn accept(state: &State, source: ImprintSource) -> Option<Command> {
     let shown = state.pose(source).ready()?.grasp_from_object;
     let accepted = state.document.pair(state.pair_name()).and_then(|labels| labels.accepted(source));
     let editable = state.document.is_editable(state.pair_name());
-    editable.then_some(Command::AcceptPose(source, accepted != Some(shown)))
+    editable.then_some(Command::AcceptPose(source, accepted != Some(shown.into())))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ mod answers;
 mod generate;
 mod masks;
 mod preferences;
+mod workbench;
 
 use super::command::{Command, Hover};
 use super::document::Review;
@@ -119,6 +120,8 @@ fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
             effects.push(Effect::ExportMasks { ticket, source, labels: state.document.labels.clone(), folder });
         }
 
+        Command::Workbench(command) => workbench::step(state, command, effects),
+
         Command::LogSeen(number) => state.log.seen = state.log.seen.max(number),
         Command::Report(err) => state.log.error(&err),
         Command::Notice(text) => state.log.info(text),
@@ -201,6 +204,7 @@ fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>) {
     masks::end_stroke(state, effects);
     state.selection.pair = Some(pair);
     state.selection.hover_point = None;
+    state.workbench.leave_pair();
     // What failed while it was only loaded ahead was not reported then.
     if let Some(key) = state.pair_key()
         && let Some(err) = state.tasks.failed.get(&Request::Sample(key))

@@ -11,13 +11,14 @@ use super::document::{PairLabels, Review};
 use super::error::TaskError;
 use super::keys::{DatasetSeq, ImprintSource, PoseEngine, Recipe, Request, ShiftMode};
 use super::library::{BundleInfo, Place, Sort};
-use super::results::{Clouds, Comparison, PoseResult, Prediction};
+use super::results::{Clouds, Comparison, LayerResult, PoseResult, Prediction};
 use super::services::{DataSource, NamedTool};
 use super::settings::{
     ColourMap, ColourRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, RuntimeChoice, Settings, Theme,
     Workspace,
 };
 use super::tasks::{Progress, Ticket};
+use super::workbench::WorkbenchCommand;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::Sample;
@@ -51,6 +52,10 @@ pub enum Pane {
     Generate,
     /// The mask tools.
     Masks,
+    /// Residuals, reasons, distances and observability of a registration.
+    Layers,
+    /// Poses of truth, measurement and prediction, per finger and joint.
+    Poses,
     /// The figures of the selected pair.
     Metrics,
     /// The figures of all pairs so far.
@@ -214,6 +219,9 @@ pub enum Command {
     /// Writes the masks to a folder for UNet training.
     ExportMasks(PathBuf),
 
+    /// Something of the workbench: layers, poses by hand, measuring.
+    Workbench(WorkbenchCommand),
+
     // Preferences
     /// Light or dark.
     SetTheme(Theme),
@@ -329,8 +337,10 @@ pub enum Computed {
     Mask(Arc<Mask>),
     /// Of [`Request::Cloud`].
     Cloud(Arc<Clouds>),
-    /// Of [`Request::Pose`].
+    /// Of [`Request::Pose`] and [`Request::Run`].
     Pose(Arc<PoseResult>),
+    /// Of [`Request::Layers`].
+    Layers(Arc<LayerResult>),
 }
 
 /// A pair whose labels are to be written.

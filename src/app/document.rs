@@ -8,8 +8,8 @@ use strum::EnumIter;
 
 use super::error::TaskError;
 use super::keys::{ImprintSource, Revision};
-use crate::domain::frames::PlanarPose;
 use crate::domain::grid::Mask;
+use crate::domain::hand::AcceptedPose;
 use crate::domain::sensor::Finger;
 
 /// How far the review of a pair is.
@@ -80,7 +80,7 @@ pub struct PairLabels {
     /// The review state.
     pub review: Review,
     /// Accepted `grasp_from_object` poses: from the measured, from the predicted imprint.
-    pub accepted: [Option<PlanarPose>; 2],
+    pub accepted: [Option<AcceptedPose>; 2],
 }
 
 impl PairLabels {
@@ -90,7 +90,7 @@ impl PairLabels {
     }
 
     /// The pose accepted for `source`.
-    pub fn accepted(&self, source: ImprintSource) -> Option<PlanarPose> {
+    pub fn accepted(&self, source: ImprintSource) -> Option<AcceptedPose> {
         self.accepted[source as usize]
     }
 }

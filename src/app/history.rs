@@ -2,7 +2,7 @@
 
 use super::document::{Document, HandMask, Review};
 use super::keys::ImprintSource;
-use crate::domain::frames::PlanarPose;
+use crate::domain::hand::AcceptedPose;
 use crate::domain::label::Patch;
 use crate::domain::sensor::Finger;
 
@@ -41,7 +41,7 @@ pub enum Edit {
         /// The imprint it was made from.
         source: ImprintSource,
         /// `grasp_from_object`.
-        pose: Option<PlanarPose>,
+        pose: Option<AcceptedPose>,
     },
 }
 

@@ -1,6 +1,7 @@
 //! What a job may do besides computing: see whether it should stop, and say how far it is.
 
 pub mod compute;
+pub mod inspect;
 pub mod prepare;
 
 use std::sync::Arc;

@@ -10,6 +10,7 @@ pub use crate::domain::postprocess::ShiftMode;
 
 use super::settings::RuntimeChoice;
 use crate::domain::dataset::PairId;
+use crate::domain::frames::PlanarPose;
 use crate::domain::sensor::Finger;
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.
@@ -182,6 +183,33 @@ pub struct PoseKey {
     pub engine: PoseEngine,
 }
 
+/// A planar pose that compares and hashes by its bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PoseBits([u64; 3]);
+
+impl From<PlanarPose> for PoseBits {
+    fn from(pose: PlanarPose) -> Self {
+        Self([pose.theta_rad, pose.y_m, pose.z_m].map(f64::to_bits))
+    }
+}
+
+impl PoseBits {
+    /// The pose.
+    pub fn get(self) -> PlanarPose {
+        let [theta_rad, y_m, z_m] = self.0.map(f64::from_bits);
+        PlanarPose { theta_rad, y_m, z_m }
+    }
+}
+
+/// A registration with everything recorded: every step, and what became of every point.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct RunKey {
+    /// What is registered, and how.
+    pub pose: PoseKey,
+    /// Where it starts (`grasp_from_object`); `None` = where the engine starts by itself.
+    pub start: Option<PoseBits>,
+}
+
 /// A result that is computed because a visible pane shows it. Ordered, hashable: it is its own key.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Request {
@@ -201,6 +229,10 @@ pub enum Request {
     Cloud(CloudKey),
     /// A pose.
     Pose(PoseKey),
+    /// A registration with everything recorded.
+    Run(RunKey),
+    /// Reasons, residuals and distances of a recorded registration from the engine's own starts.
+    Layers(PoseKey),
     /// A small picture of a pair's measured imprint.
     Thumbnail(PairKey),
 }
@@ -213,7 +245,10 @@ impl Request {
             Self::Tool(dataset, _) => Some(*dataset),
             Self::Imprint(recipe, _) | Self::Comparison(recipe, _) => Some(recipe.touch.pair.dataset),
             Self::Mask(key) => Some(key.imprint.touch().pair.dataset),
-            Self::Cloud(key) | Self::Pose(PoseKey { cloud: key, .. }) => {
+            Self::Cloud(key)
+            | Self::Pose(PoseKey { cloud: key, .. })
+            | Self::Layers(PoseKey { cloud: key, .. })
+            | Self::Run(RunKey { pose: PoseKey { cloud: key, .. }, .. }) => {
                 key.parts.iter().flatten().next().map(|(imprint, _)| imprint.touch().pair.dataset)
             }
         }

@@ -6,11 +6,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
 
-use super::keys::{CloudKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, ShiftMode, TouchKey};
+use super::keys::{CloudKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, RunKey, ShiftMode, TouchKey};
 use super::services::{Generated, NamedTool};
-use crate::domain::align::AlignReport;
+use crate::domain::align::reason::{Reason, ReasonCounts};
+use crate::domain::align::{AlignReport, BothWays, PointFit, TraceStep};
 use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::sensor::Finger;
 
@@ -196,8 +197,59 @@ pub struct PoseResult {
     pub converged: bool,
     /// Time it took, milliseconds.
     pub ms: f64,
-    /// Everything the registration says about itself; no trace.
+    /// Everything the registration says about itself; with trace and fits only in [`Results::runs`].
     pub report: AlignReport,
+}
+
+impl PoseResult {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>()
+            + self.report.trace.len() * size_of::<TraceStep>()
+            + self.report.fits.len() * size_of::<PointFit>()
+    }
+}
+
+/// What the layers show of one registration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerResult {
+    /// The registered pose that they are of, `grasp_from_object`.
+    pub grasp_from_object: PlanarPose,
+    /// The reason of every pixel, by [`Finger::index`].
+    pub reasons: [Option<Grid<Reason>>; 2],
+    /// Residual (metres) and weight of every contact point, by [`Finger::index`], in the order of the cloud.
+    pub fits: [Vec<PointFit>; 2],
+    /// Pixels per reason, by [`Finger::index`].
+    pub counts: [ReasonCounts; 2],
+    /// Residuals of the contact points of both fingers by size: shares of [`LayerResult::range_m`].
+    pub histogram: Vec<u32>,
+    /// Contact points with a larger residual than the range.
+    pub above: u32,
+    /// Largest residual of the histogram and of the heat map, metres.
+    pub range_m: f64,
+    /// Width of the narrowest kernel, metres; `None` for an engine without one.
+    pub kernel_m: Option<f64>,
+    /// Distances in both directions.
+    pub both_ways: BothWays,
+}
+
+impl LayerResult {
+    /// Residual, weight and reason at a raw bubble pixel; the fit only where the pixel is a contact point.
+    pub fn at(&self, finger: Finger, cloud: &FingerCloud, pixel: [u16; 2]) -> Option<(Reason, Option<PointFit>)> {
+        let (x, y) = (usize::from(pixel[0]), usize::from(pixel[1]));
+        let reason = *self.reasons[finger.index()].as_ref()?.get(x, y)?;
+        let fit = cloud.at_pixel(x, y).filter(|at| cloud.contact.get(*at) == Some(&true)).and_then(|at| {
+            let before = cloud.contact[..at].iter().filter(|c| **c).count();
+            self.fits[finger.index()].get(before).copied()
+        });
+        Some((reason, fit))
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let pixels: usize = self.reasons.iter().flatten().map(Grid::len).sum();
+        pixels + self.fits.iter().map(|f| f.len() * size_of::<PointFit>()).sum::<usize>() + size_of::<Self>()
+    }
 }
 
 /// All caches.
@@ -219,6 +271,10 @@ pub struct Results {
     pub clouds: Cache<CloudKey, Clouds>,
     /// Poses.
     pub poses: Cache<PoseKey, PoseResult>,
+    /// Recorded registrations.
+    pub runs: Cache<RunKey, PoseResult>,
+    /// Their layers.
+    pub layers: Cache<PoseKey, LayerResult>,
     /// Tools.
     pub tools: Cache<String, NamedTool>,
     /// The prediction shown for each touch: the last one generated, or the one chosen.
@@ -243,6 +299,8 @@ impl Default for Results {
             masks: Cache::new(32 * MIB),
             clouds: Cache::new(128 * MIB),
             poses: Cache::new(32 * MIB),
+            runs: Cache::new(32 * MIB),
+            layers: Cache::new(16 * MIB),
             tools: Cache::new(128 * MIB),
             chosen: BTreeMap::new(),
             made: BTreeMap::new(),
@@ -262,6 +320,8 @@ impl Results {
         self.masks.clear();
         self.clouds.clear();
         self.poses.clear();
+        self.runs.clear();
+        self.layers.clear();
         self.tools.clear();
         self.chosen.clear();
         self.made.clear();

@@ -14,6 +14,7 @@ use super::library::Library;
 use super::results::Results;
 use super::settings::Settings;
 use super::tasks::{Log, Tasks};
+use super::workbench::Workbench;
 use crate::domain::dataset::{PairEntry, PairId};
 use crate::domain::sensor::Finger;
 
@@ -30,6 +31,8 @@ pub struct State {
     pub history: History,
     /// What was computed.
     pub results: Results,
+    /// What the 3D panes do and show besides.
+    pub workbench: Workbench,
     /// What a person prefers.
     pub settings: Settings,
     /// What runs.

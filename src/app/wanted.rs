@@ -11,10 +11,12 @@ use super::results::{Clouds, Comparison, PoseResult};
 use super::services::NamedTool;
 use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
+use super::workbench::PoseOf;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
 use crate::domain::sensor::Finger;
 use crate::domain::units;
+use strum::IntoEnumIterator as _;
 
 /// Neighbours loaded ahead on each side of the selection.
 pub const PREFETCH: usize = 4;
@@ -386,7 +388,7 @@ impl State {
 }
 
 /// Panes that show something of the selected pair.
-const PAIR_PANES: [Pane; 11] = [
+const PAIR_PANES: [Pane; 13] = [
     Pane::GelRaw,
     Pane::GelReference,
     Pane::GelDifference,
@@ -397,6 +399,8 @@ const PAIR_PANES: [Pane; 11] = [
     Pane::ScenePredicted,
     Pane::Generate,
     Pane::Masks,
+    Pane::Layers,
+    Pane::Poses,
     Pane::Metrics,
 ];
 
@@ -428,8 +432,15 @@ impl Wanted<'_> {
         self.ask(state.document.stored.contains_key(name), Request::Labels(pair));
         let (measured, predicted) = (ImprintSource::Measured, ImprintSource::Predicted);
         let metrics = state.is_visible(&[Pane::Metrics]);
-        let scene_measured = state.is_visible(&[Pane::SceneMeasured]) || metrics;
-        let scene_predicted = state.is_visible(&[Pane::ScenePredicted]) || metrics;
+        let poses = metrics || state.is_visible(&[Pane::Poses]);
+        let bench = &state.workbench;
+        // A cloud is needed for its own view, for the other one's that shows both, and for what lies beside them.
+        let needed = |source: ImprintSource, own: Pane, other: Pane| {
+            let layers = state.is_visible(&[Pane::Layers]) && bench.side == source;
+            poses || layers || state.is_visible(&[own]) || (bench.both_clouds && state.is_visible(&[other]))
+        };
+        let scene_measured = needed(measured, Pane::SceneMeasured, Pane::ScenePredicted);
+        let scene_predicted = needed(predicted, Pane::ScenePredicted, Pane::SceneMeasured);
 
         let shown = state.selection.fingers();
         for finger in Finger::BOTH {
@@ -455,6 +466,7 @@ impl Wanted<'_> {
             for (visible, source) in [(scene_measured, measured), (scene_predicted, predicted)] {
                 if visible {
                     self.cloud_and_pose(source);
+                    self.workbench(source);
                 }
             }
         }
@@ -527,6 +539,35 @@ impl Wanted<'_> {
         };
         if state.tool().ready().is_some() {
             self.ask(state.results.poses.contains(&key), Request::Pose(key));
+        }
+    }
+
+    /// What the workbench shows of an imprint whose cloud is needed anyway.
+    fn workbench(&mut self, source: ImprintSource) {
+        let state = self.state;
+        if state.tool().ready().is_none() || state.cloud(source).ready().is_none() {
+            return;
+        }
+        if state.is_visible(&[Pane::Poses]) {
+            for key in PoseOf::iter().filter_map(|of| state.pose_key_of(source, of).ok().flatten()) {
+                if state.results.clouds.contains(&key.cloud) {
+                    self.ask(state.results.poses.contains(&key), Request::Pose(key));
+                } else {
+                    self.ask(false, Request::Cloud(key.cloud));
+                }
+            }
+        }
+        if let Some(key) = state.workbench.hand(source).and_then(|hand| hand.icp.clone()) {
+            self.ask(state.results.runs.contains(&key), Request::Run(key));
+        }
+        let Some(run) = state.run_key(source).filter(|_| state.shows_layers(source)) else { return };
+        if state.results.layers.contains(&run.pose) {
+            return;
+        }
+        if state.results.runs.contains(&run) {
+            self.ask(false, Request::Layers(run.pose));
+        } else {
+            self.ask(false, Request::Run(run));
         }
     }
 

@@ -11,6 +11,7 @@
 //! Source of the method: Fitzgibbon, Robust registration of 2D and 3D point sets, 2003.
 
 pub mod basin;
+pub mod both_ways;
 pub mod correspond;
 pub mod field;
 pub mod icp;
@@ -18,6 +19,7 @@ pub mod lab_icp;
 mod linear;
 mod observability;
 mod planar;
+pub mod reason;
 mod register;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -27,10 +29,11 @@ use serde::{Deserialize, Serialize};
 
 use super::frames::PlanarPose;
 
+pub use both_ways::{BothWays, both_ways};
 pub use field::{DistanceField, FieldError, FieldSample};
 pub use icp::IcpConfig;
 pub use lab_icp::{LabIcpConfig, lab_icp};
-pub use observability::{DEGENERATE_BELOW, Observability, observability};
+pub use observability::{DEGENERATE_BELOW, MotionEllipse, Observability, observability};
 pub use planar::align;
 pub use register::{Ask, Register, Scene};
 

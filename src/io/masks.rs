@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 use super::atomic;
 use super::dataset::Dataset;
 use crate::domain::dataset::Problem;
-use crate::domain::frames::PlanarPose;
 use crate::domain::grid::Mask;
+use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{decode_runs, encode_runs};
 use crate::domain::sensor::Finger;
 
@@ -30,6 +30,8 @@ const JOURNAL: &str = "journal.jsonl";
 const FORMAT: &str = "touch2touch-mask";
 const REVIEW_FORMAT: &str = "touch2touch-review";
 const VERSION: u32 = 1;
+/// Reviews whose accepted poses were set by hand or leave the plane; others are written as version 1.
+const HAND_VERSION: u32 = 2;
 const MASK_SUFFIX: &str = ".mask.json";
 const REVIEW_SUFFIX: &str = ".review.json";
 
@@ -101,7 +103,7 @@ pub struct StoredReview {
     pub review: String,
     /// Accepted `grasp_from_object`, from the measured and from the predicted imprint.
     #[serde(default)]
-    pub accepted: [Option<PlanarPose>; 2],
+    pub accepted: [Option<AcceptedPose>; 2],
 }
 
 /// One line of the journal.
@@ -293,8 +295,9 @@ impl MaskStore {
     /// As [`MaskStore::save`].
     pub fn save_review(&self, pair: &str, review: &StoredReview) -> Result<(), StoreError> {
         self.load_review(pair)?;
-        let content =
-            ReviewFile { format: REVIEW_FORMAT.into(), version: VERSION, pair: pair.into(), review: review.clone() };
+        // An older program must not read a pose without what it cannot know; all other files it still reads.
+        let version = if review.accepted.iter().flatten().all(|a| a.is_plain()) { VERSION } else { HAND_VERSION };
+        let content = ReviewFile { format: REVIEW_FORMAT.into(), version, pair: pair.into(), review: review.clone() };
         self.write(&self.folder.join(review_name(pair)), &content)
     }
 
@@ -425,7 +428,7 @@ fn read(file: &Path) -> Result<Vec<u8>, StoreError> {
 fn parse_mask(file: &Path, bytes: &[u8], pair: &str, finger: Finger) -> Result<StoredMask, StoreError> {
     let damaged = |reason: String| StoreError::Damaged { file: file.to_owned(), reason };
     let content: MaskFile = serde_json::from_slice(bytes).map_err(|err| damaged(err.to_string()))?;
-    check_format(file, &content.format, FORMAT, content.version)?;
+    check_format(file, &content.format, FORMAT, content.version, VERSION)?;
     if content.pair != pair || content.finger != finger.name() {
         return Err(damaged(format!("it belongs to the {} finger of {}", content.finger, content.pair)));
     }
@@ -440,15 +443,19 @@ fn parse_mask(file: &Path, bytes: &[u8], pair: &str, finger: Finger) -> Result<S
 fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, StoreError> {
     let content: ReviewFile = serde_json::from_slice(bytes)
         .map_err(|err| StoreError::Damaged { file: file.to_owned(), reason: err.to_string() })?;
-    check_format(file, &content.format, REVIEW_FORMAT, content.version)?;
+    check_format(file, &content.format, REVIEW_FORMAT, content.version, HAND_VERSION)?;
+    if content.review.accepted.iter().flatten().any(|a| !a.pose.is_finite()) {
+        let reason = "an accepted pose is not a finite number".into();
+        return Err(StoreError::Damaged { file: file.to_owned(), reason });
+    }
     Ok(content)
 }
 
-fn check_format(file: &Path, format: &str, expected: &str, version: u32) -> Result<(), StoreError> {
-    if format == expected && version == VERSION {
+fn check_format(file: &Path, format: &str, expected: &str, version: u32, newest: u32) -> Result<(), StoreError> {
+    if format == expected && (VERSION..=newest).contains(&version) {
         return Ok(());
     }
-    let reason = format!("it is {format} version {version}, expected {expected} version {VERSION}");
+    let reason = format!("it is {format} version {version}, expected {expected} up to version {newest}");
     Err(StoreError::Damaged { file: file.to_owned(), reason })
 }
 

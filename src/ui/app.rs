@@ -24,6 +24,7 @@ use crate::app::runtime::Runtime;
 use crate::app::services::SharedServices;
 use crate::app::settings::{Theme, Workspace};
 use crate::app::state::State;
+use crate::app::workbench::WorkbenchCommand;
 
 /// How the studio is started.
 pub struct Options {
@@ -128,6 +129,11 @@ impl StudioApp {
     /// Whether nothing runs, nothing waits and nothing is to be executed.
     pub fn is_idle(&self) -> bool {
         self.inbox.is_empty() && self.state.tasks.is_idle()
+    }
+
+    /// Where a point of the grasp frame (metres) appeared in a 3D pane when it was last drawn. For tests.
+    pub fn on_screen(&self, source: ImprintSource, p: [f64; 3]) -> Option<egui::Pos2> {
+        self.local.scenes[source as usize].on_screen(p.into())
     }
 
     /// The panes of the workspace in front are arranged validly. For tests.
@@ -359,11 +365,25 @@ impl eframe::App for StudioApp {
             };
             let covered =
                 cx.state.selection.palette || cx.state.selection.shortcut_sheet || cx.local.dialogs.is_path_box_open();
-            for action in shortcuts::pressed(&ctx, covered) {
+            let state = cx.state;
+            for action in shortcuts::pressed(&ctx, covered, |action| action.command(state).is_some()) {
                 if action == crate::app::action::Action::CancelJobs && cx.local.maximised.take().is_some() {
                     continue;
                 }
-                cx.act(action);
+                match action.command(state) {
+                    Some(Command::Workbench(WorkbenchCommand::Nudge(axis, by))) if action.is_nudge() => {
+                        let keys = ctx.input(|i| i.modifiers);
+                        let scale = if keys.shift {
+                            10.0
+                        } else if keys.command || keys.ctrl {
+                            0.1
+                        } else {
+                            1.0
+                        };
+                        cx.push(Command::Workbench(WorkbenchCommand::Nudge(axis, by * scale)));
+                    }
+                    _ => cx.act(action),
+                }
             }
             bars::top(&mut cx, ui);
             // Drawn before the panes, so it shows the read-out of the frame before: at rest they are the same.

@@ -9,6 +9,7 @@ use glam::DVec3;
 use super::dialogs::Dialogs;
 use super::palette::PaletteState;
 use super::saved::Saved;
+use super::scene::{Gizmo, LayerColors};
 use super::scene_view::{Device, SceneView};
 use super::theme::Palette;
 use super::widget::image_canvas::ViewTransform;
@@ -118,6 +119,10 @@ pub(super) struct Local {
     pub scenes: [SceneView; 2],
     /// Points on the device, by [`ImprintSource`].
     pub scene_clouds: [Option<SceneCloud>; 2],
+    /// Colours of the contact points, by [`ImprintSource`].
+    pub layer_colors: [Option<LayerColors>; 2],
+    /// The handles of the pose tool.
+    pub gizmo: Gizmo,
     /// The CAD model as the renderer takes them.
     pub mesh: Option<SceneMesh>,
     /// Counts what was made for the renderer.
@@ -178,6 +183,8 @@ impl Local {
             bubble_view: ViewTransform::default(),
             scenes: [SceneView::default(), SceneView::default()],
             scene_clouds: [None, None],
+            layer_colors: [None, None],
+            gizmo: Gizmo::default(),
             mesh: None,
             revision: 0,
             error_mm: 4.0,

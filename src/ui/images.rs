@@ -384,6 +384,14 @@ fn depth_pane(
     {
         output.crosshair(at.at_px, Color32::WHITE);
     }
+    // The point that was read in 3D stays marked.
+    if let Some(picked) =
+        cx.state.workbench.picked.filter(|p| p.finger == finger && (p.source == source || pane == Pane::Error))
+    {
+        let at = output.map.to_screen(picked.pixel.map(f32::from));
+        output.painter.circle_stroke(at, 6.0, eframe::egui::Stroke::new(3.0, Color32::from_black_alpha(140)));
+        output.painter.circle_stroke(at, 6.0, eframe::egui::Stroke::new(1.5, cx.p.accent));
+    }
     if paintable {
         paint_stroke(cx, ui, &output, pane, source, finger);
     }

@@ -33,7 +33,9 @@ pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
             Metrics,
             Log,
         ],
-        Workspace::Align => &[Browser, ScenePredicted, SceneMeasured, Measured, Predicted, Metrics, Generate, Log],
+        Workspace::Align => {
+            &[Browser, ScenePredicted, SceneMeasured, Measured, Predicted, Layers, Poses, Metrics, Generate, Log]
+        }
         Workspace::Label => {
             &[Browser, Masks, Measured, Predicted, SceneMeasured, ScenePredicted, GelDifference, Metrics, Log]
         }
@@ -88,10 +90,10 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
         Workspace::Align => {
             let browser = b.tabs(&[Browser]);
             let (scene_p, scene_m) = (b.tabs(&[ScenePredicted]), b.tabs(&[SceneMeasured]));
-            let (measured, predicted) = (b.tabs(&[Measured]), b.tabs(&[Predicted]));
-            let metrics = b.tabs(&[Metrics, Generate, Log]);
+            let layers = b.tabs(&[Layers, Poses]);
+            let metrics = b.tabs(&[Metrics, Measured, Predicted, Generate, Log]);
             let scenes = b.row(&[(scene_p, 1.0), (scene_m, 1.0)]);
-            let right = b.column(&[(metrics, 1.3), (predicted, 0.85), (measured, 0.85)]);
+            let right = b.column(&[(layers, 1.16), (metrics, 0.84)]);
             b.row(&[(browser, 0.165), (scenes, 0.625), (right, 0.21)])
         }
         Workspace::Label => {

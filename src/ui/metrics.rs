@@ -12,6 +12,7 @@ use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::keys::{ImprintSource, PoseEngine};
 use crate::app::state::{Absent, Lookup};
+use crate::domain::hand::{HandPose, PoseDifference};
 use crate::domain::postprocess::Stats;
 use crate::domain::sample::Scale;
 use crate::domain::sensor::Finger;
@@ -94,10 +95,29 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                 ImprintSource::Predicted => Action::AcceptPredictedPose,
             };
             let labels = cx.state.document.pair(cx.state.pair_name());
-            let accepted = labels.and_then(|l| l.accepted(source)) == Some(p);
+            let accepted = labels.and_then(|l| l.accepted(source)) == Some(p.into());
             let text = if accepted { "Accepted (withdraw)" } else { "Accept this pose" };
-            cx.action_button(ui, action, text);
+            if let Some(hand) = cx.state.by_hand(source) {
+                by_hand(cx, ui, source, hand);
+            } else {
+                cx.action_button(ui, action, text);
+            }
         }
+    }
+}
+
+/// A pose that a person set, in place of the button that takes the registered one over.
+fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: HandPose) {
+    let angle = hand.planar.inverse().theta_rad;
+    let mut text = format!("Accepted by hand: {}", units::text_deg(angle));
+    if let Some(truth) = cx.state.truth() {
+        text += &format!(" (error {})", units::text_deg(PoseDifference::between(hand.planar, truth).angle_rad));
+    }
+    ui.label(RichText::new(text).size(SMALL).color(cx.p.good));
+    let withdraw =
+        ui.small_button("Withdraw").on_hover_text("The registered pose counts again (Ctrl+Z brings it back)");
+    if withdraw.accessible_name(format!("Withdraw the pose by hand, {}", source.name().to_lowercase())).clicked() {
+        cx.push(Command::AcceptPose(source, false));
     }
 }
 

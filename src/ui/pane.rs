@@ -6,7 +6,7 @@ use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles,
 use super::cx::Cx;
 use super::theme::{SMALL, medium};
 use super::widget::help;
-use super::{browser, generate, images, log, masks, metrics, scene, settings_pane, table};
+use super::{browser, generate, images, layers, log, masks, metrics, poses, scene, settings_pane, table};
 use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
 
@@ -24,6 +24,8 @@ pub(super) fn title(pane: Pane) -> &'static str {
         Pane::ScenePredicted => "3D predicted",
         Pane::Generate => "Generate",
         Pane::Masks => "Mask",
+        Pane::Layers => "Layers",
+        Pane::Poses => "Poses",
         Pane::Metrics => "Figures",
         Pane::Table => "All figures",
         Pane::Log => "Log",
@@ -45,6 +47,8 @@ fn tooltip(pane: Pane) -> &'static str {
         Pane::ScenePredicted => "The predicted surface on the CAD model, grasp frame",
         Pane::Generate => "Predicts the Soft Bubble imprint",
         Pane::Masks => "Corrects the contact mask",
+        Pane::Layers => "Residuals, drop reasons, distances both ways and the weak direction of a registration",
+        Pane::Poses => "Truth, measurement and prediction against each other, per finger and joint",
         Pane::Metrics => "The figures of this pair",
         Pane::Table => "The figures of all pairs so far",
         Pane::Log => "What happened",
@@ -75,6 +79,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         Pane::ScenePredicted => scene::show(cx, ui, ImprintSource::Predicted),
         Pane::Generate => generate::show(cx, ui),
         Pane::Masks => masks::show(cx, ui),
+        Pane::Layers => layers::show(cx, ui),
+        Pane::Poses => poses::show(cx, ui),
         Pane::Metrics => metrics::show(cx, ui),
         Pane::Table => table::show(cx, ui),
         Pane::Log => log::show(cx, ui),

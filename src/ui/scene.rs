@@ -1,6 +1,10 @@
 //! The 3D panes: cloud, contact points and CAD model, measured and predicted, with linked cameras.
 
 mod build;
+mod gizmo;
+mod hands;
+mod layers;
+mod measure;
 mod overlay;
 
 use eframe::egui::{self, Ui};
@@ -14,11 +18,14 @@ use crate::app::command::{CameraPreset, Command, Hover};
 use crate::app::keys::ImprintSource;
 use crate::app::results::Clouds;
 use crate::app::state::Lookup;
+use crate::app::workbench::WorkbenchCommand;
 use crate::domain::sensor::Finger;
 use crate::domain::units;
 use crate::gpu::pick::nearest_point;
-use crate::gpu::view::Preset;
+use crate::gpu::view::{Camera, Preset};
 
+pub(super) use gizmo::Gizmo;
+pub(super) use layers::LayerColors;
 pub(super) use overlay::{angle_text, error_color, pose_details};
 
 /// How near the pointer must be to a point to mean it, physical pixels.
@@ -48,13 +55,29 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     if let (Lookup::Ready(clouds), Ok(Some(key))) = (lookup, state.cloud_key(source)) {
         build::update_cloud(cx, source, key, clouds);
     }
+    if state.workbench.both_clouds {
+        let other = other_side(source);
+        if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(other), state.cloud_key(other)) {
+            build::update_cloud(cx, other, key, clouds);
+        }
+    }
     build::update_mesh(cx);
+    layers::update(cx, source);
     let label = match source {
         ImprintSource::Measured => "3D view, measured",
         ImprintSource::Predicted => "3D view, predicted",
     };
-    let output = cx.local.scenes[source as usize].interact(ui, label);
-    let mut scene = build::scene_of(cx, source);
+    let held = cx.local.gizmo.holds(source);
+    let output = cx.local.scenes[source as usize].interact(ui, label, held);
+    if output.pointer.is_some() && state.workbench.side != source && cx.local.gizmo.is_free() {
+        cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
+    }
+    let seconds = ui.input(|i| i.time);
+    if state.workbench.animate_weakest && state.pose(source).shown().is_some_and(|p| p.report.observability.is_some()) {
+        // The only thing that moves by itself, and only while a person asked for it.
+        ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
+    }
+    let mut scene = build::scene_of(cx, source, seconds);
     let place = output.fit || !cx.local.scenes[source as usize].placed;
     if place && let Some(bounds) = scene.bounds() {
         let view = &mut cx.local.scenes[source as usize];
@@ -78,8 +101,42 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     }
     if let Lookup::Ready(clouds) = lookup {
         pick(cx, ui, source, &output, clouds);
+        measure::click(cx, source, &output, clouds);
     }
     overlay::show(cx, ui, source, &output);
+    let rect = output.response.rect;
+    measure::marks(cx, ui, source, &output);
+    gizmo::show(cx, ui, source, &output);
+    hands::tools(cx, ui, source, rect);
+    hands::strip(cx, ui, source, rect);
+    if let Lookup::Ready(clouds) = lookup {
+        measure::card(cx, ui, source, rect, clouds);
+    }
+}
+
+fn other_side(source: ImprintSource) -> ImprintSource {
+    match source {
+        ImprintSource::Measured => ImprintSource::Predicted,
+        ImprintSource::Predicted => ImprintSource::Measured,
+    }
+}
+
+/// The point of a cloud that is meant by a position in the picture, physical pixels: finger and index.
+fn nearest(clouds: &Clouds, camera: &Camera, size: [u32; 2], pointer: glam::DVec2) -> Option<(Finger, usize)> {
+    let mut best: Option<(Finger, usize, f64, f64)> = None;
+    for finger in Finger::BOTH {
+        let Some(cloud) = clouds.finger(finger) else { continue };
+        let hit = nearest_point(&cloud.points, &DAffine3::IDENTITY, camera, size, pointer, PICK_PX);
+        if let Some(hit) = hit {
+            let better = best.is_none_or(|(_, _, px, depth)| {
+                hit.distance_px < px - 1.0 || (hit.distance_px < px + 1.0 && hit.depth_m < depth)
+            });
+            if better {
+                best = Some((finger, hit.index, hit.distance_px, hit.depth_m));
+            }
+        }
+    }
+    best.map(|(finger, index, _, _)| (finger, index))
 }
 
 /// The point under the pointer becomes the pixel under the pointer of all images.
@@ -91,20 +148,7 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, c
         return;
     }
     let camera = &cx.local.scenes[source as usize].camera;
-    let mut best: Option<(Finger, usize, f64, f64)> = None;
-    for finger in Finger::BOTH {
-        let Some(cloud) = clouds.finger(finger) else { continue };
-        let hit = nearest_point(&cloud.points, &DAffine3::IDENTITY, camera, output.size, pointer, PICK_PX);
-        if let Some(hit) = hit {
-            let better = best.is_none_or(|(_, _, px, depth)| {
-                hit.distance_px < px - 1.0 || (hit.distance_px < px + 1.0 && hit.depth_m < depth)
-            });
-            if better {
-                best = Some((finger, hit.index, hit.distance_px, hit.depth_m));
-            }
-        }
-    }
-    let Some((finger, index, _, _)) = best else {
+    let Some((finger, index)) = nearest(clouds, camera, output.size, pointer) else {
         if cx.state.selection.hover_point.is_some() {
             cx.push(Command::HoverPoint(None));
         }

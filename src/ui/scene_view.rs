@@ -46,6 +46,8 @@ pub(super) struct SceneView {
     /// Whether the camera was placed by a fit or by a person.
     pub placed: bool,
     drawn: Option<Drawn>,
+    /// Where it was last drawn, and its size in physical pixels.
+    last: Option<(Rect, [u32; 2])>,
     error: Option<String>,
 }
 
@@ -74,17 +76,22 @@ pub(super) struct SceneOutput {
 impl SceneOutput {
     /// Where a point of the world appears on the screen.
     pub(super) fn on_screen(&self, camera: &Camera, p_in_world: DVec3) -> Option<Pos2> {
-        let (px, _) = camera.project(p_in_world, self.size)?;
-        let scale =
-            vec2(self.rect.width() / self.size[0].max(1) as f32, self.rect.height() / self.size[1].max(1) as f32);
-        Some(self.rect.min + vec2(px.x as f32, px.y as f32) * scale)
+        place_on_screen(camera, self.rect, self.size, p_in_world)
     }
 }
 
+/// Where a point of the world appears in `rect`, which shows a picture of `size` physical pixels.
+fn place_on_screen(camera: &Camera, rect: Rect, size: [u32; 2], p_in_world: DVec3) -> Option<Pos2> {
+    let (px, _) = camera.project(p_in_world, size)?;
+    let scale = vec2(rect.width() / size[0].max(1) as f32, rect.height() / size[1].max(1) as f32);
+    Some(rect.min + vec2(px.x as f32, px.y as f32) * scale)
+}
+
 impl SceneView {
-    /// Takes the space left in `ui` and moves the camera by what the pointer does. Call [`Self::draw`] next, with
+    /// Takes the space left in `ui` and moves the camera by what the pointer does, but not by the primary button while
+    /// that is `held` by something else. Call [`Self::draw`] next, with
     /// the scene that belongs to the new camera.
-    pub(super) fn interact(&mut self, ui: &mut Ui, label: &str) -> SceneOutput {
+    pub(super) fn interact(&mut self, ui: &mut Ui, label: &str, held: bool) -> SceneOutput {
         let space = ui.available_size().max(Vec2::splat(16.0));
         let (rect, response) = ui.allocate_exact_size(space, Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, label));
@@ -95,8 +102,10 @@ impl SceneView {
         let delta = DVec2::new(f64::from(delta.x), f64::from(delta.y));
         if delta != DVec2::ZERO {
             if response.dragged_by(PointerButton::Primary) {
-                self.camera.orbit(delta);
-                moved = true;
+                if !held {
+                    self.camera.orbit(delta);
+                    moved = true;
+                }
             } else if response.dragged() {
                 self.camera.pan(delta, size);
                 moved = true;
@@ -113,8 +122,15 @@ impl SceneView {
             }
         }
         self.placed |= moved;
+        self.last = Some((rect, size));
         let fit = response.double_clicked();
         SceneOutput { response, size, pointer, moved, fit, rect }
+    }
+
+    /// Where a point of the world appeared on the screen when the view was last shown.
+    pub(super) fn on_screen(&self, p_in_world: DVec3) -> Option<Pos2> {
+        let (rect, size) = self.last?;
+        place_on_screen(&self.camera, rect, size, p_in_world)
     }
 
     /// Brings the picture up to date and paints it. Nothing is drawn on the device when nothing changed.

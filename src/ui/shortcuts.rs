@@ -25,8 +25,9 @@ fn is_shifted_symbol(key: Key) -> bool {
 
 /// The actions whose shortcut was pressed in this frame. Keys without Ctrl are a text's while text is being typed.
 ///
+/// The key of an action that is not `possible` now is left to what else wants it (Enter to a focused button).
 /// While something covers the panes (`covered`) they are its own: Escape closes it and nothing else.
-pub(super) fn pressed(ctx: &egui::Context, covered: bool) -> Vec<Action> {
+pub(super) fn pressed(ctx: &egui::Context, covered: bool, possible: impl Fn(Action) -> bool) -> Vec<Action> {
     let typing = covered || ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx);
     let mut actions = Vec::new();
     ctx.input_mut(|input| {
@@ -50,7 +51,7 @@ pub(super) fn pressed(ctx: &egui::Context, covered: bool) -> Vec<Action> {
                     || (s.key == Key::Exclamationmark && *key == EKey::Num1 && modifiers.shift);
                 let shift_fits = is_shifted_symbol(s.key) || modifiers.shift == s.shift;
                 let ctrl_fits = (modifiers.ctrl || modifiers.command) == s.ctrl;
-                let fits = same_key && shift_fits && ctrl_fits && modifiers.alt == s.alt;
+                let fits = same_key && shift_fits && ctrl_fits && modifiers.alt == s.alt && possible(action);
                 hit |= fits;
                 !fits
             });
@@ -149,7 +150,7 @@ mod tests {
         let mut raw = egui::RawInput::default();
         raw.events.push(egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers });
         let mut got = Vec::new();
-        let mut output = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), false)));
+        let mut output = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), false, |_| true)));
         // No picture is made, so nobody uploads its textures.
         output.textures_delta.clear();
         got

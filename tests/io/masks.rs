@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use glam::DVec2;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::Mask;
+use touch2touch::domain::hand::{AcceptedPose, HandPose};
 use touch2touch::domain::label::{Patch, paint_stroke};
 use touch2touch::domain::sensor::Finger;
 use touch2touch::io::dataset::Dataset;
@@ -106,11 +107,40 @@ fn a_damaged_file_blocks_its_pair_and_is_kept() {
 }
 
 #[test]
+fn poses_by_hand_are_a_newer_version_and_old_files_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = MaskStore::in_folder(dir.path().to_owned());
+    let planar = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.1 / 3.0 };
+    let text = |name: &str| std::fs::read_to_string(dir.path().join(format!("{name}.review.json"))).unwrap();
+    // As the program wrote it before poses could be set by hand.
+    let old = r#"{"format":"touch2touch-review","version":1,"pair":"old","review":"done",
+        "accepted":[{"theta_rad":0.1,"y_m":0.002,"z_m":-0.03333333333333333},null]}"#;
+    std::fs::write(dir.path().join("old.review.json"), old).unwrap();
+    let read = store.load_review("old").unwrap().unwrap();
+    assert_eq!(read.accepted, [Some(planar.into()), None]);
+    store.save_review("plain", &read).unwrap();
+    assert!(text("plain").contains("\"version\":1") && !text("plain").contains("by_hand"));
+
+    let tilted = HandPose { pitch_rad: 0.05, x_m: 1e-3, ..planar.into() };
+    for pose in [HandPose::from(planar), tilted] {
+        let by_hand = Some(AcceptedPose { pose, by_hand: true });
+        let review = StoredReview { review: "todo".into(), accepted: [None, by_hand] };
+        store.save_review("hand", &review).unwrap();
+        assert!(text("hand").contains("\"version\":2"));
+        assert_eq!(store.load_review("hand").unwrap(), Some(review));
+    }
+    for bad in [text("hand").replace("\"version\":2", "\"version\":3"), text("hand").replace("0.05", "1e999")] {
+        std::fs::write(dir.path().join("hand.review.json"), &bad).unwrap();
+        assert!(store.load_review("hand").is_err(), "{bad}");
+    }
+}
+
+#[test]
 fn reviews_and_the_journal() {
     let dir = tempfile::tempdir().unwrap();
     let store = MaskStore::in_folder(dir.path().to_owned());
     let pose = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.1 / 3.0 };
-    let review = StoredReview { review: "done".into(), accepted: [Some(pose), None] };
+    let review = StoredReview { review: "done".into(), accepted: [Some(pose.into()), None] };
     store.save_review("b", &review).unwrap();
     store.save_review("a", &StoredReview { review: "flagged".into(), ..StoredReview::default() }).unwrap();
     assert_eq!(store.load_review("b").unwrap(), Some(review));

@@ -12,7 +12,7 @@ use super::super::library::{BundleKind, OpenDataset, Place};
 use super::super::results::Prediction;
 use super::super::state::State;
 use super::super::tasks::{Level, Ticket};
-use super::{cancel_all, is_selected, masks, preferences, remember, reorder};
+use super::{cancel_all, is_selected, masks, preferences, remember, reorder, workbench};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
 
@@ -110,6 +110,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.selection.pair = kept.or_else(|| state.library.order.first().copied());
     state.selection.hover = None;
     state.selection.hover_point = None;
+    state.workbench.leave_pair();
     let (pairs, problems) = (opened.source.index().pairs.len(), opened.source.problems().len());
     let (level, hint) = match problems {
         0 => (Level::Info, None),
@@ -158,18 +159,31 @@ fn store(state: &mut State, request: Request, computed: Computed) {
             results.masks.insert(key, mask, size);
         }
         (Request::Cloud(key), Computed::Cloud(clouds)) => {
-            if let Some(at) = place_of(&key.parts) {
-                results.latest.entry(at).or_default().0 = Some(key.clone());
+            // One of a single finger is of the table of poses, not what the panes show.
+            if let Some(at) =
+                place_of(&key.parts).filter(|(_, source)| state.cloud_key(*source) == Ok(Some(key.clone())))
+            {
+                state.results.latest.entry(at).or_default().0 = Some(key.clone());
             }
             let size = clouds.bytes();
-            results.clouds.insert(key, clouds, size);
+            state.results.clouds.insert(key, clouds, size);
+            workbench::refresh_cost(state);
         }
         (Request::Pose(key), Computed::Pose(pose)) => {
-            if let Some(at) = place_of(&key.cloud.parts) {
-                results.latest.entry(at).or_default().1 = Some(PoseKey::clone(&key));
+            if let Some(at) = place_of(&key.cloud.parts).filter(|(_, s)| state.pose_key(*s) == Ok(Some(key.clone()))) {
+                state.results.latest.entry(at).or_default().1 = Some(PoseKey::clone(&key));
             }
-            let size = std::mem::size_of_val(&*pose);
-            results.poses.insert(key, pose, size);
+            let size = pose.bytes();
+            state.results.poses.insert(key, pose, size);
+        }
+        (Request::Run(key), Computed::Pose(pose)) => {
+            let size = pose.bytes();
+            results.runs.insert(key.clone(), pose, size);
+            workbench::run_arrived(state, &key);
+        }
+        (Request::Layers(key), Computed::Layers(layers)) => {
+            let size = layers.bytes();
+            results.layers.insert(key, layers, size);
         }
         (request, _) => log::error!("the result of {request:?} is of another kind"),
     }
@@ -248,6 +262,7 @@ fn failed_request(state: &mut State, request: Request, err: TaskError) {
     let loud = match &request {
         Request::Sample(key) => is_selected(state, *key),
         Request::Labels(_) | Request::Tool(..) => true,
+        Request::Run(key) => workbench::run_failed(state, key),
         _ => false,
     };
     if loud || err.kind == TaskErrorKind::Panicked {

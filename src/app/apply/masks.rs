@@ -13,11 +13,12 @@ use super::super::settings::MaskTool;
 use super::super::state::{Lookup, State};
 use super::{reorder, save_labels};
 use crate::domain::grid::Mask;
+use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{self, Patch};
 use crate::domain::sensor::Finger;
 
 /// Whether the selected pair may be edited; says why not.
-fn check_editable(state: &mut State, what: &str) -> bool {
+pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
     if state.entry().is_none() {
         return false;
     }
@@ -242,13 +243,24 @@ pub(super) fn accept_pose(state: &mut State, source: ImprintSource, accept: bool
     }
     let pose = match (accept, state.pose(source)) {
         (false, _) => None,
-        (true, Lookup::Ready(pose)) => Some(pose.grasp_from_object),
+        (true, Lookup::Ready(pose)) => Some(pose.grasp_from_object.into()),
         (true, _) => return state.log.error(&TaskError::new("Accept the pose", "there is no pose yet")),
     };
+    let name = if accept { "pose accepted" } else { "pose withdrawn" };
+    set_accepted(state, name, source, pose, effects);
+}
+
+/// Stores or withdraws the accepted pose of an imprint: one gesture. The pair must be editable.
+pub(super) fn set_accepted(
+    state: &mut State,
+    name: &'static str,
+    source: ImprintSource,
+    pose: Option<AcceptedPose>,
+    effects: &mut Vec<Effect>,
+) {
     let pair = state.pair_name().to_owned();
     let mut edit = Edit::Pose { pair: pair.clone(), source, pose };
     edit.swap(&mut state.document);
-    let name = if accept { "pose accepted" } else { "pose withdrawn" };
     state.history.record(Gesture { name, edits: vec![edit] });
     save_labels(state, &pair, effects);
 }

@@ -8,6 +8,7 @@ use super::super::results::{Clouds, Comparison, FingerCloud, PoseResult, Predict
 use super::super::services::NamedTool;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::inspect::recorded;
 use crate::domain::mesh::TriMesh;
 use crate::domain::metrics::{self, SsimRange};
 use crate::domain::pose::{ToolModel, register};
@@ -166,9 +167,28 @@ pub fn pose(
     engine: PoseEngine,
     truth: Option<PlanarPose>,
 ) -> Result<PoseResult, TaskError> {
+    run(clouds, tool, engine, truth, None, false)
+}
+
+/// [`pose`] from a given start (`grasp_from_object`) where there is one, with everything recorded where asked.
+///
+/// # Errors
+/// As [`pose`].
+pub fn run(
+    clouds: &Clouds,
+    tool: &ToolModel,
+    engine: PoseEngine,
+    truth: Option<PlanarPose>,
+    from: Option<PlanarPose>,
+    record: bool,
+) -> Result<PoseResult, TaskError> {
     let start = Instant::now();
     let points = clouds.contact_points();
-    let report = register(&points, tool, engine, false).map_err(|err| TaskError::from_error("Pose", &err))?;
+    let report = match record || from.is_some() {
+        true => recorded(&points, tool, engine, from),
+        false => register(&points, tool, engine, false),
+    };
+    let report = report.map_err(|err| TaskError::from_error("Pose", &err))?;
     let ms = start.elapsed().as_secs_f64() * 1e3;
     let angle_rad = report.lab_angle_rad();
     let truth_rad = truth.map(|t| t.inverse().theta_rad);

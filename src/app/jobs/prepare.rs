@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::super::command::Computed;
 use super::super::error::TaskError;
-use super::super::keys::{ImprintKey, MaskRecipe, MaskVersion, PairKey, Request, TouchKey};
+use super::super::keys::{CloudKey, ImprintKey, MaskRecipe, MaskVersion, PairKey, Request, RunKey, TouchKey};
 use super::super::services::SharedServices;
 use super::super::state::State;
-use super::{JobCx, Lane, compute};
+use super::{JobCx, Lane, compute, inspect};
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::Sample;
 
@@ -197,7 +197,44 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Box::new(move |_| Ok(Computed::Pose(Arc::new(compute::pose(&clouds, &tool.model, engine, truth)?)))),
             )
         }
+        Request::Run(RunKey { pose: key, start }) => {
+            let clouds = results.clouds.get(&key.cloud)?.clone();
+            let tool = results.tools.get(&key.tool.to_string())?.clone();
+            let pair = key.cloud.parts.iter().flatten().next()?.0.touch().pair;
+            let truth = results.samples.get(&pair)?.grasp_from_object;
+            let (engine, start) = (key.engine, start.map(|bits| bits.get()));
+            job(
+                Lane::Compute,
+                "Registration, recorded".into(),
+                Box::new(move |_| {
+                    let run = compute::run(&clouds, &tool.model, engine, truth, start, true)?;
+                    Ok(Computed::Pose(Arc::new(run)))
+                }),
+            )
+        }
+        Request::Layers(key) => {
+            let clouds = results.clouds.get(&key.cloud)?.clone();
+            let tool = results.tools.get(&key.tool.to_string())?.clone();
+            let run = results.runs.get(&RunKey { pose: key.clone(), start: None })?.clone();
+            let masks = masks_of(state, &key.cloud);
+            job(
+                Lane::Compute,
+                "Layers of the registration".into(),
+                Box::new(move |_| {
+                    let masks = [masks[0].as_deref(), masks[1].as_deref()];
+                    Ok(Computed::Layers(Arc::new(inspect::layers(&clouds, masks, &tool.model, &run)?)))
+                }),
+            )
+        }
     }
+}
+
+/// The masks of a cloud, by finger.
+fn masks_of(state: &State, key: &CloudKey) -> [Option<Arc<Mask>>; 2] {
+    key.parts.each_ref().map(|part| {
+        let (imprint, version) = part.as_ref()?;
+        mask_of(state, imprint, version.as_ref()?)
+    })
 }
 
 /// The pixels of the mask in a cloud's recipe.

@@ -457,6 +457,7 @@ impl From<RuntimeChoice> for EngineChoice {
 mod tests {
     use super::*;
     use crate::domain::frames::PlanarPose;
+    use crate::domain::hand::{AcceptedPose, HandPose};
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
@@ -471,7 +472,10 @@ mod tests {
         PairLabels {
             masks: [Some(HandMask { mask, revision: Revision(3), base: "Threshold 5.00 mm".into() }), None],
             review: Review::InProgress,
-            accepted: [Some(PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }), None],
+            accepted: [
+                Some(PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
+                Some(AcceptedPose { pose: HandPose { x_m: 1e-3, ..HandPose::default() }, by_hand: true }),
+            ],
         }
     }
 

@@ -23,6 +23,8 @@ pub struct Observability {
     /// The motion of the tool that changes the residuals least, in the grasp frame: angle times
     /// [`ANGLE_SCALE_M`], y, z; unit length, sign arbitrary. The angle turns about `centre`.
     pub weakest: [f64; 3],
+    /// The three motions that belong to `eigenvalues`, in the same order and form as `weakest` (which is the first).
+    pub motions: [[f64; 3]; 3],
     /// Mean of the telling points, `(y, z)`, metres, grasp frame.
     pub centre: DVec2,
     /// Points up to 2 mm outside the silhouette: those that tell.
@@ -32,15 +34,79 @@ pub struct Observability {
 }
 
 impl Observability {
-    /// The weakest motion in words, such as `slides along 92° in y-z` or `turns about its centre`.
+    /// The weakest motion in words, such as `slides along (y 0.05, z 1.00)` or `turns about its centre`.
     pub fn weakest_text(&self) -> String {
         let [turn, y, z] = self.weakest;
         if turn.abs() > y.hypot(z) {
             "turns about its centre".to_owned()
         } else {
-            format!("slides along {:.0}° in y-z", z.atan2(y).to_degrees().rem_euclid(180.0))
+            // One of the two opposite signs, always the same one.
+            let sign = if z < 0.0 || (z == 0.0 && y < 0.0) { -1.0 } else { 1.0 };
+            let along = DVec2::new(y, z) * (sign / y.hypot(z));
+            format!("slides along (y {:.2}, z {:.2})", along.x, along.y)
         }
     }
+
+    /// The pose moved by `share` (-1 to 1) of at most 2 mm and 2 degrees along the weakest motion.
+    pub fn moved_along_weakest(&self, grasp_from_object: PlanarPose, share: f64) -> PlanarPose {
+        /// How far the motion is shown: seen at a glance, and still next to the part.
+        const SHIFT_M: f64 = 0.002;
+        const TURN_RAD: f64 = 2.0 / 180.0 * std::f64::consts::PI;
+        let [turn, y, z] = self.weakest;
+        let turn = turn / ANGLE_SCALE_M;
+        // The farther of the two reaches its limit.
+        let scale = share / (y.hypot(z) / SHIFT_M).max(turn.abs() / TURN_RAD).max(1e-9);
+        let origin = DVec2::new(grasp_from_object.y_m, grasp_from_object.z_m);
+        let moved =
+            self.centre + DVec2::from_angle(turn * scale).rotate(origin - self.centre) + DVec2::new(y, z) * scale;
+        PlanarPose { theta_rad: grasp_from_object.theta_rad + turn * scale, y_m: moved.x, z_m: moved.y }
+    }
+
+    /// How far the tool can move before the distances of the telling points change by `tolerance_m` (root mean
+    /// square): the inverse of the curvature. Nothing is larger than `limit_m` (angles: over [`ANGLE_SCALE_M`]).
+    pub fn ellipse(&self, tolerance_m: f64, limit_m: f64) -> MotionEllipse {
+        let mut c = [[0.0; 3]; 3];
+        for (value, v) in self.eigenvalues.iter().zip(&self.motions) {
+            let reach = (tolerance_m / value.max(0.0).sqrt()).min(limit_m);
+            for i in 0..3 {
+                for j in 0..3 {
+                    c[i][j] += reach * reach * v[i] * v[j];
+                }
+            }
+        }
+        // Half axes of the shifts alone, whatever the angle does meanwhile: the lower right block.
+        let (mean, half) = (0.5 * (c[1][1] + c[2][2]), 0.5 * (c[1][1] - c[2][2]));
+        let spread = half.hypot(c[1][2]);
+        let direction = DVec2::from_angle(0.5 * c[1][2].atan2(half));
+        let length = |square: f64| square.max(0.0).sqrt();
+        MotionEllipse {
+            centre: self.centre,
+            half_axes: [direction * length(mean + spread), direction.perp() * length(mean - spread)],
+            turn_rad: length(c[0][0]) / ANGLE_SCALE_M,
+        }
+    }
+
+    /// Standard deviations of angle (radians), y and z (metres) if the distances had independent errors of `noise_m`:
+    /// what noise alone does. A wrong mask does more.
+    pub fn deviations(&self, noise_m: f64) -> [f64; 3] {
+        let n = self.telling.max(1) as f64;
+        let variance = |i: usize| -> f64 {
+            self.eigenvalues.iter().zip(&self.motions).map(|(value, v)| v[i] * v[i] / value.max(1e-12)).sum()
+        };
+        let [turn, y, z] = [0, 1, 2].map(|i| noise_m * (variance(i) / n).sqrt());
+        [turn / ANGLE_SCALE_M, y, z]
+    }
+}
+
+/// Shifts and turns of equal effect on the fit, about the mean of the telling points.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct MotionEllipse {
+    /// Its middle, `(y, z)`, metres, grasp frame.
+    pub centre: DVec2,
+    /// Half axes of the shifts, `(y, z)`, metres, the longer one first.
+    pub half_axes: [DVec2; 2],
+    /// The same for the angle, radians.
+    pub turn_rad: f64,
 }
 
 /// Looks at the slopes of all points near the outline, at the given pose. Points are `(y, z)`, metres, grasp frame;
@@ -62,6 +128,7 @@ pub fn observability(points_yz: &[DVec2], field: &DistanceField, grasp_from_obje
         return Observability {
             eigenvalues: [0.0; 3],
             weakest: [0.0, 1.0, 0.0],
+            motions: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
             centre: if telling.is_empty() { DVec2::ZERO } else { centre / telling.len() as f64 },
             telling: telling.len(),
             degenerate: true,
@@ -83,6 +150,7 @@ pub fn observability(points_yz: &[DVec2], field: &DistanceField, grasp_from_obje
     Observability {
         eigenvalues,
         weakest: vectors[0],
+        motions: vectors,
         centre,
         telling: telling.len(),
         degenerate: eigenvalues[0] < DEGENERATE_BELOW,
@@ -123,7 +191,60 @@ fn eigen_symmetric(mut a: [[f64; 3]; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::align::testing::{disc, filled};
+    use crate::domain::mesh::TriMesh;
+    use glam::DVec3;
     use proptest::prelude::*;
+
+    /// A rod along z, and points on it and a little beside it.
+    fn rod() -> (DistanceField, Vec<DVec2>) {
+        let mesh: TriMesh = crate::domain::align::testing::cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.04));
+        let half = DVec2::new(0.0035, 0.02);
+        (DistanceField::from_mesh(&mesh).unwrap(), filled(&[half], 0.0, 4000, PlanarPose::default(), 0.0, 1))
+    }
+
+    #[test]
+    fn a_rod_slides_and_its_ellipse_lies_along_it() {
+        let (field, points) = rod();
+        let o = observability(&points, &field, PlanarPose::default());
+        assert!(o.degenerate);
+        assert_eq!(o.weakest_text(), "slides along (y 0.00, z 1.00)");
+        let e = o.ellipse(5e-4, 0.01);
+        assert!(e.half_axes[0].y.abs() > 0.0099 && e.half_axes[0].x.abs() < 1e-4, "{e:?}");
+        assert!(e.half_axes[1].length() < 1e-3, "{e:?}");
+        let [turn, y, z] = o.deviations(3e-4);
+        assert!(z > 100.0 * y && turn.to_degrees() < 1.0, "{turn} {y} {z}");
+        // It is shown by moving 2 mm along itself, and back again.
+        for share in [-1.0, 0.5, 1.0] {
+            let moved = o.moved_along_weakest(PlanarPose::default(), share);
+            assert!((moved.z_m.abs() - 0.002 * f64::abs(share)).abs() < 1e-6 && moved.y_m.abs() < 1e-5, "{moved:?}");
+        }
+    }
+
+    #[test]
+    fn a_disc_turns_about_its_centre() {
+        let field = DistanceField::from_mesh(&disc(0.01, 96)).unwrap();
+        let points: Vec<DVec2> = (0..2000).map(|i| DVec2::from_angle(f64::from(i)) * 0.0104).collect();
+        let pose = PlanarPose { theta_rad: 0.0, y_m: 0.001, z_m: -0.002 };
+        let at: Vec<DVec2> = points.iter().map(|p| pose.transform_yz(*p)).collect();
+        let o = observability(&at, &field, pose);
+        assert!(o.degenerate);
+        assert_eq!(o.weakest_text(), "turns about its centre");
+        let moved = o.moved_along_weakest(pose, 1.0);
+        assert!(((moved.theta_rad - pose.theta_rad).abs().to_degrees() - 2.0).abs() < 1e-6);
+        assert!((moved.y_m - pose.y_m).hypot(moved.z_m - pose.z_m) < 1e-4, "about its own middle");
+        assert!(o.ellipse(5e-4, 0.01).turn_rad > 0.4);
+    }
+
+    #[test]
+    fn nothing_to_tell_from_is_bounded_by_the_limit() {
+        let (field, _) = rod();
+        let o = observability(&[], &field, PlanarPose::default());
+        let e = o.ellipse(5e-4, 0.01);
+        assert!(e.half_axes.iter().all(|a| (a.length() - 0.01).abs() < 1e-12), "{e:?}");
+        assert!(o.deviations(3e-4).iter().all(|d| d.is_finite()));
+        assert!(o.moved_along_weakest(PlanarPose::default(), 1.0).is_finite());
+    }
 
     proptest! {
         #[test]

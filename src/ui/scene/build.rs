@@ -5,6 +5,7 @@ use std::sync::Arc;
 use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
+use super::layers;
 use crate::app::keys::{CloudKey, ImprintSource};
 use crate::app::results::{Clouds, FingerCloud};
 use crate::domain::sensor::Finger;
@@ -50,12 +51,14 @@ pub(super) fn update_mesh(cx: &mut Cx<'_>) {
     cx.local.mesh = Some(SceneMesh { key, revision: cx.local.revision, mesh: Arc::new(tool.model.mesh.clone()) });
 }
 
-/// Everything one side shows.
-pub(super) fn scene_of(cx: &Cx<'_>, source: ImprintSource) -> SceneData {
+/// Everything one side shows at time `seconds`.
+pub(super) fn scene_of(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> SceneData {
     let mut scene = SceneData { background: rgb(cx.p.canvas), ..SceneData::default() };
     clouds(cx, source, &mut scene);
     pointed(cx, source, &mut scene);
-    meshes(cx, source, &mut scene);
+    picked(cx, source, &mut scene);
+    meshes(cx, source, seconds, &mut scene);
+    scene.lines.extend(layers::ellipse(cx, source));
     guides(cx, &mut scene);
     scene
 }
@@ -69,15 +72,68 @@ fn clouds(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
             let rest = theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
             let looks = [(PointSize::Px(1.2), rest, "membrane"), (PointSize::Metres(0.000_3), CONTACT, "contact")];
             for (part, (size, color, name)) in parts.iter().zip(looks) {
-                scene.clouds.push(CloudItem {
+                let mut item = CloudItem {
                     name: format!("{name} {}", finger.name()),
                     revision: cloud.revision,
                     points: part.clone(),
                     colors: PointColors::One,
                     style: CloudStyle { color: rgb(color), size, ..CloudStyle::default() },
-                });
+                };
+                if name == "contact" {
+                    layers::paint(cx, source, finger, &mut item);
+                }
+                scene.clouds.push(item);
             }
         }
+    }
+    if cx.state.workbench.both_clouds {
+        other_cloud(cx, super::other_side(source), scene);
+    }
+}
+
+/// The contact points of the other side, in its colour, where both are shown in one view.
+fn other_cloud(cx: &Cx<'_>, other: ImprintSource, scene: &mut SceneData) {
+    let Some(cloud) = &cx.local.scene_clouds[other as usize] else { return };
+    // What is of another pair is no comparison.
+    if cx.state.cloud_key(other) != Ok(Some(cloud.key.clone())) {
+        return;
+    }
+    for finger in Finger::BOTH {
+        let Some([_, contact]) = &cloud.fingers[finger.index()] else { continue };
+        scene.clouds.push(CloudItem {
+            name: format!("other contact {}", finger.name()),
+            revision: cloud.revision,
+            points: contact.clone(),
+            colors: PointColors::One,
+            style: CloudStyle {
+                color: rgb(side_color(cx.p, other)),
+                size: PointSize::Metres(0.000_3),
+                ..CloudStyle::default()
+            },
+        });
+    }
+}
+
+/// The point that was clicked.
+fn picked(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
+    let point = cx.state.workbench.picked.filter(|picked| picked.source == source).and_then(|picked| {
+        let cloud = cx.state.cloud(source).ready()?.finger(picked.finger)?;
+        cloud.points.get(cloud.at_pixel(picked.pixel[0].into(), picked.pixel[1].into())?).copied()
+    });
+    if let Some(point) = point {
+        scene.clouds.push(one_point("picked", point, cx.p.accent, 11.0));
+    }
+}
+
+/// A cloud of a single point, as large on the screen at any distance.
+fn one_point(name: &str, point: DVec3, color: Color32, px: f32) -> CloudItem {
+    let bits = point.to_array().map(f64::to_bits);
+    CloudItem {
+        name: name.into(),
+        revision: bits[0] ^ bits[1].rotate_left(21) ^ bits[2].rotate_left(42),
+        points: [point].into(),
+        colors: PointColors::One,
+        style: CloudStyle { color: rgb(color), size: PointSize::Px(px), ..CloudStyle::default() },
     }
 }
 
@@ -90,19 +146,12 @@ fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
         cloud.points.get(cloud.at_pixel(x, y)?).copied()
     });
     if let Some(point) = pointed {
-        let bits = point.to_array().map(f64::to_bits);
-        scene.clouds.push(CloudItem {
-            name: "pointer".into(),
-            revision: bits[0] ^ bits[1].rotate_left(21) ^ bits[2].rotate_left(42),
-            points: [point].into(),
-            colors: PointColors::One,
-            style: CloudStyle { color: rgb(cx.p.strong), size: PointSize::Px(9.0), ..CloudStyle::default() },
-        });
+        scene.clouds.push(one_point("pointer", point, cx.p.strong, 9.0));
     }
 }
 
 /// The CAD model at the registered and at the true pose.
-fn meshes(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
+fn meshes(cx: &Cx<'_>, source: ImprintSource, seconds: f64, scene: &mut SceneData) {
     let state = cx.state;
     let tool_now = state.tool().ready().map(|t| t.name.as_str());
     if let Some(mesh) = cx.local.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) {
@@ -113,16 +162,30 @@ fn meshes(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
             shading: Shading::Smooth,
             style,
         };
-        if let Some(pose) = state.pose(source).shown() {
-            scene.meshes.push(item(
-                "CAD",
-                MeshStyle {
-                    world_from_mesh: pose.grasp_from_object.to_affine(),
-                    color: rgb(cx.p.cad),
-                    opacity: 0.9,
-                    look: Look::Solid,
-                },
-            ));
+        let registered = state.pose(source).shown().map(|pose| pose.grasp_from_object);
+        let mut show = |name: &str, world_from_mesh: DAffine3, color: Color32, look: Look| {
+            let opacity = if look == Look::Solid { 0.9 } else { 0.6 };
+            scene.meshes.push(item(name, MeshStyle { world_from_mesh, color: rgb(color), opacity, look }));
+        };
+        // Where a hand holds the tool, or put it, the registered pose is its shadow.
+        let hand = state.workbench.hand(source).map(|hand| (hand.pose, cx.p.accent));
+        let set = hand.or_else(|| state.by_hand(source).map(|pose| (pose, cx.p.good)));
+        match (set, registered) {
+            (Some((pose, color)), registered) => {
+                show("CAD by hand", pose.to_affine(), color, Look::Solid);
+                if let Some(registered) = registered {
+                    show("CAD", registered.to_affine(), cx.p.cad, Look::XRay);
+                }
+            }
+            (None, Some(registered)) => {
+                let pose = layers::swayed(cx, source, registered, seconds);
+                show("CAD", pose.to_affine(), cx.p.cad, Look::Solid);
+            }
+            (None, None) => {}
+        }
+        let other = super::other_side(source);
+        if let Some(pose) = state.pose(other).ready().filter(|_| state.workbench.both_clouds) {
+            show("CAD of the other side", pose.grasp_from_object.to_affine(), side_color(cx.p, other), Look::XRay);
         }
         if let Some(truth) = state.sample().ready().and_then(|s| s.grasp_from_object) {
             scene.meshes.push(item(

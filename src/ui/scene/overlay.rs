@@ -3,16 +3,23 @@
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, Ui, pos2, vec2};
 use glam::DVec3;
 
+use strum::IntoEnumIterator as _;
+
 use super::build::{AXIS, axes_origin};
+use super::hands;
 use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::results::PoseResult;
 use crate::app::state::{Absent, Lookup};
+use crate::app::workbench::Layer;
+use crate::domain::align::reason::Reason;
+use crate::domain::hand::PoseDifference;
 use crate::domain::units;
 use crate::gpu::guides;
 use crate::gpu::view::Camera;
 use crate::ui::cx::{Cx, side_color};
 use crate::ui::images::CONTACT;
+use crate::ui::layers::{RESIDUAL_MAP, reason_rgb};
 use crate::ui::scene_view::SceneOutput;
 use crate::ui::theme::Palette;
 
@@ -43,6 +50,22 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, output: 
         Lookup::Waiting => write("Pose: computing…".into(), 12.0, cx.p.weak),
         Lookup::Failed(err) => write(format!("No pose: {}", err.why), 12.0, cx.p.wrong),
         Lookup::Absent(absent) => write(format!("No pose: {}", lower_first(absent)), 12.0, cx.p.weak),
+    }
+    if let Some(pose) = cx.state.by_hand(source) {
+        let mut text = format!("Accepted by hand: {}", hands::place_text(pose));
+        if let Some(off) = hands::off_truth(cx.state, pose) {
+            text += &format!(", {} off the truth", units::text_deg(off.angle_rad));
+        }
+        write(text, 11.0, cx.p.good);
+    }
+    // The poses of both sides against each other and against the truth, in the picture.
+    if let Some(apart) = cx.state.sides_apart() {
+        let mut text = difference("Measured and predicted", "apart", apart);
+        if let (Some(truth), Some(pose)) = (cx.state.truth(), cx.state.pose(source).ready()) {
+            let off = PoseDifference::between(pose.grasp_from_object, truth);
+            text = format!("{} · {text}", difference("This pose", "off the truth", off));
+        }
+        write(text, 11.0, cx.p.weak);
     }
     legend(cx, ui, source, rect);
     sides(cx, ui, source, rect);
@@ -75,6 +98,11 @@ fn sides(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
             }
         }
     });
+}
+
+/// `Measured and predicted 1.2° and 0.85 mm apart`.
+fn difference(what: &str, how: &str, d: PoseDifference) -> String {
+    format!("{what} {} and {} {how}", units::text_deg(d.angle_rad), units::text_mm(d.position_m))
 }
 
 fn lower_first(absent: Absent) -> String {
@@ -138,16 +166,68 @@ fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output:
     painter.text(pos2(right - width * 0.5, y - 4.0), Align2::CENTER_BOTTOM, text, FontId::proportional(11.0), p.text);
 }
 
+/// The colours of residuals with their range, beside the scale bar.
+fn residual_bar(cx: &Cx<'_>, painter: &egui::Painter, source: ImprintSource, rect: Rect) {
+    let Some(layers) = cx.state.layers(source).ready() else { return };
+    let bar = Rect::from_min_size(pos2(rect.right() - 132.0, rect.bottom() - 62.0), vec2(120.0, 9.0));
+    let steps = 30;
+    for i in 0..steps {
+        let [r, g, b] = RESIDUAL_MAP.rgb8((i as f32 + 0.5) / steps as f32);
+        let x = bar.left() + bar.width() * i as f32 / steps as f32;
+        let part = Rect::from_min_size(pos2(x, bar.top()), vec2(bar.width() / steps as f32 + 0.5, bar.height()));
+        painter.rect_filled(part, 0.0, Color32::from_rgb(r, g, b));
+    }
+    let font = FontId::proportional(10.0);
+    for (share, anchor) in [(0.0, Align2::LEFT_TOP), (0.5, Align2::CENTER_TOP), (1.0, Align2::RIGHT_TOP)] {
+        let mm = units::mm(layers.range_m) * f64::from(share);
+        let text = if share == 1.0 { format!("{mm:.0} mm residual") } else { format!("{mm:.0}") };
+        painter.text(pos2(bar.left() + bar.width() * share, bar.bottom() + 1.0), anchor, text, font.clone(), cx.p.text);
+    }
+    if let Some(kernel) = layers.kernel_m {
+        let x = bar.left() + bar.width() * (kernel / layers.range_m) as f32;
+        painter.vline(x, bar.top() - 3.0..=bar.bottom(), Stroke::new(1.5, cx.p.strong));
+    }
+}
+
 /// What the colours mean, and buttons for the sides.
 fn legend(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
     let p = cx.p;
     let painter = ui.painter_at(rect);
-    let mut entries = vec![(side_color(p, source), "membrane"), (CONTACT, "contact")];
+    let mut entries = vec![(side_color(p, source), "membrane")];
+    match cx.local.layer_colors[source as usize].as_ref().map(|_| cx.state.workbench.layer) {
+        Some(Layer::Reasons) => {}
+        Some(_) => residual_bar(cx, &painter, source, rect),
+        None => entries.push((CONTACT, "contact")),
+    }
+    if cx.state.workbench.both_clouds {
+        let other = super::other_side(source);
+        let text = if other == ImprintSource::Measured { "measured contact" } else { "predicted contact" };
+        entries.push((side_color(p, other), text));
+    }
+    if cx.state.workbench.hand(source).is_some() {
+        entries.push((p.accent, "CAD, in hand"));
+    } else if cx.state.by_hand(source).is_some() {
+        entries.push((p.good, "CAD, accepted by hand"));
+    }
     if cx.state.pose(source).shown().is_some() {
         entries.push((p.cad, "CAD, aligned"));
     }
     if cx.state.sample().ready().is_some_and(|s| s.grasp_from_object.is_some()) && cx.local.mesh.is_some() {
         entries.push((p.truth, "CAD, true pose"));
+    }
+    let mut entries: Vec<(Color32, String)> = entries.into_iter().map(|(c, text)| (c, text.to_owned())).collect();
+    if cx.state.workbench.layer == Layer::Reasons
+        && cx.local.layer_colors[source as usize].is_some()
+        && let Some(layers) = cx.state.layers(source).ready()
+    {
+        // The reasons of the points that are drawn, with their counts.
+        for reason in Reason::iter().filter(|r| !matches!(r, Reason::OutsideMask | Reason::InvalidDepth)) {
+            let count = layers.counts[0][reason as usize] + layers.counts[1][reason as usize];
+            if count > 0 {
+                let [r, g, b] = reason_rgb(reason);
+                entries.push((Color32::from_rgb(r, g, b), format!("{reason}: {count}")));
+            }
+        }
     }
     let mut y = rect.bottom() - 14.0;
     for (color, text) in entries.into_iter().rev() {

@@ -30,6 +30,9 @@ pub const SCENE: &[(&str, &str)] = &[
     ("Double-click", "fit"),
     ("Ctrl + Alt + 1 … 4", "from left, right, front, top"),
     ("Hover", "cross-hair in the images"),
+    ("Click a point", "read it, or measure with Y (mm) and Shift + Y (angle)"),
+    ("Z", "pose tool: arrows or handles; Enter accepts, Esc reverts"),
+    ("V", "next layer"),
 ];
 
 /// A question mark that lists `controls` under the pointer.

@@ -1,0 +1,163 @@
+//! Changing the workbench: layers, poses by hand, measuring.
+
+use super::super::effect::Effect;
+use super::super::error::TaskError;
+use super::super::keys::{ImprintSource, Request, RunKey};
+use super::super::state::State;
+use super::super::workbench::{HandTry, SceneTool, WorkbenchCommand};
+use super::masks;
+use crate::domain::hand::{self, AcceptedPose, HandCost, HandPose};
+
+/// Width of the kernel that costs of poses by hand are counted with, metres: the narrowest of the registration.
+const KERNEL_M: f64 = 1e-3;
+
+pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut Vec<Effect>) {
+    let bench = &mut state.workbench;
+    match command {
+        WorkbenchCommand::SetLayer(layer) => bench.layer = layer,
+        WorkbenchCommand::SetAnimateWeakest(on) => bench.animate_weakest = on,
+        WorkbenchCommand::SetBothClouds(on) => bench.both_clouds = on,
+        WorkbenchCommand::SetTool(tool) => {
+            bench.tool = tool;
+            bench.marks.clear();
+            if tool != SceneTool::Pose {
+                bench.hand = None;
+            }
+        }
+        WorkbenchCommand::SetSixDof(on) => {
+            bench.six_dof = on;
+            // A tilt that can no longer be changed must not stay unseen.
+            if let Some(hand) = bench.hand.as_ref().filter(|hand| !on && !hand.pose.is_planar()) {
+                let flat = HandPose::from(hand.pose.planar);
+                put(state, |_| flat);
+            }
+        }
+        WorkbenchCommand::SetSide(side) => bench.side = side,
+        WorkbenchCommand::Nudge(axis, by) => {
+            if bench.tool == SceneTool::Pose && (bench.six_dof || !axis.leaves_plane()) {
+                put(state, |pose| pose.moved(axis, by));
+            }
+        }
+        WorkbenchCommand::SetHandPose(pose) => {
+            if bench.tool == SceneTool::Pose {
+                put(state, |_| pose);
+            }
+        }
+        WorkbenchCommand::StartIcp => start_icp(state),
+        WorkbenchCommand::AcceptHand => accept(state, effects),
+        WorkbenchCommand::RevertHand => bench.hand = None,
+        WorkbenchCommand::Pick(picked) => bench.picked = picked,
+        WorkbenchCommand::Mark(side, point) => {
+            let needed = bench.tool.marks();
+            if needed == 0 || !point.is_finite() {
+                return;
+            }
+            // A measurement is of one view; a complete one makes room for the next.
+            if bench.marks.len() >= needed || bench.marks.first().is_some_and(|(of, _)| *of != side) {
+                bench.marks.clear();
+            }
+            bench.marks.push((side, point));
+        }
+        WorkbenchCommand::ClearMarks => bench.marks.clear(),
+    }
+}
+
+/// What a pose costs with the contact points of an imprint; `None` while cloud or model are not there.
+fn cost_of(state: &State, source: ImprintSource, pose: HandPose) -> Option<HandCost> {
+    let clouds = state.cloud(source).ready()?;
+    let tool = &state.tool().ready()?.model;
+    Some(hand::cost(&clouds.contact_points(), &tool.field, &tool.distance, pose, KERNEL_M))
+}
+
+/// The pose being set for the side in hand; begins one if there is none.
+fn hold(state: &State) -> Option<HandTry> {
+    let (pair, source) = (state.pair_key()?, state.workbench.side);
+    if let Some(hand) = state.workbench.hand(source).filter(|hand| hand.pair == pair) {
+        return Some(hand.clone());
+    }
+    // Without a model there is nothing to be moved.
+    state.tool().ready()?;
+    let began = state.hand_begins(source);
+    let cost = cost_of(state, source, began);
+    Some(HandTry { pair, source, pose: began, began, cost, began_cost: cost, icp: None, from_icp: None })
+}
+
+/// Puts the tool where `to` says, from where it is. A pose that is not finite changes nothing.
+fn put(state: &mut State, to: impl FnOnce(HandPose) -> HandPose) {
+    let Some(mut hand) = hold(state) else { return };
+    let pose = to(hand.pose);
+    if !pose.is_finite() {
+        return;
+    }
+    hand.cost = cost_of(state, hand.source, pose);
+    hand.pose = pose;
+    // A registration from the place before is no longer asked for.
+    hand.icp = None;
+    hand.from_icp = None;
+    state.workbench.hand = Some(hand);
+}
+
+/// The contact points changed: the same pose costs something else.
+pub(super) fn refresh_cost(state: &mut State) {
+    let Some(mut hand) = state.workbench.hand.take() else { return };
+    hand.cost = cost_of(state, hand.source, hand.pose);
+    hand.began_cost = cost_of(state, hand.source, hand.began);
+    state.workbench.hand = Some(hand);
+}
+
+fn start_icp(state: &mut State) {
+    const WHAT: &str = "Start ICP from here";
+    if state.workbench.tool != SceneTool::Pose {
+        return;
+    }
+    let Some(mut hand) = hold(state) else {
+        return state.log.error(&TaskError::new(WHAT, "there is no tool to be moved"));
+    };
+    let Ok(Some(pose)) = state.pose_key(hand.source) else {
+        return state.log.error(&TaskError::new(WHAT, "the contact points are not there yet").with_hint("Try again."));
+    };
+    let key = RunKey { pose, start: Some(hand.pose.planar.into()) };
+    // Asked for by a person: what failed before is tried again.
+    state.tasks.failed.remove(&Request::Run(key.clone()));
+    hand.icp = Some(key.clone());
+    hand.from_icp = None;
+    state.workbench.hand = Some(hand);
+    if state.results.runs.contains(&key) {
+        run_arrived(state, &key);
+    }
+}
+
+/// A recorded registration is there: the tool in hand goes where the one it waits for ended.
+pub(super) fn run_arrived(state: &mut State, key: &RunKey) {
+    let Some(hand) = state.workbench.hand.as_ref().filter(|hand| hand.icp.as_ref() == Some(key)) else { return };
+    let source = hand.source;
+    let Some(pose) = state.results.runs.get(key).map(|run| HandPose::from(run.grasp_from_object)) else { return };
+    let cost = cost_of(state, source, pose);
+    if let Some(hand) = &mut state.workbench.hand {
+        hand.pose = pose;
+        hand.cost = cost;
+        hand.icp = None;
+        hand.from_icp = Some(key.clone());
+    }
+}
+
+/// A recorded registration failed; whether a person waits for it, who has to be told.
+pub(super) fn run_failed(state: &mut State, key: &RunKey) -> bool {
+    match &mut state.workbench.hand {
+        Some(hand) if hand.icp.as_ref() == Some(key) => {
+            hand.icp = None;
+            true
+        }
+        _ => false,
+    }
+}
+
+fn accept(state: &mut State, effects: &mut Vec<Effect>) {
+    let Some(hand) = state.workbench.hand.clone() else { return };
+    if !masks::check_editable(state, "Accept the pose") {
+        return;
+    }
+    let accepted = AcceptedPose { pose: hand.pose, by_hand: true };
+    state.workbench.hand = None;
+    masks::set_accepted(state, "pose set by hand", hand.source, Some(accepted), effects);
+}

@@ -1,0 +1,149 @@
+//! Hands on: the buttons of the tools in a 3D view, and the strip of the pose that a hand holds.
+
+use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, pos2, vec2};
+
+use crate::app::action::Action;
+use crate::app::keys::ImprintSource;
+use crate::app::state::State;
+use crate::app::workbench::{HandTry, Layer, SceneTool};
+use crate::domain::hand::{HandCost, HandPose, PoseDifference};
+use crate::domain::units;
+use crate::ui::cx::Cx;
+use crate::ui::theme::{SMALL, caption};
+
+/// The tools, below the buttons that turn the view.
+pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
+    let top = rect.top() + 164.0;
+    let place = Rect::from_min_max(pos2(rect.right() - 28.0, top), pos2(rect.right() - 4.0, rect.bottom()));
+    if place.height() < 130.0 {
+        return;
+    }
+    let builder = UiBuilder::new().max_rect(place).id_salt(("tools", source as usize));
+    ui.scope_builder(builder, |ui| {
+        ui.spacing_mut().item_spacing.y = 2.0;
+        let side = source.name().to_lowercase();
+        let bench = &cx.state.workbench;
+        let (tool, both, layer) = (bench.tool, bench.both_clouds, bench.layer);
+        for (action, letter, on) in [
+            (Action::PoseTool, "P", tool == SceneTool::Pose),
+            (Action::MeasureDistance, "D", tool == SceneTool::Distance),
+            (Action::MeasureAngle, "A", tool == SceneTool::Angle),
+            (Action::NextLayer, "V", layer != Layer::None),
+            (Action::BothClouds, "2", both),
+        ] {
+            let color = if on { cx.p.strong } else { cx.p.weak };
+            let text = RichText::new(letter).size(11.0).color(color);
+            let fill = if on { cx.p.selected } else { cx.p.panel };
+            let button = Button::new(text).min_size(vec2(24.0, 18.0)).fill(fill);
+            let response = ui.add_enabled(action.command(cx.state).is_some(), button);
+            let response = response.accessible_name(format!("{}, {side}", action.name()));
+            if response.on_hover_text(action.help()).clicked() {
+                cx.act(action);
+            }
+        }
+    });
+}
+
+/// The pose in hand: where it is, what it costs, and what can be done with it.
+pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
+    let bench = &cx.state.workbench;
+    if bench.tool != SceneTool::Pose || bench.hand.as_ref().is_some_and(|hand| hand.source != source) {
+        return;
+    }
+    let hand = bench.hand(source).cloned();
+    let pose = hand.as_ref().map_or_else(|| cx.state.hand_begins(source), |hand| hand.pose);
+    let size = vec2((rect.width() - 44.0).min(430.0), 84.0);
+    let place = Rect::from_min_size(pos2(rect.left() + 8.0, rect.bottom() - 84.0 - size.y), size);
+    let builder = UiBuilder::new().max_rect(place).id_salt(("hand", source as usize));
+    ui.scope_builder(builder, |ui| {
+        ui.painter().rect(place, 4.0, cx.p.panel.gamma_multiply(0.95), (1.0, cx.p.accent), egui::StrokeKind::Inside);
+        let inner = place.shrink2(vec2(8.0, 4.0));
+        ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
+            ui.set_clip_rect(place.intersect(ui.clip_rect()));
+            ui.spacing_mut().item_spacing = vec2(4.0, 1.0);
+            ui.label(RichText::new(place_text(pose)).size(12.0).color(cx.p.strong));
+            let (text, color) = cost_text(cx, hand.as_ref(), pose);
+            ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(
+                "Outline: distance of the contact points to the tool's outline in the plane, inside counted as zero. \
+                 Surface: distance to the tool's surface in space. Of at most 512 contact points",
+            );
+            ui.horizontal(|ui| {
+                let busy = hand.as_ref().is_some_and(|hand| hand.icp.is_some());
+                let icp = if busy { "Registering…" } else { "ICP from here" };
+                for (action, text) in
+                    [(Action::IcpFromHere, icp), (Action::AcceptHand, "Accept"), (Action::RevertHand, "Revert")]
+                {
+                    small_button(cx, ui, action, text, source, false);
+                }
+                let six_dof = cx.state.workbench.six_dof;
+                small_button(cx, ui, Action::SixDof, "6-DoF", source, six_dof);
+            });
+            ui.label(caption("Arrows y, z 0.1 mm · Alt+Left, Right 0.5° · Shift ×10 · Ctrl ÷10", cx.p));
+        });
+    });
+}
+
+fn small_button(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, source: ImprintSource, on: bool) {
+    let command = action.command(cx.state);
+    let button = Button::selectable(on, RichText::new(text).size(SMALL)).frame_when_inactive(true);
+    let response = ui.add_enabled(command.is_some(), button.min_size(vec2(0.0, 20.0)));
+    let response = response.accessible_name(format!("{}, {}", action.name(), source.name().to_lowercase()));
+    if response.on_hover_text(action.help()).on_disabled_hover_text(action.help()).clicked()
+        && let Some(command) = command
+    {
+        cx.push(command);
+    }
+}
+
+/// The six numbers, those out of the plane only where they are not zero.
+pub(super) fn place_text(pose: HandPose) -> String {
+    let planar = pose.planar;
+    // The angle as everywhere on screen: of the tool's inverse motion, as the lab reports it.
+    let angle = planar.inverse().theta_rad;
+    let mut text = format!(
+        "y {:+.2}  z {:+.2} mm   angle {:+.1}°",
+        units::mm(planar.y_m),
+        units::mm(planar.z_m),
+        angle.to_degrees()
+    );
+    if !pose.is_planar() {
+        text += &format!(
+            "   x {:+.2} mm  pitch {:+.1}°  yaw {:+.1}°",
+            units::mm(pose.x_m),
+            pose.pitch_rad.to_degrees(),
+            pose.yaw_rad.to_degrees()
+        );
+    }
+    text
+}
+
+/// What the pose costs, against where it began; and how far it is off the truth, where that is known.
+fn cost_text(cx: &Cx<'_>, hand: Option<&HandTry>, pose: HandPose) -> (String, Color32) {
+    let Some(hand) = hand else {
+        return ("Move the tool by keys or by its handles".into(), cx.p.weak);
+    };
+    let mut text = match (hand.cost, hand.began_cost) {
+        (Some(now), Some(before)) => costs(now, before),
+        _ => "cost: the contact points are not there yet".into(),
+    };
+    if let Some(off) = off_truth(cx.state, pose) {
+        text += &format!(" · off truth {} {}", units::text_deg(off.angle_rad), units::text_mm(off.position_m));
+    }
+    let better = hand.cost.zip(hand.began_cost).is_some_and(|(a, b)| a.cost_m2 <= b.cost_m2);
+    (text, if better { cx.p.good } else { cx.p.caution })
+}
+
+fn costs(now: HandCost, before: HandCost) -> String {
+    format!(
+        "outline {:.2} (was {:.2}) mm · {:.0} % inliers · surface {:.2} mm",
+        units::mm(now.outline_rms_m),
+        units::mm(before.outline_rms_m),
+        now.inlier_share * 100.0,
+        units::mm(now.surface_rms_m)
+    )
+}
+
+/// How far the planar part of a pose is off the truth.
+pub(super) fn off_truth(state: &State, pose: HandPose) -> Option<PoseDifference> {
+    Some(PoseDifference::between(pose.planar, state.truth()?))
+}

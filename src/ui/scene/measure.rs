@@ -1,0 +1,163 @@
+//! Clicks in a 3D view: a point is read, or measured to.
+
+use eframe::egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, UiBuilder, pos2, vec2};
+use glam::DVec3;
+
+use super::nearest;
+use crate::app::command::Command;
+use crate::app::keys::ImprintSource;
+use crate::app::results::Clouds;
+use crate::app::workbench::{Picked, SceneTool, WorkbenchCommand};
+use crate::domain::units;
+use crate::ui::cx::Cx;
+use crate::ui::layers::reason_rgb;
+use crate::ui::scene_view::SceneOutput;
+use crate::ui::theme::{SMALL, caption};
+
+/// What a click does.
+pub(super) fn click(cx: &mut Cx<'_>, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
+    let tool = cx.state.workbench.tool;
+    if !output.response.clicked() || tool == SceneTool::Pose {
+        return;
+    }
+    let Some(pointer) = output.pointer else { return };
+    let camera = &cx.local.scenes[source as usize].camera;
+    let hit = nearest(clouds, camera, output.size, pointer).and_then(|(finger, index)| {
+        let cloud = clouds.finger(finger)?;
+        Some((finger, *cloud.points.get(index)?, *cloud.pixels.get(index)?))
+    });
+    match (tool, hit) {
+        (SceneTool::Look, hit) => {
+            let picked = hit.map(|(finger, _, pixel)| Picked { source, finger, pixel });
+            if picked != cx.state.workbench.picked {
+                cx.push(Command::Workbench(WorkbenchCommand::Pick(picked)));
+            }
+        }
+        (_, Some((_, point, _))) => cx.push(Command::Workbench(WorkbenchCommand::Mark(source, point))),
+        (_, None) => cx.push(Command::Notice("No point under the pointer: measure from point to point".into())),
+    }
+}
+
+/// The measurement: its points, the lines between them, and the number.
+pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput) {
+    let bench = &cx.state.workbench;
+    let rect = output.response.rect;
+    let painter = ui.painter_at(rect);
+    let font = FontId::proportional(12.0);
+    let label = |at: Pos2, text: String, color: Color32| {
+        let galley = painter.layout_no_wrap(text, font.clone(), color);
+        let back = Rect::from_min_size(at + vec2(8.0, -8.0), galley.size());
+        painter.rect_filled(back.expand2(vec2(4.0, 2.0)), 3.0, cx.p.canvas.gamma_multiply(0.85));
+        painter.galley(back.min, galley, color);
+    };
+    if bench.tool.marks() > 0 && bench.marks.len() < bench.tool.marks() {
+        let text = format!("Click point {} of {} · Esc to stop", bench.marks.len() + 1, bench.tool.marks());
+        label(pos2(rect.center().x - 90.0, rect.bottom() - 34.0), text, cx.p.text);
+    }
+    let points: Vec<DVec3> = bench.marks.iter().filter(|(of, _)| *of == source).map(|(_, p)| *p).collect();
+    let camera = &cx.local.scenes[source as usize].camera;
+    let places: Vec<Option<Pos2>> = points.iter().map(|p| output.on_screen(camera, *p)).collect();
+    let color = cx.p.strong;
+    for pair in places.windows(2) {
+        if let [Some(a), Some(b)] = pair {
+            painter.line_segment([*a, *b], Stroke::new(3.0, cx.p.canvas));
+            painter.line_segment([*a, *b], Stroke::new(1.5, color));
+        }
+    }
+    for place in places.iter().flatten() {
+        painter.circle(*place, 4.0, cx.p.accent, Stroke::new(1.0, color));
+    }
+    if let Some(text) = result(bench.tool, &points)
+        && let Some(Some(at)) = places.get(places.len() / 2)
+    {
+        label(*at, text, color);
+    }
+}
+
+/// The number of a complete measurement.
+pub(super) fn result(tool: SceneTool, points: &[DVec3]) -> Option<String> {
+    match (tool, points) {
+        (SceneTool::Distance, [a, b]) => Some(units::text_mm(a.distance(*b))),
+        (SceneTool::Angle, [a, b, c]) => {
+            let (u, v) = (*a - *b, *c - *b);
+            let angle = u.angle_between(v);
+            Some(if angle.is_finite() { units::text_deg(angle) } else { "no angle: two points are one".into() })
+        }
+        _ => None,
+    }
+}
+
+/// Everything known about the point that was clicked.
+pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect, clouds: &Clouds) {
+    let Some(picked) = cx.state.workbench.picked.filter(|p| p.source == source) else { return };
+    let state = cx.state;
+    let Some(cloud) = clouds.finger(picked.finger) else { return };
+    let (x, y) = (usize::from(picked.pixel[0]), usize::from(picked.pixel[1]));
+    let imprint = state.imprint(source, picked.finger).shown().and_then(|i| i.get(x, y).copied());
+    let camera = state.bubble(picked.finger).ready().and_then(|b| b.camera.as_ref());
+    let depth = camera.and_then(|c| c.depth_reference.get(x, y).copied()).zip(imprint).map(|(r, i)| r - i);
+    let layer = state.layers(source).ready().and_then(|layers| layers.at(picked.finger, cloud, picked.pixel));
+    let mm = |v: Option<f32>| v.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| units::text_mm(f64::from(v)));
+    let fit = layer.and_then(|(_, fit)| fit);
+    let lines = [
+        ("Pixel", format!("{} ({x}, {y})", picked.finger.name())),
+        ("Depth", mm(depth)),
+        ("Imprint", mm(imprint)),
+        ("Residual", mm(fit.map(|f| f.residual_m))),
+        ("Weight", fit.map_or("–".to_owned(), |f| format!("{:.2}", f.weight))),
+    ];
+    let size = vec2(168.0, 122.0);
+    let place = Rect::from_min_size(rect.right_bottom() - size - vec2(36.0, 30.0), size);
+    let builder = UiBuilder::new().max_rect(place).id_salt(("picked", source as usize));
+    ui.scope_builder(builder, |ui| {
+        ui.painter().rect(place, 4.0, cx.p.panel, Stroke::new(1.0, cx.p.line), eframe::egui::StrokeKind::Inside);
+        let inner = place.shrink2(vec2(8.0, 5.0));
+        ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
+            ui.spacing_mut().item_spacing.y = 0.0;
+            ui.horizontal(|ui| {
+                ui.label(caption("Point", cx.p));
+                ui.with_layout(eframe::egui::Layout::right_to_left(eframe::egui::Align::Center), |ui| {
+                    let close = ui.add(eframe::egui::Button::new("×").frame(false).min_size(vec2(14.0, 14.0)));
+                    let close = close.accessible_name("Close the read-out").on_hover_text("Esc");
+                    if close.clicked() {
+                        cx.push(Command::Workbench(WorkbenchCommand::Pick(None)));
+                    }
+                });
+            });
+            for (name, value) in lines {
+                line(ui, cx.p.weak, name, &value, cx.p.strong);
+            }
+            match layer {
+                Some((reason, _)) => {
+                    let [r, g, b] = reason_rgb(reason);
+                    line(ui, cx.p.weak, "Reason", &reason.to_string(), Color32::from_rgb(r, g, b));
+                }
+                None => line(ui, cx.p.weak, "Reason", "…", cx.p.weak),
+            }
+        });
+    });
+}
+
+fn line(ui: &mut Ui, weak: Color32, name: &str, value: &str, color: Color32) {
+    use eframe::egui::{Role, Sense, WidgetInfo};
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 15.0), Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{name} {value}")));
+    let font = FontId::proportional(SMALL);
+    ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, name, font.clone(), weak);
+    ui.painter().text(rect.right_center(), Align2::RIGHT_CENTER, value, font, color);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measurements_have_units_and_wait_for_their_points() {
+        let p = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        assert_eq!(result(SceneTool::Distance, &[p(0.0, 0.0)]), None);
+        assert_eq!(result(SceneTool::Distance, &[p(0.0, 0.0), p(0.003, 0.004)]).unwrap(), "5.00 mm");
+        assert_eq!(result(SceneTool::Angle, &[p(1.0, 0.0), p(0.0, 0.0), p(0.0, 2.0)]).unwrap(), "90.0°");
+        assert!(result(SceneTool::Angle, &[p(1.0, 0.0), p(1.0, 0.0), p(0.0, 2.0)]).unwrap().contains("no angle"));
+        assert_eq!(result(SceneTool::Look, &[]), None);
+    }
+}

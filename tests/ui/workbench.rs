@@ -1,0 +1,322 @@
+//! The workbench by keys, clicks and drags: layers, poses by hand, measuring, reading points.
+
+use eframe::egui::{Key, Modifiers, Pos2, Vec2, vec2};
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::action::Action;
+use touch2touch::app::command::{CameraPreset, Command, Pane, UiRequest};
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::{MaskSource, Workspace};
+use touch2touch::app::state::{Lookup, State};
+use touch2touch::app::workbench::{HandTry, Layer, PoseOf, SceneTool, WorkbenchCommand};
+use touch2touch::domain::align::reason::Reason;
+use touch2touch::domain::hand::{HandAxis, PoseDifference, STEP_M, STEP_RAD};
+use touch2touch::domain::sensor::Finger;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::masks::MaskStore;
+
+use super::rig::Rig;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+const MEASURED: ImprintSource = ImprintSource::Measured;
+const VIEW: &str = "3D view, measured";
+
+impl Rig {
+    fn model(&self) -> &State {
+        self.harness.state().state()
+    }
+
+    fn press(&mut self, modifiers: Modifiers, key: Key) {
+        self.harness.key_press_modifiers(modifiers, key);
+        self.harness.step();
+        self.settle();
+    }
+
+    /// A place in the measured view by shares of its rectangle.
+    fn in_view(&self, share: [f32; 2]) -> Pos2 {
+        let rect = self.harness.get_by_label(VIEW).rect();
+        rect.min + vec2(share[0], share[1]) * rect.size()
+    }
+
+    fn move_to(&mut self, at: Pos2) {
+        self.harness.hover_at(at);
+        self.harness.step();
+        self.harness.step();
+    }
+
+    fn click_at(&mut self, at: Pos2) {
+        self.move_to(at);
+        self.harness.drag_at(at);
+        self.harness.step();
+        self.harness.drop_at(at);
+        self.harness.step();
+        self.settle();
+    }
+
+    fn drag(&mut self, from: Pos2, by: Vec2) {
+        self.move_to(from);
+        self.harness.drag_at(from);
+        self.harness.step();
+        for i in 1..=4 {
+            self.harness.hover_at(from + by * (i as f32 / 4.0));
+            self.harness.step();
+        }
+        self.harness.drop_at(from + by);
+        self.harness.step();
+        self.settle();
+    }
+
+    fn hand(&self) -> HandTry {
+        self.model().workbench.hand(MEASURED).expect("a pose in hand").clone()
+    }
+
+    /// The studio on the Align workspace with true masks, the pointer in the measured view, seen from the right.
+    fn aligned() -> Option<Self> {
+        let mut rig = Self::new(SIZE, 2)?;
+        rig.send(Command::DismissHint);
+        rig.send(Command::LogSeen(u64::MAX));
+        rig.send(Command::SetMaskSource(MaskSource::Truth));
+        rig.send(Command::SetWorkspace(Workspace::Align));
+        let middle = rig.in_view([0.5, 0.5]);
+        rig.move_to(middle);
+        rig.send(Command::Ui(UiRequest::Camera(CameraPreset::Right)));
+        rig.send(Command::Ui(UiRequest::Fit));
+        assert!(rig.model().pose(MEASURED).ready().is_some());
+        assert_eq!(rig.model().workbench.side, MEASURED, "the pointer says which side");
+        Some(rig)
+    }
+
+    fn asks_to_repaint(&self) -> bool {
+        let delays = self.harness.output().viewport_output.values().map(|v| v.repaint_delay);
+        delays.into_iter().any(|d| d < std::time::Duration::from_secs(3600))
+    }
+}
+
+#[test]
+fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    let name = rig.model().pair_name().to_owned();
+    // Without the pose tool the keys move nothing.
+    rig.press(Modifiers::NONE, Key::ArrowRight);
+    assert!(rig.model().workbench.hand.is_none());
+    rig.press(Modifiers::NONE, Key::Z);
+    assert_eq!(rig.model().workbench.tool, SceneTool::Pose);
+    let began = rig.model().shown_pose(MEASURED).unwrap();
+    for (modifiers, key, axis, by) in [
+        (Modifiers::NONE, Key::ArrowRight, HandAxis::Y, STEP_M),
+        (Modifiers::SHIFT, Key::ArrowLeft, HandAxis::Y, -10.0 * STEP_M),
+        (Modifiers::CTRL, Key::ArrowDown, HandAxis::Z, 0.1 * STEP_M),
+        (Modifiers::NONE, Key::ArrowUp, HandAxis::Z, -STEP_M),
+        (Modifiers::ALT, Key::ArrowRight, HandAxis::Theta, STEP_RAD),
+        (Modifiers::ALT | Modifiers::SHIFT, Key::ArrowLeft, HandAxis::Theta, -10.0 * STEP_RAD),
+    ] {
+        let before = rig.model().workbench.hand(MEASURED).map_or(began, |hand| hand.pose);
+        rig.press(modifiers, key);
+        let (now, want) = (rig.hand().pose, before.moved(axis, by));
+        let off = PoseDifference::between(now.planar, want.planar);
+        assert!(off.angle_rad < 1e-12 && off.position_m < 1e-12, "{modifiers:?} {key:?}: {now:?} for {want:?}");
+    }
+    let hand = rig.hand();
+    let (now, was) = (hand.cost.unwrap(), hand.began_cost.unwrap());
+    assert!(now.cost_m2 > was.cost_m2, "4.5 degrees off costs more: {now:?} {was:?}");
+    rig.shoot("test-pose-tool");
+
+    // Escape gives it up; nothing was written.
+    rig.press(Modifiers::NONE, Key::Escape);
+    assert!(rig.model().workbench.hand.is_none() && rig.model().accepted(MEASURED).is_none());
+
+    // Enter takes it over: one gesture, undone and done again, also on the disk.
+    rig.press(Modifiers::SHIFT, Key::ArrowRight);
+    let pose = rig.hand().pose;
+    rig.press(Modifiers::NONE, Key::Enter);
+    let stored = |rig: &Rig| {
+        let dataset = Dataset::open(&rig.data).unwrap();
+        let review = MaskStore::for_dataset(&dataset).unwrap().load_review(&name).unwrap();
+        review.and_then(|r| r.accepted[0])
+    };
+    assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
+    assert_eq!(stored(&rig).map(|a| (a.pose, a.by_hand)), Some((pose, true)));
+    assert!(rig.harness.query_all_by_label_contains("Accepted by hand").count() > 0, "the figures say so");
+    rig.press(Modifiers::CTRL, Key::Z);
+    assert_eq!((rig.model().by_hand(MEASURED), stored(&rig)), (None, None));
+    rig.press(Modifiers::CTRL | Modifiers::SHIFT, Key::Z);
+    assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
+    // After a restart it is still there.
+    rig.restart(SIZE);
+    rig.send(Command::SetWorkspace(Workspace::Align));
+    assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
+}
+
+#[test]
+fn handles_move_and_turn_the_tool_and_not_the_view() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    rig.press(Modifiers::NONE, Key::Z);
+    let began = rig.model().hand_begins(MEASURED);
+    let origin = rig.harness.state().on_screen(MEASURED, [began.x_m, began.planar.y_m, began.planar.z_m]).unwrap();
+    rig.drag(origin, vec2(30.0, 18.0));
+    let moved = rig.hand().pose;
+    assert!(moved.planar.y_m != began.planar.y_m && moved.planar.z_m > began.planar.z_m, "down is +z: {moved:?}");
+    assert_eq!(moved.planar.theta_rad, began.planar.theta_rad);
+    let at = rig.harness.state().on_screen(MEASURED, [moved.x_m, moved.planar.y_m, moved.planar.z_m]).unwrap();
+    assert!((at - origin - vec2(30.0, 18.0)).length() < 1.0, "the disc stays under the pointer: {at} from {origin}");
+    // The ring: 62 points around the middle.
+    rig.drag(at + vec2(62.0, 0.0), vec2(0.0, 25.0));
+    let turned = rig.hand().pose;
+    let by = (turned.planar.theta_rad - moved.planar.theta_rad).abs();
+    assert!((by - (25.0f64 / 62.0).atan()).abs() < 0.06, "{} degrees", by.to_degrees());
+    assert!((turned.planar.y_m - moved.planar.y_m).abs() < 1e-12 && turned.is_planar());
+    // Beside the handles the same drag turns the view.
+    let corner = rig.in_view([0.2, 0.62]);
+    rig.drag(corner, vec2(40.0, 0.0));
+    assert_eq!(rig.hand().pose, turned);
+    // Out of the plane only when asked for, and back again.
+    rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::X, 1e-3)));
+    assert!(rig.hand().pose.is_planar());
+    rig.send(Action::SixDof.command(rig.model()).unwrap());
+    rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::X, 1e-3)));
+    assert_eq!(rig.hand().pose.x_m, 1e-3);
+    rig.shoot("test-six-dof");
+    rig.send(Action::SixDof.command(rig.model()).unwrap());
+    assert!(rig.hand().pose.is_planar());
+}
+
+#[test]
+fn icp_starts_where_the_hand_left_the_tool() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    rig.press(Modifiers::NONE, Key::Z);
+    for _ in 0..2 {
+        rig.press(Modifiers::SHIFT, Key::ArrowRight);
+    }
+    rig.press(Modifiers::ALT | Modifiers::SHIFT, Key::ArrowRight);
+    let from = rig.hand().pose;
+    rig.press(Modifiers::SHIFT, Key::Z);
+    let hand = rig.hand();
+    let run = hand.from_icp.expect("it came from a registration");
+    assert_eq!(run.start.map(|s| s.get()), Some(from.planar));
+    let report = &rig.model().results.runs.get(&run).unwrap().report;
+    assert_eq!((report.start, report.runs.len()), (from.planar, 1), "one start: this one");
+    // It comes back to where the registration had been by itself.
+    let off = PoseDifference::between(hand.pose.planar, rig.model().pose(MEASURED).ready().unwrap().grasp_from_object);
+    assert!(off.angle_rad.to_degrees() < 1.0 && off.position_m < 1e-3, "{off:?}");
+    assert!(hand.cost.unwrap().cost_m2 <= hand.began_cost.unwrap().cost_m2 * 1.05);
+}
+
+#[test]
+fn distances_and_angles_are_measured_from_point_to_point() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    rig.press(Modifiers::NONE, Key::Y);
+    assert_eq!(rig.model().workbench.tool, SceneTool::Distance);
+    let cloud = rig.model().cloud(MEASURED).ready().unwrap().contact_points();
+    let ends = [cloud[cloud.len() / 10], cloud[cloud.len() / 3]];
+    for p in ends {
+        let at = rig.harness.state().on_screen(MEASURED, p.to_array()).unwrap();
+        rig.click_at(at);
+    }
+    let marks = rig.model().workbench.marks.clone();
+    assert_eq!(marks.len(), 2);
+    // Another point may lie nearer to the eye under the same pixel; in the picture it is the same place.
+    for (mark, end) in marks.iter().zip(ends) {
+        let place = |p: [f64; 3]| rig.harness.state().on_screen(MEASURED, p).unwrap();
+        assert!((place(mark.1.to_array()) - place(end.to_array())).length() < 10.0);
+    }
+    rig.shoot("test-measure");
+    rig.press(Modifiers::NONE, Key::Escape);
+    assert!(rig.model().workbench.marks.is_empty());
+    rig.press(Modifiers::SHIFT, Key::Y);
+    for p in [ends[0], ends[1], cloud[cloud.len() / 2], ends[0]] {
+        let at = rig.harness.state().on_screen(MEASURED, p.to_array()).unwrap();
+        rig.click_at(at);
+    }
+    assert_eq!(rig.model().workbench.marks.len(), 1, "the fourth point begins anew");
+    // A click beside all points marks nothing and says why.
+    rig.click_at(rig.in_view([0.02, 0.5]));
+    assert_eq!(rig.model().workbench.marks.len(), 1);
+}
+
+#[test]
+fn a_clicked_point_says_all_about_itself() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    let clouds = rig.model().cloud(MEASURED).ready().unwrap();
+    let cloud = clouds.finger(Finger::Right).unwrap();
+    let contact = (0..cloud.points.len()).filter(|i| cloud.contact[*i]).nth(40).unwrap();
+    let at = rig.harness.state().on_screen(MEASURED, cloud.points[contact].to_array()).unwrap();
+    rig.click_at(at);
+    let picked = rig.model().workbench.picked.expect("a point");
+    let clouds = rig.model().cloud(MEASURED).ready().unwrap();
+    let layers = rig.model().layers(MEASURED).ready().expect("reasons are there once they are shown");
+    let (reason, _) = layers.at(picked.finger, clouds.finger(picked.finger).unwrap(), picked.pixel).unwrap();
+    for label in [format!("Reason {reason}"), format!("Pixel {}", picked.finger.name())] {
+        assert!(rig.harness.query_all_by_label_contains(&label).count() > 0, "{label}");
+    }
+    rig.shoot("test-picked");
+    rig.press(Modifiers::NONE, Key::Escape);
+    assert_eq!(rig.model().workbench.picked, None);
+}
+
+#[test]
+fn layers_go_round_and_their_numbers_add_up() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    for layer in [Layer::Residuals, Layer::Reasons, Layer::Correspondences, Layer::None] {
+        rig.press(Modifiers::NONE, Key::V);
+        assert_eq!(rig.model().workbench.layer, layer);
+        rig.shoot(&format!("test-layer-{}", layer.name()).to_lowercase());
+    }
+    let layers = rig.model().layers(MEASURED).ready().expect("the pane shows them");
+    for finger in Finger::BOTH {
+        let pixels = rig.model().imprint(MEASURED, finger).ready().unwrap().len();
+        assert_eq!(layers.counts[finger.index()].iter().sum::<usize>(), pixels, "a reason for every pixel");
+        let mask = rig.model().mask_in_force(MEASURED, finger).unwrap().mask;
+        let outside = mask.as_slice().iter().filter(|m| !**m).count();
+        assert_eq!(layers.counts[finger.index()][Reason::OutsideMask as usize], outside);
+    }
+    let contact = rig.model().cloud(MEASURED).ready().unwrap().contact_points().len();
+    assert_eq!(layers.histogram.iter().sum::<u32>() as usize + layers.above as usize, contact);
+    assert!(layers.both_ways.scene_to_model.overlap > 0.8, "{:?}", layers.both_ways);
+    // The other side has its own.
+    rig.send(Command::Generate);
+    let side = rig.harness.get_by_label("Layers of the predicted side").rect().center();
+    rig.click_at(side);
+    assert_eq!(rig.model().workbench.side, ImprintSource::Predicted);
+    let predicted = rig.model().layers(ImprintSource::Predicted);
+    assert!(predicted.ready().is_some() || matches!(predicted, Lookup::Failed(_) | Lookup::Absent(_)));
+    rig.shoot("test-layers-predicted");
+}
+
+#[test]
+fn what_no_pane_shows_is_not_computed_and_rest_is_rest() {
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    rig.send(Command::DismissHint);
+    rig.send(Command::SetMaskSource(MaskSource::Truth));
+    // In Inspect there are 3D views, but neither layers nor poses per finger.
+    assert!(rig.model().pose(MEASURED).ready().is_some());
+    assert!(rig.model().results.runs.is_empty() && rig.model().results.layers.is_empty());
+    rig.send(Command::SetWorkspace(Workspace::Align));
+    assert_eq!(rig.model().results.layers.len(), 1, "for the side in hand, not for both");
+    assert!(!rig.model().selection.panes.contains(&Pane::Poses));
+    let clouds = rig.model().results.clouds.len();
+    rig.harness.get_all_by_label("Poses").next().unwrap().click();
+    rig.harness.step();
+    rig.settle();
+    assert!(rig.model().selection.panes.contains(&Pane::Poses));
+    assert_eq!(rig.model().results.clouds.len(), clouds + 2, "one more for each finger");
+    let truth = rig.model().truth().unwrap();
+    for of in [PoseOf::Right, PoseOf::Left, PoseOf::Joint] {
+        let pose = rig.model().pose_of(MEASURED, of).ready().unwrap().grasp_from_object;
+        let off = PoseDifference::between(pose, truth);
+        assert!(off.position_m < 0.02, "{of:?} {off:?}");
+    }
+    rig.shoot("test-poses");
+    // At rest nothing is painted; while the weak direction is shown moving, it is; and then it rests again.
+    rig.harness.step();
+    assert!(!rig.asks_to_repaint());
+    rig.harness.state_mut().push(Action::AnimateWeakest.command(&State::default()).unwrap());
+    for _ in 0..6 {
+        rig.harness.step();
+        assert!(rig.asks_to_repaint());
+    }
+    rig.shoot("test-weakest");
+    rig.harness.state_mut().push(Command::Workbench(WorkbenchCommand::SetAnimateWeakest(false)));
+    for _ in 0..4 {
+        rig.harness.step();
+    }
+    assert!(!rig.asks_to_repaint());
+}
