@@ -1,23 +1,27 @@
 //! Writes one shard of training data for the Python package in `training/`.
 //!
-//! `cargo run --release --no-default-features --example training_data -- OUT N SEED [train|unseen|seen]`
+//! `cargo run --release --no-default-features --example training_data -- OUT N SEED [train|unseen|seen]
+//! [plain|ambiguous|misaligned]`
 //! writes `N` grasps, both fingers each, to the new folder `OUT`: `gelslim.npy`, `imprint.npy`, `clean.npy`,
 //! `contact.npy`, `meta.npy` (described in `training/data.py`) and, last of all, `done.json`.
-//! `train`: 60 % the nine seen tools, 40 % random tools, half of it with randomised sensors. `seen` and `unseen`:
+//! `train`: 60 % the nine seen tools, 40 % random tools, 60 % of it with randomised sensors and stretched tools. `seen` and `unseen`:
 //! those tools with the nominal sensors, for validation. The three unseen tools are never in `train`.
+//! `ambiguous`: the GelSlims close on the bare shaft of the tool, so that they see nothing of its pattern.
+//! `misaligned`: the bubbles grasp up to 8 mm from where the GelSlims did. For a mixture, write shards of both.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
+use glam::DVec2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use touch2touch::domain::grid::DepthMap;
 use touch2touch::domain::resample;
 use touch2touch::domain::sensor::{Finger, bubble};
-use touch2touch::domain::sim::{self, SimConfig};
+use touch2touch::domain::sim::{self, Bar, Grasp, SimConfig, ToolSpec};
 
 /// Side of the resized GelSlim image, pixels.
 const SIDE: usize = 128;
@@ -35,6 +39,20 @@ enum Mix {
     Seen,
     Unseen,
 }
+
+/// What is wrong with the pairs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Condition {
+    Plain,
+    Ambiguous,
+    Misaligned,
+}
+
+/// Largest distance along y and z between the grasps of a misaligned pair, metres.
+const MISALIGNMENT_M: f64 = 0.008;
+/// How far beyond the grasp an ambiguous pair's pattern begins, metres: out of the GelSlim's 18 mm, within the bubble's
+/// 74 mm.
+const SHAFT_M: f64 = 0.018;
 
 /// One finger's part of a grasp, as it is stored.
 struct Record {
@@ -77,8 +95,30 @@ fn micrometres(depth: &DepthMap) -> Vec<i16> {
         .collect()
 }
 
+/// The tool with longer bars to the sides and towards the wrist and shorter ones at the tip, as the real tools have.
+fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
+    let side = rng.random_range(0.9..1.6);
+    let wrist = rng.random_range(0.9..1.35);
+    let tip = rng.random_range(0.15..1.1);
+    for p in tool.bars.iter_mut().flat_map(|bar| &mut bar.core) {
+        p.x *= side;
+        p.y *= if p.y > 0.0 { tip } else { wrist };
+    }
+    tool
+}
+
+/// The tool pushed towards the tip, on a bare shaft that reaches far back to the wrist.
+fn on_a_shaft(mut tool: ToolSpec) -> ToolSpec {
+    let half_width_m = tool.bars.iter().map(|bar| bar.half_width_m).fold(0.0, f64::max);
+    for p in tool.bars.iter_mut().flat_map(|bar| &mut bar.core) {
+        p.y = if p.y < 0.0 { 0.2 * p.y } else { p.y } + SHAFT_M;
+    }
+    tool.bars.push(Bar { core: vec![DVec2::new(0.0, -0.07), DVec2::new(0.0, SHAFT_M)], half_width_m });
+    tool
+}
+
 /// Simulates grasp `index` of the shard; both fingers.
-fn grasp(index: u64, seed: u64, mix: Mix) -> Result<Vec<Record>> {
+fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Record>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(index));
     let pick = |rng: &mut ChaCha8Rng, seen: bool| {
         let tools: Vec<usize> = (0..sim::tools().len()).filter(|&i| sim::tools()[i].seen == seen).collect();
@@ -87,23 +127,40 @@ fn grasp(index: u64, seed: u64, mix: Mix) -> Result<Vec<Record>> {
     let random = mix == Mix::Train && rng.random_bool(0.4);
     let number = if random { None } else { Some(pick(&mut rng, mix != Mix::Unseen)) };
     let invented;
+    let nominal = mix != Mix::Train || rng.random_bool(0.4);
     let tool = match number {
-        Some(i) => &sim::tools()[i],
+        Some(i) if nominal => &sim::tools()[i],
+        Some(i) => {
+            invented = stretched(sim::tools()[i].clone(), &mut rng);
+            &invented
+        }
         None => {
-            invented = sim::random_tool(rng.random());
+            let tool = sim::random_tool(rng.random());
+            invented = if nominal { tool } else { stretched(tool, &mut rng) };
             &invented
         }
     };
-    let nominal = mix != Mix::Train || rng.random_bool(0.5);
     let config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
     let grasp = sim::random_grasp(rng.random());
-    let sample = sim::simulate(tool, grasp, rng.random(), &config);
+    let on_shaft = if condition == Condition::Ambiguous { Some(on_a_shaft(tool.clone())) } else { None };
+    let tool = on_shaft.as_ref().unwrap_or(tool);
+    let noise = rng.random();
+    let sample = sim::simulate(tool, grasp, noise, &config);
+    // the bubbles' own grasp, if it is another one
+    let grasp = if condition == Condition::Misaligned {
+        let mut off = || rng.random_range(-MISALIGNMENT_M..=MISALIGNMENT_M);
+        Grasp { x_m: grasp.x_m + off(), y_m: grasp.y_m + off(), ..grasp }
+    } else {
+        grasp
+    };
+    let elsewhere = (condition == Condition::Misaligned).then(|| sim::simulate(tool, grasp, noise, &config));
     Finger::BOTH
         .iter()
         .map(|&finger| {
             let touch = sample.finger(finger).context("the simulator left a finger out")?;
             let gelslim = touch.gelslim.as_ref().context("no GelSlim image")?;
-            let imprint = touch.bubble.as_ref().context("no bubble image")?;
+            let pressed = elsewhere.as_ref().unwrap_or(&sample).finger(finger).context("no such finger")?;
+            let imprint = pressed.bubble.as_ref().context("no bubble image")?;
             let truth = imprint.truth.as_ref().context("no truth")?;
             ensure!(imprint.imprint.size() == [bubble::WIDTH, bubble::HEIGHT], "unexpected bubble size");
             let small = resample::bilinear_rgb(&gelslim.difference, SIDE, SIDE);
@@ -132,7 +189,10 @@ fn grasp(index: u64, seed: u64, mix: Mix) -> Result<Vec<Record>> {
 
 fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    ensure!(matches!(arguments.len(), 3 | 4), "usage: training_data OUT N SEED [train|seen|unseen]");
+    ensure!(
+        (3..=5).contains(&arguments.len()),
+        "usage: training_data OUT N SEED [train|seen|unseen] [plain|ambiguous|misaligned]"
+    );
     let folder = Path::new(&arguments[0]);
     let grasps: usize = arguments[1].parse().context("N must be a whole number")?;
     let seed: u64 = arguments[2].parse().context("SEED must be a whole number")?;
@@ -142,6 +202,13 @@ fn main() -> Result<()> {
         "seen" => Mix::Seen,
         "unseen" => Mix::Unseen,
         other => anyhow::bail!("unknown mix {other:?}: use train, seen or unseen"),
+    };
+    let condition_name = arguments.get(4).map_or("plain", String::as_str);
+    let condition = match condition_name {
+        "plain" => Condition::Plain,
+        "ambiguous" => Condition::Ambiguous,
+        "misaligned" => Condition::Misaligned,
+        other => anyhow::bail!("unknown condition {other:?}: use plain, ambiguous or misaligned"),
     };
     ensure!(!folder.join("done.json").exists(), "{} is already written", folder.display());
     std::fs::create_dir_all(folder)?;
@@ -157,7 +224,7 @@ fn main() -> Result<()> {
     for start in (0..grasps).step_by(CHUNK) {
         let end = grasps.min(start + CHUNK);
         let chunk: Vec<Vec<Record>> =
-            (start..end).into_par_iter().map(|i| grasp(i as u64, seed, mix)).collect::<Result<_>>()?;
+            (start..end).into_par_iter().map(|i| grasp(i as u64, seed, mix, condition)).collect::<Result<_>>()?;
         for record in chunk.iter().flatten() {
             gelslim.i16s(&record.gelslim)?;
             imprint.i16s(&record.imprint)?;
@@ -170,7 +237,7 @@ fn main() -> Result<()> {
     for mut file in [gelslim, imprint, clean, contact, meta] {
         file.0.flush()?;
     }
-    let done = serde_json::json!({ "mix": mix_name, "grasps": grasps, "samples": samples, "seed": seed });
+    let done = serde_json::json!({ "mix": mix_name, "condition": condition_name, "grasps": grasps, "samples": samples, "seed": seed });
     std::fs::write(folder.join("done.json"), done.to_string())?;
     Ok(())
 }

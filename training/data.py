@@ -98,6 +98,29 @@ def dihedral(image, k):
     return torch.flip(image, dims=(-1,)) if k >= 4 else image
 
 
+def each_dihedral(images, k):
+    """`dihedral` with an own symmetry per image (N,C,S,S), k (N,)."""
+    return torch.stack([dihedral(image, int(i)) for image, i in zip(images, k)])
+
+
+# The GelSlim's window in the generator's image (128 x 128, rotated bubble): rows, then columns, of both fingers' mean.
+WINDOW = (slice(50, 79), slice(63, 94))
+
+
+def padded(gelslim):
+    """GelSlim images (N,3,128,128) drawn where the sensor lies in the bubble's view, nothing around."""
+    rows, columns = WINDOW
+    size = (rows.stop - rows.start, columns.stop - columns.start)
+    out = torch.zeros_like(gelslim)
+    out[:, :, rows, columns] = F.interpolate(gelslim, size=size, mode="bilinear", align_corners=False, antialias=True)
+    return out
+
+
+def cropped(image):
+    """The part of the generator's image that the GelSlim sees, enlarged to 128 x 128."""
+    return F.interpolate(image[:, :, *WINDOW], size=(128, 128), mode="bilinear", align_corners=False)
+
+
 def augment_gelslim(x, randomised, rng):
     """Sensor variety for standardised differences (N,3,128,128): strong where `randomised` (N,) is true.
 
@@ -120,8 +143,8 @@ def augment_gelslim(x, randomised, rng):
     blurred = F.avg_pool2d(F.pad(x, (1, 1, 1, 1), mode="replicate"), 3, stride=1)
     x = torch.lerp(x, blurred, uniform(0, 1, n, 1, 1, 1) * (0.3 + 0.7 * strong))
     x = x + uniform(0, 0.06, n, 1, 1, 1) * (1 + 3 * strong) * normal(*x.shape)
-    cut = torch.from_numpy(rng.random(n) < 0.3)[:, None, None, None] & (strong > 0)
-    return torch.where(cut, (x * 2.5).clamp(0, 1) / 2.5, x)
+    cut = torch.from_numpy(rng.random(n) < 0.35)[:, None, None, None] & (strong > 0)
+    return torch.where(cut, (x * uniform(0.4, 3, n, 1, 1, 1) + uniform(0, 0.15, n, 1, 1, 1)).clamp(0, 1), x)
 
 
 def sha256(path):

@@ -18,6 +18,8 @@ from PIL import Image
 from . import data, diffusion
 
 PEAK_M = 0.0225
+# What black and white of a picture without scale are taken to mean.
+ASSUMED_M = (-0.0063, 0.0180)
 
 
 class Bundle:
@@ -43,7 +45,7 @@ class Bundle:
         """Model images (N,1,128,128) in [-1,1] for standardised GelSlim images."""
         condition = self.run("condition_encoder", gelslim)
         latent = diffusion.ddim(lambda x, t, c: self.run("denoiser", x, t, c), condition,
-                                steps or self.manifest["defaults"]["steps"], seed)
+                                steps or self.manifest["defaults"]["steps"], seed, self.manifest["latent"]["shape"])
         return self.run("decoder", latent)
 
     def mask(self, metres):
@@ -76,6 +78,20 @@ def iou(a, b):
 
 def unit(image):
     return (image - image.min()) / (image.max() - image.min()).clamp(min=1e-9)
+
+
+def likeness(a, truth, prefix):
+    """PSNR and SSIM of two images stretched to 0..1 each, and with scale and offset of `a` fitted to the truth.
+
+    The stretch hangs on two pixels, the noisiest ones of a measured imprint; the fit on all.
+    """
+    centred = (a - a.mean()).double()
+    slope = (centred * (truth - truth.mean())).sum() / (centred**2).sum().clamp(min=1e-12)
+    fitted = (slope * centred + truth.mean()).float()
+    a = unit(a)
+    return {prefix + "psnr_db": psnr(a, truth, 1), prefix + "ssim": ssim(a, truth),
+            prefix + "fitted_psnr_db": psnr(fitted, truth, 1), prefix + "fitted_ssim": ssim(fitted, truth),
+            prefix + "correlation": float(np.corrcoef(a.flatten(), truth.flatten())[0, 1])}
 
 
 def tile(image):
@@ -137,23 +153,29 @@ def pictures_figures(bundle, masker, folder, out):
         zero = torch.tensor([float(np.bincount(c.flatten().byte().numpy()).argmax()) for c in raw])
         difference = (raw - zero[:, None, None]) / 255
         standard = (difference - torch.tensor(data.MEAN)[:, None, None]) / torch.tensor(data.STD)[:, None, None]
-        predicted = unit(bundle.predict(standard[None])[0, 0])
-        truth = unit(load("bubble")[0])
-        pair = {"name": name, "psnr_db": psnr(predicted, truth, 1), "ssim": ssim(predicted, truth)}
+        drawn = bundle.predict(standard[None])[0, 0]
+        predicted, truth = unit(drawn), unit(load("bubble")[0])
+        pair = {"name": name, "clipped": bool((zero < 40).any()), **likeness(drawn, truth, "")}
+        # In the assumed scale, where the level of the prediction counts and its extremes do not.
+        low, high = (2 * (m - data.RANGE_M[0]) / (data.RANGE_M[1] - data.RANGE_M[0]) - 1 for m in ASSUMED_M)
+        scaled = (drawn - low) / (high - low)
+        pair |= {"assumed_psnr_db": psnr(scaled, truth, 1), "assumed_ssim": ssim(scaled, truth)}
         row = [tile(raw / 255), tile(truth[None]), tile(predicted[None])]
         if (Path(folder) / f"{name}_vqvae.png").exists():
             lab = unit(load("vqvae")[0])
-            pair |= {"vqvae_psnr_db": psnr(lab, truth, 1), "vqvae_ssim": ssim(lab, truth)}
+            pair |= likeness(lab, truth, "vqvae_")
             row.append(tile(lab[None]))
         if masker:
-            metres = -0.0063 + truth * (0.0180 + 0.0063)
+            metres = ASSUMED_M[0] + truth * (ASSUMED_M[1] - ASSUMED_M[0])
             full = torch.flip(F.interpolate(metres[None, None], size=(140, 175), mode="bilinear", align_corners=False), (2, 3))
             row.append(tile(torch.flip(masker.mask(full).float(), (1, 2))))
         pairs.append(pair)
         rows.append(np.concatenate(row, axis=0))
     sheet([rows[i:i + 12] for i in range(0, len(rows), 12)], out / "pictures.png")
-    keys = [k for k in pairs[0] if k != "name"]
-    return {"pairs": pairs, "mean": {k: float(np.mean([p[k] for p in pairs])) for k in keys}}
+    keys = [k for k in pairs[0] if k not in ("name", "clipped")]
+    groups = {"all": pairs, "clean": [p for p in pairs if not p["clipped"]], "clipped": [p for p in pairs if p["clipped"]]}
+    means = {g: {"pairs": len(ps), **{k: float(np.mean([p[k] for p in ps])) for k in keys}} for g, ps in groups.items() if ps}
+    return {"pairs": pairs, "mean": means}
 
 
 def main():

@@ -1,4 +1,4 @@
-"""Command line: `python -m training.export {generator|mask} --run DIR --data DIR --out BUNDLE`.
+"""Command line: `python -m training.export NAME --run DIR --data DIR --out BUNDLE`, NAME as for `training.train`.
 
 Writes the ONNX graphs and the manifest of a bundle, and checks every graph against torch with ONNX Runtime.
 """
@@ -13,7 +13,7 @@ import onnxruntime
 import torch
 from torch import nn
 
-from . import data, diffusion, models
+from . import baselines, data, diffusion, models
 
 OPSET = 17
 
@@ -31,6 +31,40 @@ class Decoder(nn.Module):
         return self.decoder(latent * self.std + self.mean)
 
 
+class OneShot(nn.Module):
+    """The "denoiser" of a network that draws in one go: always the v that leads to the condition itself.
+
+    With x = a z + s e and z the condition, v = a e - s z = (a x - z) / s. Every sampler ends at the condition.
+    """
+
+    def __init__(self):
+        super().__init__()
+        bars = torch.from_numpy(diffusion.alpha_bar())
+        self.register_buffer("weights", torch.stack([(bars / (1 - bars)).sqrt(), -1 / (1 - bars).sqrt()], dim=1).float())
+
+    def forward(self, latent, timestep, condition):
+        w = self.weights[timestep][:, :, None, None]
+        return w[:, :1] * latent + w[:, 1:] * condition
+
+
+class Codes(nn.Module):
+    """The VQ-VAE up to its quantised codes."""
+
+    def __init__(self, net):
+        super().__init__()
+        self.net = net
+
+    def forward(self, gelslim):
+        return self.net.quantise(self.net.features(gelslim))
+
+
+class Picture(nn.Module):
+    """The picture as it is; a graph must hold an operator."""
+
+    def forward(self, latent):
+        return latent * 1.0
+
+
 def load_generator(run):
     """(condition encoder, denoiser, decoder) with averaged weights, and the states they came from."""
     ae = torch.load(Path(run) / "autoencoder.pt", weights_only=True)
@@ -43,11 +77,11 @@ def load_generator(run):
     return encoder.eval(), denoiser.eval(), decoder.eval(), ae, state
 
 
-def predict(nets, gelslim, steps=10, seed=42):
+def predict(nets, gelslim, steps=10, seed=42, shape=(4, 16, 16)):
     """Imprints in metres, raw orientation, for standardised GelSlim images."""
     encoder, denoiser, decoder = nets
     with torch.no_grad():
-        return data.from_model(decoder(diffusion.ddim(denoiser, encoder(gelslim), steps, seed)))
+        return data.from_model(decoder(diffusion.ddim(denoiser, encoder(gelslim), steps, seed, shape)))
 
 
 def write(net, path, inputs, output, examples):
@@ -77,38 +111,38 @@ def provenance(note, shards, states, differences):
         "note": note,
         "data": "simulated touches (examples/training_data.rs); the unseen tools are not among them",
         "shards": shards.record(),
-        "runs": {name: {k: s[k] for k in ("step", "samples", "minutes", "losses", "seed")} for name, s in states.items()},
+        "runs": {name: {k: s[k] for k in ("step", "samples", "minutes", "losses", "seed", "options") if k in s} for name, s in states.items()},
         "onnx_minus_torch_max": differences,
         "tools": {"torch": torch.__version__, "onnx_opset": OPSET},
         "licence": "MIT OR Apache-2.0",
     }
 
 
-def generator(args, out):
-    encoder, denoiser, decoder, ae, state = load_generator(args.run)
+def generator_bundle(args, out, name, nets, shapes, steps, states):
+    """Writes the three graphs; the manifest. `shapes`: of condition and latent, each (C,H,W)."""
+    encoder, denoiser, decoder = nets
     shards = data.Shards(args.data)
     files, differences = {}, {}
     graphs = {
         "condition_encoder": (encoder, ("gelslim",), "condition", (torch.randn(2, 3, 128, 128),)),
         "denoiser": (denoiser, ("latent", "timestep", "condition"), "prediction",
-                     (torch.randn(2, 4, 16, 16), torch.tensor([1, 999]), torch.randn(2, models.CONDITION, 16, 16))),
-        "decoder": (decoder, ("latent",), "image", (torch.randn(2, 4, 16, 16),)),
+                     (torch.randn(2, *shapes[1]), torch.tensor([1, 999]), torch.randn(2, *shapes[0]))),
+        "decoder": (decoder, ("latent",), "image", (torch.randn(2, *shapes[1]),)),
     }
     for role, (net, inputs, output, examples) in graphs.items():
         files[role], differences[role] = write(net, out / f"{role}.onnx", inputs, output, examples)
     # Statistics for the paper's shift, on training touches of the nominal sensors.
     nominal = np.flatnonzero(shards.meta[:, 6] == 1)
     chosen = np.sort(np.random.default_rng(args.seed).choice(nominal, min(256, len(nominal)), replace=False))
-    predicted = torch.cat([predict((encoder, denoiser, decoder), shards.gelslim(chosen[i:i + 32]))
+    predicted = torch.cat([predict(nets, shards.gelslim(chosen[i:i + 32]), steps, shape=shapes[1])
                            for i in range(0, len(chosen), 32)]).double()
     measured = shards.metres("imprint", chosen).double()
     return {
-        "format": "touch2touch-bundle", "format_version": 1, "kind": "generator",
-        "name": "Latent diffusion, simulated data", "files": files,
+        "format": "touch2touch-bundle", "format_version": 1, "kind": "generator", "name": name, "files": files,
         "input": {"sensor": "gelslim", "size": [128, 128], "scale": "0..1", "mean": list(data.MEAN),
                   "std": list(data.STD), "resampling": "bilinear", "rotation_deg": 0},
-        "condition": {"shape": [models.CONDITION, 16, 16]},
-        "latent": {"shape": [models.LATENT, 16, 16], "scale_factor": 1.0},
+        "condition": {"shape": list(shapes[0])},
+        "latent": {"shape": list(shapes[1]), "scale_factor": 1.0},
         "schedule": {"kind": "scaled_linear", "steps": diffusion.STEPS, "beta_start": diffusion.BETA_START,
                      "beta_end": diffusion.BETA_END},
         "prediction": "v",
@@ -117,8 +151,48 @@ def generator(args, out):
         "shift": {"pred_mean": (predicted.mean().item() + data.RANGE_M[1]) / 2,
                   "pred_std": predicted.std(correction=0).item() / 2,
                   "gt_mean": measured.mean().item(), "gt_std": measured.std(correction=0).item()},
-        "defaults": {"steps": 10, "sampler": "ddim", "spacing": "trailing", "eta": 0.0, "seed": 42},
-        "provenance": provenance(args.note, shards, {"autoencoder": ae, "generator": state}, differences),
+        "defaults": {"steps": steps, "sampler": "ddim", "spacing": "trailing", "eta": 0.0, "seed": 42},
+        "provenance": provenance(args.note, shards, states, differences),
+    }
+
+
+def generator(args, out):
+    encoder, denoiser, decoder, ae, state = load_generator(args.run)
+    shapes = (models.CONDITION, 16, 16), (models.LATENT, 16, 16)
+    return generator_bundle(args, out, "Latent diffusion, simulated data", (encoder, denoiser, decoder), shapes, 10,
+                            {"autoencoder": ae, "generator": state})
+
+
+def one_shot(args, out):
+    """A baseline that draws in one go, as a generator whose denoiser leads any sampler to the drawn picture."""
+    state = torch.load(Path(args.run) / f"{args.what}.pt", weights_only=True)
+    net = baselines.VqVae() if args.what == "vqvae" else baselines.L1UNet()
+    net.load_state_dict(state["nets"][args.what])
+    if state["options"]["geometry"] == "cropping":
+        raise SystemExit("a network trained on cropped imprints does not draw the bubble's view; a bundle cannot say so")
+    if state["options"]["geometry"] == "padding":
+        raise SystemExit("padding the GelSlim image is not part of a bundle's preparation; export a run without it")
+    net = net.eval()
+    if args.what == "vqvae":
+        nets, shape = (Codes(net), OneShot(), net.decoder), (net.book.shape[1], 16, 16)
+    else:
+        nets, shape = (net, OneShot(), Picture()), (1, 128, 128)
+    title = {"vqvae": "VQ-VAE", "l1unet": "L1 UNet", "visgel": "VisGel"}[args.what]
+    return generator_bundle(args, out, f"{title}, simulated data", nets, (shape, shape), 1, {args.what: state})
+
+
+def classifier(args, out):
+    """Bundles have no kind for a classifier yet: `touch2touch bundle check` refuses this one, and says so."""
+    state = torch.load(Path(args.run) / "classifier.pt", weights_only=True)
+    net = baselines.Classifier()
+    net.load_state_dict(state["nets"]["classifier"])
+    entry, difference = write(net.eval(), out / "tool_classifier.onnx", ("imprint",), "logits", (torch.rand(2, 1, 128, 128),))
+    return {
+        "format": "touch2touch-bundle", "format_version": 1, "kind": "tool_classifier",
+        "name": "Tool classifier, simulated data", "files": {"tool_classifier": entry},
+        "input": {"sensor": "bubble", "size": [128, 128], "range_m": list(data.RANGE_M), "rotation_deg": 180},
+        "output": {"classes": baselines.TOOLS},
+        "provenance": provenance(args.note, data.Shards(args.data), {"classifier": state}, {"tool_classifier": difference}),
     }
 
 
@@ -137,9 +211,12 @@ def mask(args, out):
     }
 
 
+WHAT = {"generator": generator, "mask": mask, "l1unet": one_shot, "visgel": one_shot, "vqvae": one_shot, "classifier": classifier}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("generator", "mask"))
+    parser.add_argument("what", choices=tuple(WHAT))
     parser.add_argument("--run", default="training/runs/demo", help="folder of checkpoints")
     parser.add_argument("--data", default="training/data/train", help="folder of the training shards")
     parser.add_argument("--out", required=True, help="bundle folder to write")
@@ -149,7 +226,7 @@ def main():
     torch.set_num_threads(1)
     out = Path(args.out)
     out.mkdir(parents=True, exist_ok=True)
-    manifest = {"generator": generator, "mask": mask}[args.what](args, out)
+    manifest = WHAT[args.what](args, out)
     (out / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
     print(json.dumps({"bundle": str(out), "bytes": sum(f.stat().st_size for f in out.iterdir()),
                       "onnx_minus_torch_max": manifest["provenance"]["onnx_minus_torch_max"]}))

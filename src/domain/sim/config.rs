@@ -82,6 +82,8 @@ pub struct GelSlimConfig {
     pub indentation_spread: f64,
     /// Deviation of the angle between gel and tool, radians.
     pub tilt_rad: f64,
+    /// How much less deep the gel presses towards the tool's tip, radians.
+    pub lean_rad: f64,
     /// Length over which the gel rises beside a dent.
     pub decay_m: f64,
     /// Blur of the surface.
@@ -132,6 +134,7 @@ impl Default for GelSlimConfig {
             indentation_m: 0.001,
             indentation_spread: 0.08,
             tilt_rad: 0.012,
+            lean_rad: 0.0,
             decay_m: 0.000_8,
             smoothing_m: 0.000_08,
             // green lights the wrist side; red and blue 120 degrees away
@@ -169,14 +172,20 @@ impl SimConfig {
     /// Another pair of sensors, drawn around the nominal one: for training that must not depend on one sensor.
     pub fn randomised(seed: u64) -> Self {
         let mut noise = Noise::new(seed, Stream::Config, 0);
-        let mut around = |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
         let (b, g) = (BubbleConfig::default(), GelSlimConfig::default());
+        // Published imprints stay pushed in up to the wrist's edge of the picture and bulge beyond the tip: a larger,
+        // steeper dome whose middle lies nearer the wrist. The ranges reach from the nominal sensor to there.
+        let rim_centre_z_m = noise.uniform(-0.025, 0.009);
+        let rim_semi_axes_m = [noise.uniform(0.042, 0.062), noise.uniform(0.058, 0.085)];
+        let lean_rad = noise.uniform(-0.015, 0.065);
+        let decay_m = noise.uniform(0.000_5, 0.001_6);
+        let mut around = |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
         let bubble = BubbleConfig {
-            press_m: around(b.press_m, 0.15),
-            dome_rise_m: around(b.dome_rise_m, 0.12),
-            rim_semi_axes_m: b.rim_semi_axes_m.map(|a| around(a, 0.06)),
-            rim_centre_z_m: around(b.rim_centre_z_m, 0.4),
-            air_kept: around(b.air_kept, 0.4),
+            press_m: around(b.press_m + 0.001, 0.2),
+            dome_rise_m: around(b.dome_rise_m + 0.002, 0.25),
+            rim_semi_axes_m,
+            rim_centre_z_m,
+            air_kept: around(b.air_kept, 0.6),
             noise_m: around(b.noise_m, 0.4),
             drift_m: around(b.drift_m, 0.6),
             texture_m: around(b.texture_m, 0.4),
@@ -193,7 +202,8 @@ impl SimConfig {
             indentation_m: around(g.indentation_m, 0.3),
             indentation_spread: around(g.indentation_spread, 0.5),
             tilt_rad: around(g.tilt_rad, 0.6),
-            decay_m: around(g.decay_m, 0.35),
+            lean_rad,
+            decay_m,
             smoothing_m: around(g.smoothing_m, 0.6),
             led_angle_rad: g.led_angle_rad.map(|a| a + around(1.0, 0.22) - 1.0),
             led_gain: g.led_gain.map(|a| around(a, 0.35)),

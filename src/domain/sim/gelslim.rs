@@ -40,7 +40,8 @@ impl Gel {
     ) -> Self {
         let (columns, rows) = grid_size();
         // the two surfaces are never quite parallel
-        let tilt = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.tilt_rad;
+        let tilt = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.tilt_rad
+            - DVec2::Y * config.lean_rad;
         let depth = config.indentation_m * (1.0 + config.indentation_spread * f64::from(noise.normal()));
         let mut obstacle = Field::filled(columns, rows, f32::NEG_INFINITY);
         for j in 0..rows {

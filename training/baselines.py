@@ -1,0 +1,216 @@
+"""The paper's baselines and its tool classifier: networks and training.
+
+L1 UNet and VisGel (a conditional GAN) draw the imprint (N,1,128,128) from the standardised GelSlim image
+(N,3,128,128) in one go; the VQ-VAE passes through 16 x 16 quantised codes. The classifier names the tool of an
+imprint. Sized for a CPU, not the sizes of the papers.
+"""
+
+import torch
+import torch.nn.functional as F
+from torch import nn
+
+import numpy as np
+
+from . import data
+from .models import ResBlock, Transformer, norm
+from .run import Run, condition, edges, indices, symmetries, target
+
+TOOLS = 12
+
+
+def normalised(gelslim):
+    """The strength of the colours differs from sensor to sensor: divided out, as the condition encoder does."""
+    return gelslim / torch.sqrt((gelslim * gelslim).mean(dim=(1, 2, 3), keepdim=True) + 0.02)
+
+
+def down(a, b):
+    return nn.Sequential(nn.Conv2d(a, b, 4, stride=2, padding=1), ResBlock(b, b))
+
+
+def mixed(block, x):
+    """A transformer over the cells of a feature map."""
+    n, c, h, w = x.shape
+    return block(x.flatten(2).transpose(1, 2)).transpose(1, 2).reshape(n, c, h, w)
+
+
+class Drawer(nn.Module):
+    """Features (N,channels,16,16) to the picture (N,1,128,128)."""
+
+    def __init__(self, channels):
+        super().__init__()
+        self.body = nn.Sequential(
+            nn.Conv2d(channels, 112, 3, padding=1), ResBlock(112, 112),
+            nn.Conv2d(112, 64, 1), nn.Upsample(scale_factor=2.0, mode="nearest"), ResBlock(64, 64),
+            nn.Conv2d(64, 32, 1), nn.Upsample(scale_factor=2.0, mode="nearest"), ResBlock(32, 32),
+            norm(32), nn.SiLU(), nn.Conv2d(32, 16, 3, padding=1), nn.Upsample(scale_factor=2.0, mode="nearest"),
+            nn.Conv2d(16, 16, 3, padding=1), nn.SiLU(), nn.Conv2d(16, 1, 3, padding=1))
+
+    def forward(self, x):
+        return self.body(x)
+
+
+class L1UNet(nn.Module):
+    """UNet over 64, 32, 16 and 8 cells; attention at the bottom. Also VisGel's generator."""
+
+    def __init__(self, widths=(32, 64, 112, 160)):
+        super().__init__()
+        self.enter = nn.Conv2d(3, widths[0], 8, stride=2, padding=3)
+        self.down = nn.ModuleList(down(a, b) for a, b in zip(widths, widths[1:]))
+        self.mix = nn.ModuleList(Transformer(widths[-1], 5) for _ in range(2))
+        self.place = nn.Parameter(0.02 * torch.randn(1, widths[-1], 8, 8))
+        self.lift = nn.ModuleList(nn.Conv2d(b, a, 1) for a, b in zip(widths, widths[1:]))
+        self.up = nn.ModuleList(ResBlock(2 * a, a) for a in widths[:-1])
+        self.out = nn.Sequential(norm(widths[0]), nn.SiLU(), nn.Conv2d(widths[0], 16, 3, padding=1),
+                                 nn.Upsample(scale_factor=2.0, mode="nearest"), nn.SiLU(), nn.Conv2d(16, 1, 3, padding=1))
+
+    def forward(self, gelslim):
+        skips = [self.enter(normalised(gelslim))]
+        for block in self.down:
+            skips.append(block(skips[-1]))
+        x = skips.pop() + self.place
+        for block in self.mix:
+            x = mixed(block, x)
+        for lift, up, skip in zip(reversed(self.lift), reversed(self.up), reversed(skips)):
+            x = up(torch.cat([F.interpolate(lift(x), scale_factor=2.0, mode="nearest"), skip], dim=1))
+        return self.out(x)
+
+
+class PatchCritic(nn.Module):
+    """Real or drawn, per patch, given the GelSlim image beside the imprint."""
+
+    def __init__(self):
+        super().__init__()
+        self.body = nn.Sequential(
+            nn.Conv2d(4, 24, 4, stride=2, padding=1), nn.LeakyReLU(0.2),
+            nn.Conv2d(24, 48, 4, stride=2, padding=1), norm(48), nn.LeakyReLU(0.2),
+            nn.Conv2d(48, 96, 4, stride=2, padding=1), norm(96), nn.LeakyReLU(0.2), nn.Conv2d(96, 1, 4, padding=1))
+
+    def forward(self, gelslim, image):
+        return self.body(torch.cat([normalised(gelslim), image], dim=1))
+
+
+class VqVae(nn.Module):
+    """Encoder, nearest code of a learnt book, decoder. `forward` returns (picture, features, codes)."""
+
+    def __init__(self, codes=512, dim=64):
+        super().__init__()
+        self.encoder = nn.Sequential(nn.Conv2d(3, 48, 8, stride=4, padding=2), ResBlock(48, 48), down(48, 96), ResBlock(96, 96))
+        self.place = nn.Parameter(0.02 * torch.randn(1, 96, 16, 16))
+        self.mix = nn.ModuleList(Transformer(96, 4) for _ in range(2))
+        self.narrow = nn.Conv2d(96, dim, 1)
+        self.book = nn.Parameter(torch.randn(codes, dim) * 0.5)
+        self.decoder = Drawer(dim)
+
+    def features(self, gelslim):
+        x = self.encoder(normalised(gelslim)) + self.place
+        for block in self.mix:
+            x = mixed(block, x)
+        return self.narrow(x)
+
+    def quantise(self, z):
+        n, c, h, w = z.shape
+        flat = z.permute(0, 2, 3, 1).reshape(-1, c)
+        distance = (self.book * self.book).sum(dim=1) - 2 * flat @ self.book.t()
+        chosen = self.book[distance.argmin(dim=1)]
+        return chosen.reshape(n, h, w, c).permute(0, 3, 1, 2)
+
+    def forward(self, gelslim):
+        z = self.features(gelslim)
+        q = self.quantise(z)
+        return self.decoder(z + (q - z).detach()), z, q
+
+
+class Classifier(nn.Module):
+    """Which of the lab's twelve tools made the imprint (N,1,128,128): logits (N,12)."""
+
+    def __init__(self):
+        super().__init__()
+        self.body = nn.Sequential(nn.Conv2d(1, 24, 8, stride=4, padding=2), ResBlock(24, 24), down(24, 48), down(48, 96),
+                                  norm(96), nn.SiLU(), nn.Flatten(), nn.Linear(96 * 64, TOOLS))
+
+    def forward(self, image):
+        return self.body(image)
+
+
+def begin(args, kind, net, rate, others=None):
+    net = net.to(memory_format=torch.channels_last)
+    shards, rng = data.Shards(args.data), np.random.default_rng(args.seed)
+    return shards, rng, Run(args, kind, {kind: net, **(others or {})}, rate)
+
+
+def pairs(shards, rng, run, size=16):
+    """Batches of (GelSlim, clean imprint) until the budget is spent."""
+    for batch in indices(shards, rng, size):
+        if run.over():
+            return
+        k = symmetries(run.args, rng, len(batch))
+        yield condition(shards, batch, k, run.args, rng), target(shards, "clean", batch, k, run.args)
+
+
+def l1unet(args):
+    net = L1UNet()
+    shards, rng, run = begin(args, "l1unet", net, 1e-3)
+    for gelslim, clean in pairs(shards, rng, run):
+        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
+            loss = (net(gelslim).float() - clean).abs().mean()
+        run.descend(loss, len(gelslim), {"l1": loss})
+    run.save()
+
+
+def visgel(args):
+    """L1 and a least-squares GAN; the critic has its own optimiser, begun anew at each start."""
+    net, critic = L1UNet(), PatchCritic()
+    critic.requires_grad_(False)
+    shards, rng, run = begin(args, "visgel", net, 7e-4, {"critic": critic})
+    optimiser = torch.optim.AdamW(critic.parameters(), lr=3e-4, betas=(0.5, 0.99))
+    for gelslim, clean in pairs(shards, rng, run):
+        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
+            drawn = net(gelslim).float()
+        critic.requires_grad_(True)
+        real, fake = critic(gelslim, clean), critic(gelslim, drawn.detach())
+        judged = ((real - 1) ** 2).mean() + (fake**2).mean()
+        optimiser.zero_grad()
+        judged.backward()
+        optimiser.step()
+        critic.requires_grad_(False)
+        l1, fooled = (drawn - clean).abs().mean(), ((critic(gelslim, drawn) - 1) ** 2).mean()
+        run.descend(20 * l1 + 0.1 * fooled, len(gelslim), {"l1": l1, "critic": judged})
+    run.save()
+
+
+def vqvae(args):
+    net = VqVae()
+    shards, rng, run = begin(args, "vqvae", net, 1e-3)
+    for gelslim, clean in pairs(shards, rng, run):
+        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
+            drawn, z, q = net(gelslim)
+        l1, edge = (drawn.float() - clean).abs().mean(), edges(drawn.float(), clean)
+        book = F.mse_loss(q, z.detach()) + 0.25 * F.mse_loss(z, q.detach())
+        run.descend(10 * l1 + 10 * edge + book, len(gelslim), {"l1": l1, "edge": edge, "book": book})
+        if run.step % 100 == 0 and run.progress() < 0.5:
+            revive(net, z.detach())
+    run.save()
+
+
+@torch.no_grad()
+def revive(net, z):
+    """Moves codes that no feature of the batch chose to random features."""
+    flat = z.permute(0, 2, 3, 1).reshape(-1, z.shape[1])
+    distance = (net.book * net.book).sum(dim=1) - 2 * flat @ net.book.t()
+    unused = torch.ones(len(net.book), dtype=torch.bool)
+    unused[distance.argmin(dim=1).unique()] = False
+    net.book[unused] = flat[torch.randint(len(flat), (int(unused.sum()),))]
+
+
+def classifier(args):
+    net = Classifier()
+    shards, rng, run = begin(args, "classifier", net, 1e-3)
+    for batch in indices(shards, rng, 32):
+        if run.over():
+            break
+        batch = batch[shards.meta[batch, 5] >= 0]
+        tool = torch.from_numpy(shards.meta[batch, 5]).long()
+        image = target(shards, "imprint" if rng.random() < 0.5 else "clean", batch, np.zeros(len(batch), int), args)
+        loss = F.cross_entropy(net(image), tool)
+        run.descend(loss, len(batch), {"cross": loss})
+    run.save()

@@ -1,0 +1,105 @@
+"""Training of the latent diffusion: the KL autoencoder, then condition encoder and denoiser."""
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+
+from . import data, diffusion, models
+from .run import Run, condition, edges, indices, start, symmetries, target
+
+
+def autoencoder(args):
+    shards, rng = data.Shards(args.data), np.random.default_rng(args.seed)
+    net = models.Autoencoder()
+    start(net.decoder, args, "decoder", "decoder.")
+    net = net.to(memory_format=torch.channels_last)
+    run = Run(args, "autoencoder", {"autoencoder": net}, 1.5e-3)
+    for batch in indices(shards, rng, 8):
+        if run.over():
+            break
+        # A bundle has no encoder: a new one first learns the latents that the bundle's decoder knows.
+        frozen = bool(args.start) and run.progress() < 0.4
+        net.decoder.requires_grad_(not frozen)
+        k = rng.integers(8, size=len(batch))
+        clean = target(shards, "clean", batch, k, args)
+        image = target(shards, "imprint", batch, k, args) if rng.random() < 0.5 else clean
+        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
+            mean, log_var = net.encode(image)
+            drawn = net.decode(mean + torch.exp(0.5 * log_var) * torch.randn_like(mean)).float()
+        l1, edge = (drawn - clean).abs().mean(), edges(drawn, clean)
+        kl = 0.5 * (mean**2 + log_var.exp() - 1 - log_var).mean()
+        run.descend(10 * l1 + 20 * edge + 4e-4 * kl, len(batch), {"l1": l1, "edge": edge, "kl": kl})
+    run.save()
+
+
+class Latents:
+    """The clean imprints' latents, whitened per cell, computed once per sample and symmetry."""
+
+    def __init__(self, net, shards, args):
+        self.net, self.shards, self.args, self.store = net.eval(), shards, args, {}
+        chosen = np.random.default_rng(1).choice(len(shards), min(1024, len(shards)), replace=False)
+        parts = [np.sort(chosen[i:i + 32]) for i in range(0, len(chosen), 32)]
+        z, log_var = (torch.cat(x) for x in zip(*(self._raw(p, np.zeros(len(p), int)) for p in parts)))
+        self.mean = z.mean(dim=0, keepdim=True)
+        # The posterior's own spread counts too: a channel that carries little must not be blown up to full size.
+        spread = (z - self.mean) ** 2 + log_var.exp()
+        self.std = spread.mean(dim=(0, 2, 3), keepdim=True).sqrt()
+
+    @torch.no_grad()
+    def _raw(self, batch, k):
+        """Mean and log variance for samples `batch`, each turned by its own symmetry."""
+        return self.net.encode(target(self.shards, "clean", batch, k, self.args))
+
+    def take(self, batch, k):
+        pairs = list(zip(batch.tolist(), k.tolist()))
+        missing = [i for i, pair in enumerate(pairs) if pair not in self.store]
+        if missing:
+            for i, z in zip(missing, self._raw(batch[missing], k[missing])[0].half()):
+                self.store[pairs[i]] = z
+        return (torch.stack([self.store[pair] for pair in pairs]).float() - self.mean) / self.std
+
+
+def generator(args):
+    shards, rng = data.Shards(args.data), np.random.default_rng(args.seed)
+    ae = models.Autoencoder()
+    ae.load_state_dict(torch.load(Path(args.out) / "autoencoder.pt", weights_only=True)["nets"]["autoencoder"])
+    encoder, denoiser = models.ConditionEncoder(), models.Denoiser()
+    start(encoder, args, "condition_encoder")
+    start(denoiser, args, "denoiser")
+    encoder, denoiser = (n.to(memory_format=torch.channels_last) for n in (encoder, denoiser))
+    averages = {"encoder_ema": copy.deepcopy(encoder), "denoiser_ema": copy.deepcopy(denoiser)}
+    for net in averages.values():
+        net.requires_grad_(False)
+    run = Run(args, "generator", {"encoder": encoder, "denoiser": denoiser, **averages}, 7e-4)
+    latents = Latents(ae, shards, args)
+    if "latent_mean" in run.extra:
+        latents.mean, latents.std = run.extra["latent_mean"], run.extra["latent_std"]
+    elif args.start:
+        known = start(models.Autoencoder().decoder, args, "decoder", "decoder.")
+        latents.mean, latents.std = known["mean"], known["std"]
+    run.extra = {"latent_mean": latents.mean, "latent_std": latents.std}
+    bars = torch.from_numpy(diffusion.alpha_bar()).float()
+    for batch in indices(shards, rng, 16):
+        if run.over():
+            break
+        # Pairs turned and mirrored together, as the lab's own augmentation does: the colours tell which way up.
+        k = symmetries(args, rng, len(batch))
+        z, gelslim = latents.take(batch, k), condition(shards, batch, k, args, rng)
+        # Stratified steps: the batch covers the whole schedule.
+        t = ((torch.arange(len(batch)) + torch.rand(len(batch))) / len(batch) * diffusion.STEPS).long()
+        t = t[torch.randperm(len(batch))]
+        x, v = diffusion.noised(z, torch.randn_like(z), t, bars)
+        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
+            seen = encoder(gelslim)
+            guess = denoiser(x, t, seen).float()
+        loss = F.mse_loss(guess, v)
+        direct = F.mse_loss(seen[:, :models.LATENT].float(), z)
+        run.descend(loss + 0.5 * direct, len(batch), {"v": loss, "direct": direct})
+        decay = min(0.998, (1 + run.step) / (20 + run.step))
+        for average, net in ((averages["encoder_ema"], encoder), (averages["denoiser_ema"], denoiser)):
+            for a, p in zip(average.parameters(), net.parameters()):
+                a.lerp_(p.detach(), 1 - decay)
+    run.save()

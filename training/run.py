@@ -1,0 +1,136 @@
+"""What every training run shares: progress, learning rate, log, checkpoints, and the batches."""
+
+import json
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from . import data, weights
+
+
+class Run:
+    """Progress, learning rate, log and checkpoints of one training run."""
+
+    def __init__(self, args, kind, nets, rate):
+        self.args, self.kind, self.nets, self.rate = args, kind, nets, rate
+        self.out = Path(args.out)
+        self.out.mkdir(parents=True, exist_ok=True)
+        self.optimiser = torch.optim.AdamW([p for n in nets.values() for p in n.parameters() if p.requires_grad],
+                                           lr=rate, betas=(0.9, 0.99), weight_decay=0.01)
+        self.step, self.samples, self.spent, self.means, self.extra = 0, 0, 0.0, {}, {}
+        self.checkpoint = self.out / f"{kind}.pt"
+        if self.checkpoint.exists():
+            state = torch.load(self.checkpoint, weights_only=True)
+            for name, net in nets.items():
+                net.load_state_dict(state["nets"][name])
+            self.optimiser.load_state_dict(state["optimiser"])
+            self.step, self.samples, self.spent = state["step"], state["samples"], state["minutes"]
+            self.extra = state["extra"]
+        self.started = self.saved = self.logged = time.monotonic()
+
+    def minutes(self):
+        return self.spent + (time.monotonic() - self.started) / 60
+
+    def progress(self):
+        if self.args.steps:
+            return self.step / self.args.steps
+        return self.minutes() / self.args.minutes
+
+    def over(self):
+        return self.progress() >= 1
+
+    def learning_rate(self):
+        """Warm-up, then constant, then a cosine fall over the last 60 percent."""
+        fall = min(max((self.progress() - 0.4) / 0.6, 0), 1)
+        return float(self.rate * min(1, (self.step + 1) / 100) * (0.02 + 0.98 * (1 + np.cos(np.pi * fall)) / 2))
+
+    def descend(self, loss, count, figures):
+        """One optimiser step."""
+        rate = self.learning_rate()
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate
+        self.optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.optimiser.param_groups[0]["params"], 1.0)
+        self.optimiser.step()
+        self.step += 1
+        self.samples += count
+        for key, value in ((k, float(v.detach())) for k, v in figures.items()):
+            self.means[key] = 0.98 * self.means.get(key, value) + 0.02 * value
+        now = time.monotonic()
+        if now - self.logged > 20:
+            self.logged = now
+            text = " ".join(f"{k} {v:.5f}" for k, v in self.means.items())
+            with (self.out / f"{self.kind}.log").open("a") as log:
+                log.write(f"{self.minutes():.2f} min step {self.step} samples {self.samples} lr {rate:.2e} {text}\n")
+        if now - self.saved > 120:
+            self.save()
+
+    def save(self):
+        self.saved = time.monotonic()
+        state = {"nets": {k: n.state_dict() for k, n in self.nets.items()}, "optimiser": self.optimiser.state_dict(),
+                 "step": self.step, "samples": self.samples, "minutes": self.minutes(), "extra": self.extra,
+                 "losses": self.means, "seed": self.args.seed, "options": options(self.args)}
+        partial = self.checkpoint.with_suffix(".partial")
+        torch.save(state, partial)
+        os.replace(partial, self.checkpoint)
+        facts = {k: state[k] for k in ("step", "samples", "minutes", "losses", "seed", "options")}
+        (self.out / f"{self.kind}.json").write_text(json.dumps(facts, indent=1))
+
+
+def options(args):
+    """The switches that make one run differ from another, for the checkpoint and the provenance."""
+    keys = ("turned", "rotation", "flip", "geometry", "condition_noise")
+    return {k: getattr(args, k) for k in keys} | {"begun_from_a_bundle": bool(args.start)}
+
+
+def indices(shards, rng, batch):
+    """Endless batches of sample numbers; looks for new shards after each pass."""
+    while True:
+        if len(shards) < batch:
+            raise SystemExit(f"{shards.folder} holds {len(shards)} samples, fewer than one batch of {batch}")
+        order = rng.permutation(len(shards))
+        for i in range(0, len(order) - batch + 1, batch):
+            yield np.sort(order[i:i + batch])
+        shards.refresh()
+
+
+def symmetries(args, rng, count):
+    """A symmetry for each of `count` pairs: plain, or one of the turns and mirrorings that the switches allow."""
+    allowed = [k for k in range(1, 8) if (args.rotation or k % 4 == 0) and (args.flip or k < 4)]
+    if not allowed:
+        return np.zeros(count, int)
+    return np.where(rng.random(count) < args.turned, rng.choice(allowed, size=count), 0)
+
+
+def condition(shards, batch, k, args, rng):
+    """Augmented, standardised GelSlim images (N,3,128,128), channels last, turned by `k`."""
+    gelslim = shards.gelslim(batch)
+    if args.geometry == "padding":
+        gelslim = data.padded(gelslim)
+    gelslim = data.augment_gelslim(data.each_dihedral(gelslim, k), torch.from_numpy(shards.meta[batch, 6] == 0), rng)
+    if args.condition_noise:
+        gelslim = gelslim + args.condition_noise * torch.from_numpy(rng.standard_normal(gelslim.shape, dtype=np.float32))
+    return gelslim.contiguous(memory_format=torch.channels_last)
+
+
+def target(shards, key, batch, k, args):
+    """Imprints (N,1,128,128) in [-1,1], turned by `k`."""
+    image = data.to_model(shards.metres(key, batch))
+    if args.geometry == "cropping":
+        image = data.cropped(image)
+    return data.each_dihedral(image, k).contiguous(memory_format=torch.channels_last)
+
+
+def start(net, args, role, prefix=""):
+    """Fills `net` from the bundle of `--from`, if one was given; returns what else that graph holds."""
+    return weights.load(net, Path(args.start) / f"{role}.onnx", prefix) if args.start else {}
+
+
+def edges(x, y):
+    """Mean absolute difference of the two images' gradients."""
+    d = x - y
+    return d.diff(dim=2).abs().mean() + d.diff(dim=3).abs().mean()
