@@ -97,9 +97,9 @@ fn micrometres(depth: &DepthMap) -> Vec<i16> {
 
 /// The tool with longer bars to the sides and towards the wrist and shorter ones at the tip, as the real tools have.
 fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
-    let side = rng.random_range(0.9..1.6);
-    let wrist = rng.random_range(0.9..1.35);
-    let tip = rng.random_range(0.15..1.1);
+    let side = rng.random_range(1.0..1.6);
+    let wrist = rng.random_range(0.95..1.3);
+    let tip = rng.random_range(0.15..0.7);
     for p in tool.bars.iter_mut().flat_map(|bar| &mut bar.core) {
         p.x *= side;
         p.y *= if p.y > 0.0 { tip } else { wrist };

@@ -21,6 +21,9 @@ def read(path):
     """The state dict of the network that was exported to the graph at `path`."""
     graph = onnx.load(str(path)).graph
     values = {i.name: torch.from_numpy(numpy_helper.to_array(i).copy()) for i in graph.initializer}
+    for node in graph.node:
+        if node.op_type == "Cast" and node.input[0] in values and node.input[0].endswith("_f16"):
+            values[node.output[0]] = values.pop(node.input[0]).float()
     state = {k: v for k, v in values.items() if not k.startswith("onnx::")}
     for node in graph.node:
         if node.op_type not in UNNAMED:
