@@ -21,8 +21,11 @@ mod observability;
 mod planar;
 pub mod reason;
 mod register;
+mod search;
 #[cfg(test)]
 pub(crate) mod testing;
+
+use std::borrow::Cow;
 
 use glam::{DAffine3, DVec2};
 use serde::{Deserialize, Serialize};
@@ -47,8 +50,12 @@ pub const MIN_POINTS: usize = 32;
 /// What [`align`] may vary. The default is what the product uses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AlignConfig {
-    /// Poses to start from, `grasp_from_object`. Not empty.
+    /// Poses to start from, `grasp_from_object`: exactly these, and no ladder. Empty: the ladder chooses.
     pub starts: Vec<PlanarPose>,
+    /// Rungs that the ladder may use, cheapest first. With one alone, its answer is taken as it is.
+    pub rungs: Vec<Rung>,
+    /// What an answer must reach for the ladder to stop.
+    pub accept: Accept,
     /// Points used for the answer; more are thinned evenly.
     pub points: usize,
     /// Points used to rank the starts.
@@ -59,7 +66,7 @@ pub struct AlignConfig {
     pub max_iterations: usize,
     /// Best starts that are refined with all points.
     pub keep: usize,
-    /// Where the pose is expected; only used to say whether it was found there.
+    /// Where the pose is expected: what the ladder searches, and whether the answer was found there.
     pub prior: Prior,
     /// Keep per-iteration states and per-point residuals.
     pub record: bool,
@@ -67,17 +74,42 @@ pub struct AlignConfig {
 
 impl Default for AlignConfig {
     fn default() -> Self {
-        let start = |degrees: f64| PlanarPose { theta_rad: degrees.to_radians(), ..PlanarPose::default() };
         Self {
-            starts: vec![start(-15.0), start(0.0), start(15.0)],
-            points: 512,
+            starts: Vec::new(),
+            rungs: vec![Rung::Single, Rung::Several, Rung::Grid],
+            accept: Accept::default(),
+            points: 2048,
             scout_points: 128,
-            kernels_m: vec![4e-3, 2e-3, 1e-3],
+            kernels_m: vec![8e-3, 2e-3, 1e-3],
             max_iterations: 20,
             keep: 2,
             prior: Prior::default(),
             record: false,
         }
+    }
+}
+
+/// What an answer must reach to be believed without further search. Costs are shares of the squared kernel width,
+/// so 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Accept {
+    /// Greatest cost per point after one start.
+    pub cost: f64,
+    /// Smallest share of points within the kernel's width after one start.
+    pub inliers: f64,
+    /// The same when several starts or a grid agree on the answer: then it is the mask that is bad, not the search.
+    pub cost_searched: f64,
+    /// The same.
+    pub inliers_searched: f64,
+    /// Smallest eigenvalue of [`Observability`].
+    pub weakest: f64,
+}
+
+impl Default for Accept {
+    /// On spoilt masks, right answers cost 0.005 to 0.24 and keep 78 to 100 % of their points; wrong minima cost at
+    /// least 0.29 and keep at most 68 %.
+    fn default() -> Self {
+        Self { cost: 0.2, inliers: 0.8, cost_searched: 0.26, inliers_searched: 0.72, weakest: DEGENERATE_BELOW }
     }
 }
 
@@ -431,28 +463,33 @@ pub struct Distances {
 }
 
 /// Centroid and size of the finite points, computed about a local origin in f64.
-struct Cleaned {
-    /// Finite points.
-    points: Vec<DVec2>,
+struct Cleaned<'a> {
+    /// Finite points: the offered ones where all are.
+    points: Cow<'a, [DVec2]>,
     centroid: DVec2,
     not_finite: usize,
 }
 
 /// Drops points that are not finite and refuses sets without a size.
-fn clean(points: &[DVec2], needed: usize) -> Result<Cleaned, AlignError> {
+fn clean(points: &[DVec2], needed: usize) -> Result<Cleaned<'_>, AlignError> {
     /// Four cells of the field: below this no outline can be told from a dot.
     const MIN_EXTENT_M: f64 = 4.0 * field::CELL_M;
     // Larger coordinates would lose the millimetres that matter; no gripper is a kilometre long.
     const MAX_COORDINATE_M: f64 = 1e6;
-    let finite: Vec<DVec2> =
-        points.iter().copied().filter(|p| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE_M).collect();
-    let got = finite.len();
+    // False for NaN too.
+    let usable = |p: &DVec2| p.x.abs() <= MAX_COORDINATE_M && p.y.abs() <= MAX_COORDINATE_M;
+    let got = points.iter().filter(|p| usable(p)).count();
     if got < needed {
         return Err(AlignError::TooFewPoints { got, needed });
     }
+    let finite: Cow<'_, [DVec2]> = if got == points.len() {
+        Cow::Borrowed(points)
+    } else {
+        Cow::Owned(points.iter().copied().filter(usable).collect())
+    };
     let origin = finite[0];
     let (mut sum, mut low, mut high) = (DVec2::ZERO, DVec2::ZERO, DVec2::ZERO);
-    for p in &finite {
+    for p in finite.iter() {
         let p = *p - origin;
         sum += p;
         low = low.min(p);

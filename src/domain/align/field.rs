@@ -4,6 +4,8 @@
 //! the stored distances are exact: to the nearest projected edge. Inside they are exact to about a tenth of a
 //! millimetre, which is enough because registration charges nothing there.
 
+pub(super) mod batch;
+
 use glam::DVec2;
 
 use crate::domain::mesh::TriMesh;

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::field::batch::{Cloud, State};
 use super::{ANGLE_SCALE_M, DistanceField};
 use crate::domain::frames::PlanarPose;
 
@@ -112,38 +113,43 @@ pub struct MotionEllipse {
 /// Looks at the slopes of all points near the outline, at the given pose. Points are `(y, z)`, metres, grasp frame;
 /// those that are not finite are ignored. Too few telling points count as degenerate with zero eigenvalues.
 pub fn observability(points_yz: &[DVec2], field: &DistanceField, grasp_from_object: PlanarPose) -> Observability {
-    let object_from_grasp = grasp_from_object.inverse();
-    let turn = DVec2::from_angle(grasp_from_object.theta_rad);
-    let mut centre = DVec2::ZERO;
-    let telling: Vec<(DVec2, DVec2)> = points_yz
-        .iter()
-        .filter_map(|&p| {
-            let sample = field.sample(object_from_grasp.transform_yz(p));
-            let near = sample.on_grid && (0.0..=REACH_M).contains(&sample.distance);
-            near.then(|| (p, turn.rotate(sample.gradient)))
-        })
-        .inspect(|(p, _)| centre += *p)
-        .collect();
-    if telling.len() < MIN_TELLING {
+    let finite: Vec<DVec2> = points_yz.iter().copied().filter(|p| p.is_finite()).collect();
+    let centroid = finite.iter().sum::<DVec2>() / finite.len().max(1) as f64;
+    let cloud = Cloud::new(finite.iter().map(|p| *p - centroid));
+    of_cloud(&cloud, centroid, field, State::from_pose(grasp_from_object, centroid))
+}
+
+/// The same for a cloud about its centroid (`(y, z)`, metres, grasp frame).
+pub(super) fn of_cloud(cloud: &Cloud, centroid: DVec2, field: &DistanceField, state: State) -> Observability {
+    let moments = field.moments(cloud, state, REACH_M);
+    let count = moments.count;
+    // From the object frame, where the field is, back to the hand.
+    let turn = DVec2::from_angle(-state.phi);
+    let arm = if count > 0 { moments.arms / count as f64 } else { DVec2::ZERO };
+    let centre = centroid + turn.rotate(arm);
+    if count < MIN_TELLING {
         return Observability {
             eigenvalues: [0.0; 3],
             weakest: [0.0, 1.0, 0.0],
             motions: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
-            centre: if telling.is_empty() { DVec2::ZERO } else { centre / telling.len() as f64 },
-            telling: telling.len(),
+            centre,
+            telling: count,
             degenerate: true,
         };
     }
-    centre /= telling.len() as f64;
-    let mut h = [[0.0; 3]; 3];
-    for (p, gradient) in &telling {
-        let j = [gradient.dot((*p - centre).perp()) / ANGLE_SCALE_M, gradient.x, gradient.y];
-        for (row, a) in h.iter_mut().zip(j) {
-            for (cell, b) in row.iter_mut().zip(j) {
-                *cell += a * b / telling.len() as f64;
-            }
-        }
-    }
+    // Slopes by the angle were taken about the centroid; about the telling points' own centre they are
+    // j0 - slope . perp(arm).
+    let [m00, m01, m02, m11, m12, m22] = moments.products.map(|m| m / count as f64);
+    let p = arm.perp();
+    let h01 = m01 - (m11 * p.x + m12 * p.y);
+    let h02 = m02 - (m12 * p.x + m22 * p.y);
+    let h00 = m00 - 2.0 * (m01 * p.x + m02 * p.y) + m11 * p.x * p.x + 2.0 * m12 * p.x * p.y + m22 * p.y * p.y;
+    let cross = turn.rotate(DVec2::new(h01, h02)) / ANGLE_SCALE_M;
+    let (c, s) = (turn.x, turn.y);
+    let h11 = c * c * m11 - 2.0 * c * s * m12 + s * s * m22;
+    let h12 = c * s * (m11 - m22) + (c * c - s * s) * m12;
+    let h22 = s * s * m11 + 2.0 * c * s * m12 + c * c * m22;
+    let h = [[h00 / (ANGLE_SCALE_M * ANGLE_SCALE_M), cross.x, cross.y], [cross.x, h11, h12], [cross.y, h12, h22]];
     let (eigenvalues, vectors) = eigen_symmetric(h);
     // A mean of squares: below zero is rounding.
     let eigenvalues = eigenvalues.map(|e| e.max(0.0));
@@ -152,7 +158,7 @@ pub fn observability(points_yz: &[DVec2], field: &DistanceField, grasp_from_obje
         weakest: vectors[0],
         motions: vectors,
         centre,
-        telling: telling.len(),
+        telling: count,
         degenerate: eigenvalues[0] < DEGENERATE_BELOW,
     }
 }

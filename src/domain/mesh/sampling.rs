@@ -53,11 +53,20 @@ pub fn spread(len: usize, count: usize) -> Vec<usize> {
     if len <= count {
         return (0..len).collect();
     }
+    // Block borders are i * len / count, counted up instead of divided out.
+    let (whole, part) = (len / count, len % count);
+    let (mut from, mut carry) = (0, 0);
     (0..count)
         .map(|i| {
-            let (from, to) = (i * len / count, (i + 1) * len / count);
+            carry += part;
+            let over = usize::from(carry >= count);
+            carry -= over * count;
+            let to = from + whole + over;
             let hash = (i as u64).wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            from + ((hash ^ (hash >> 31)) % (to - from) as u64) as usize
+            let hash = hash ^ (hash >> 31);
+            let chosen = from + (((hash >> 32) * (to - from) as u64) >> 32) as usize;
+            from = to;
+            chosen
         })
         .collect()
 }

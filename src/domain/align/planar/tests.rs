@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::domain::align::testing::{cross, cross_contacts, cuboid, disc, filled};
+use crate::domain::align::{Stop, TraceStep};
 use crate::domain::units::angle_error;
 
 fn field() -> &'static DistanceField {
@@ -49,19 +50,21 @@ proptest! {
     ) {
         let truth = pose(7.0, 0.002, -0.003);
         let points = cross_contacts(600, truth, 3e-4, seed);
-        let still = align(&points, field(), &AlignConfig::default()).unwrap();
+        let starts = [-15.0, 0.0, 15.0].map(|d| pose(d, 0.0, 0.0)).to_vec();
+        let still = align(&points, field(), &AlignConfig { starts, ..AlignConfig::default() }).unwrap();
         let motion = pose(degrees, y, z);
         let moved: Vec<DVec2> = points.iter().map(|p| motion.transform_yz(*p)).collect();
-        let mut config = AlignConfig::default();
-        config.starts = config.starts.iter().map(|s| compose(motion, *s)).collect();
+        let starts = [-15.0, 0.0, 15.0].map(|d| compose(motion, pose(d, 0.0, 0.0))).to_vec();
+        let config = AlignConfig { starts, ..AlignConfig::default() };
         let report = align(&moved, field(), &config).unwrap();
         let (angle, _) = errors(report.grasp_from_object, compose(motion, still.grasp_from_object));
-        prop_assert!(angle < 1e-4, "{angle} deg off after {motion:?}");
+        // The look-ups are in f32: rounding may end a descent one step of some micrometres earlier.
+        prop_assert!(angle < 0.02, "{angle} deg off after {motion:?}");
         // Where the tool's points end up, rather than the translation: that one is about a far origin.
         let corner = DVec2::new(0.01, 0.02);
         let expected = motion.transform_yz(still.grasp_from_object.transform_yz(corner));
         let distance = report.grasp_from_object.transform_yz(corner).distance(expected);
-        prop_assert!(distance < 1e-6, "{distance} m off after {motion:?}");
+        prop_assert!(distance < 1e-5, "{distance} m off after {motion:?}");
     }
 
     #[test]
@@ -167,8 +170,11 @@ fn settings_that_make_no_sense_are_refused() {
         align(&points, field(), &config).map(|_| ())
     };
     assert_eq!(with(|_| ()), Ok(()));
-    assert_eq!(with(|c| c.starts.clear()), Err(AlignError::Config { what: "starts" }));
-    assert_eq!(with(|c| c.starts[0].y_m = f64::NAN), Err(AlignError::Config { what: "starts" }));
+    assert_eq!(with(|c| c.starts = vec![pose(0.0, f64::NAN, 0.0)]), Err(AlignError::Config { what: "starts" }));
+    assert_eq!(with(|c| c.rungs.clear()), Err(AlignError::Config { what: "rungs" }));
+    assert_eq!(with(|c| c.rungs = vec![Rung::Fixed]), Err(AlignError::Config { what: "rungs" }));
+    assert_eq!(with(|c| c.prior.shift_m = 0.0), Err(AlignError::Config { what: "prior" }));
+    assert_eq!(with(|c| c.prior.theta_rad = f64::INFINITY), Err(AlignError::Config { what: "prior" }));
     assert_eq!(with(|c| c.kernels_m.clear()), Err(AlignError::Config { what: "kernels_m" }));
     assert_eq!(with(|c| c.kernels_m[1] = 0.0), Err(AlignError::Config { what: "kernels_m" }));
     assert_eq!(with(|c| c.points = 3), Err(AlignError::Config { what: "points" }));
@@ -180,9 +186,11 @@ fn settings_that_make_no_sense_are_refused() {
 #[test]
 fn recording_changes_nothing_and_tells_the_whole_way() {
     let points = cross_contacts(900, pose(15.0, 0.003, -0.001), 3e-4, 9);
-    let plain = align(&points, field(), &AlignConfig::default()).unwrap();
-    assert!(plain.trace.is_empty() && plain.fits.is_empty());
-    let config = AlignConfig { record: true, ..AlignConfig::default() };
+    let starts = [-15.0, 0.0, 15.0].map(|d| pose(d, 0.0, 0.0)).to_vec();
+    let config = AlignConfig { starts, ..AlignConfig::default() };
+    let plain = align(&points, field(), &config).unwrap();
+    assert_eq!((plain.trace.capacity(), plain.fits.capacity(), plain.ladder.len()), (0, 0, 0));
+    let config = AlignConfig { record: true, ..config };
     let recorded = align(&points, field(), &config).unwrap();
     assert_eq!(plain, AlignReport { trace: Vec::new(), fits: Vec::new(), ..recorded.clone() });
     assert_eq!(recorded.fits.len(), points.len());
