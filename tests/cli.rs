@@ -4,6 +4,10 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
+use touch2touch::domain::frames::PlanarPose;
+use touch2touch::domain::hand::{AcceptedPose, HandPose};
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::masks::{MaskStore, StoredReview};
 
 use crate::support;
 
@@ -68,6 +72,23 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     assert!(report["trace"].as_array().unwrap().len() > 3, "the start and some iterations");
     assert!(report["fits"].as_array().unwrap().len() > 100, "each point's residual");
     assert!(cases[0].get("report").is_none(), "nothing is recorded unless asked for");
+
+    // What a person accepted in the studio stands beside what was registered.
+    assert!(cases[0].get("accepted").is_none());
+    let store = MaskStore::for_dataset(&Dataset::open(&set).unwrap()).unwrap();
+    let planar = PlanarPose { theta_rad: -0.1, y_m: 0.001, z_m: 0.002 };
+    let pose = HandPose { pitch_rad: 0.05, ..planar.into() };
+    let accepted = [Some(AcceptedPose { pose, by_hand: true }), None];
+    let name = cases[0]["name"].as_str().unwrap();
+    store.save_review(name, &StoredReview { review: "todo".into(), accepted }).unwrap();
+    let labelled = json(&run(&["pose", set_text, "--json"], data_path));
+    let cases: Vec<&Value> =
+        labelled["cases"].as_array().unwrap().iter().filter(|c| !c["accepted"].is_null()).collect();
+    assert_eq!(cases.len(), 1);
+    let found = &cases[0]["accepted"];
+    assert_eq!((cases[0]["name"].as_str(), found["by_hand"].as_bool()), (Some(name), Some(true)));
+    assert!((found["angle_deg"].as_f64().unwrap() - 0.1f64.to_degrees()).abs() < 1e-9, "{found}");
+    assert!(found["error_deg"].is_number() && found["grasp_from_object"]["pitch_rad"] == 0.05, "{found}");
 
     let masks = dir.path().join("masks");
     let nothing = run(&["masks", "export", "--input", set_text, "--out", masks.to_str().unwrap()], data_path);

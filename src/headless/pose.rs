@@ -15,11 +15,13 @@ use super::{Common, Output, VerbResult};
 use crate::domain::align::AlignReport;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::hand::{AcceptedPose, HandPose};
 use crate::domain::metrics::AngleSummary;
 use crate::domain::pose::{self, Engine, FingerInput, ToolModel};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
+use crate::io::masks::MaskStore;
 
 /// Arguments of `pose`.
 #[derive(Debug, Args)]
@@ -93,8 +95,38 @@ struct Case {
     z_m: Option<f64>,
     ms: f64,
     stop: String,
+    /// What a person accepted for this imprint in the studio, where there are labels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    accepted: Option<Accepted>,
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<AlignReport>,
+}
+
+/// An accepted pose in the sense of the other numbers of a [`Case`].
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Accepted {
+    /// Whether a person set it, rather than took over what a registration answered.
+    by_hand: bool,
+    angle_deg: f64,
+    error_deg: Option<f64>,
+    y_m: f64,
+    z_m: f64,
+    /// All six numbers as they are stored.
+    grasp_from_object: HandPose,
+}
+
+impl Accepted {
+    fn new(accepted: AcceptedPose, truth_rad: Option<f64>) -> Self {
+        let found = accepted.pose.planar.inverse();
+        Self {
+            by_hand: accepted.by_hand,
+            angle_deg: found.theta_rad.to_degrees(),
+            error_deg: truth_rad.map(|t| angle_error(found.theta_rad, t).to_degrees()),
+            y_m: found.y_m,
+            z_m: found.z_m,
+            grasp_from_object: accepted.pose,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -133,6 +165,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let mut predictor = Predictor::new(&args.model);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
     let mut cases = Vec::new();
+    let store = MaskStore::for_dataset(&dataset).ok();
     let mut complete = true;
     for id in ids {
         let entry = &dataset.index.pairs[id];
@@ -161,8 +194,16 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             complete = false;
             continue;
         };
+        // Labels beside the data, made in the studio; a damaged file is said and does not hold up the poses.
+        let reviewed = store.as_ref().and_then(|store| {
+            store.load_review(&entry.name).unwrap_or_else(|err| {
+                output.note(&format!("{}: {err}", entry.name));
+                None
+            })
+        });
         for &imprint in imprints {
-            match pose_cases(args, &entry.name, &sample, tool, imprint, engines, &mut predictor) {
+            let accepted = reviewed.as_ref().and_then(|r| r.accepted[usize::from(imprint == "predicted")]);
+            match pose_cases(args, &entry.name, &sample, tool, (imprint, accepted), engines, &mut predictor) {
                 Ok(found) => {
                     complete &= found.iter().all(|c| c.angle_deg.is_some());
                     cases.extend(found);
@@ -193,7 +234,7 @@ fn pose_cases(
     name: &str,
     sample: &Sample,
     tool: &ToolModel,
-    imprint: &'static str,
+    (imprint, accepted): (&'static str, Option<AcceptedPose>),
     engines: &[Engine],
     predictor: &mut Predictor,
 ) -> anyhow::Result<Vec<Case>> {
@@ -231,6 +272,7 @@ fn pose_cases(
                     Ok(r) => r.report.stop.to_string(),
                     Err(err) => err.to_string(),
                 },
+                accepted: accepted.map(|a| Accepted::new(a, truth)),
                 report: result.ok().map(|r| r.report).filter(|_| args.trace),
             }
         })

@@ -25,6 +25,7 @@ use crate::app::services::SharedServices;
 use crate::app::settings::{Theme, Workspace};
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
+use crate::domain::hand::PoseDifference;
 
 /// How the studio is started.
 pub struct Options {
@@ -230,9 +231,18 @@ impl StudioApp {
         let Some(key) = self.state.pair_key() else { return };
         let mut seen = self.local.seen.get(&key).copied().unwrap_or_default();
         for source in ImprintSource::iter() {
+            let at = source as usize;
             if let Some(pose) = self.state.pose(source).ready() {
-                seen.error_rad[source as usize] = pose.error_rad;
-                seen.angle_rad[source as usize] = Some(pose.angle_rad);
+                seen.error_rad[at] = pose.error_rad;
+                seen.angle_rad[at] = Some(pose.angle_rad);
+                // What a person set counts before what was registered.
+                let hand = self.state.by_hand(source);
+                seen.by_hand[at] = hand.is_some();
+                if let Some(hand) = hand {
+                    let off = self.state.truth().map(|truth| PoseDifference::between(hand.planar, truth));
+                    seen.error_rad[at] = off.map(|d| d.angle_rad);
+                    seen.angle_rad[at] = Some(hand.planar.inverse().theta_rad);
+                }
             }
         }
         if seen != SeenPose::default() {

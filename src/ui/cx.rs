@@ -79,6 +79,8 @@ pub(super) struct SeenPose {
     pub error_rad: [Option<f64>; 2],
     /// The angle, radians, by imprint source.
     pub angle_rad: [Option<f64>; 2],
+    /// Whether a person set the pose, by imprint source.
+    pub by_hand: [bool; 2],
 }
 
 /// Points as the renderer takes them, made once per cloud.

@@ -28,10 +28,10 @@ pub(super) const RESIDUAL_MAP: ColorMap = ColorMap::Viridis;
 pub(super) fn reason_rgb(reason: Reason) -> [u8; 3] {
     match reason {
         Reason::Inlier => [0x00, 0x9e, 0x73],
-        Reason::Inside => [0x56, 0xb4, 0xe9],
+        Reason::Inside => [0xf0, 0xe4, 0x42],
         Reason::BeyondGate => [0xd5, 0x5e, 0x00],
         Reason::Trimmed => [0xcc, 0x79, 0xa7],
-        Reason::OutOfFrame => [0xf0, 0xe4, 0x42],
+        Reason::OutOfFrame => [0x00, 0x72, 0xb2],
         Reason::InvalidDepth => [0xe8, 0xe8, 0xe8],
         Reason::OutsideMask => [0x70, 0x70, 0x70],
     }

@@ -36,6 +36,8 @@ struct Row {
     finger: Option<Finger>,
     review: Review,
     numbers: [Option<f64>; 5],
+    /// Whether the poses were set by hand.
+    by_hand: [bool; 2],
 }
 
 /// The pane.
@@ -86,6 +88,7 @@ fn rows(cx: &Cx<'_>) -> Vec<Row> {
             finger,
             review: state.document.review(&entry.name),
             numbers: [image[0], image[1], image[2], angle(ImprintSource::Measured), angle(ImprintSource::Predicted)],
+            by_hand: seen.by_hand,
         })
     };
     for (touch, recipe) in &state.results.chosen {
@@ -224,7 +227,10 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: &Row) {
                 let v = row.numbers[i - 3];
                 let decimals = [1, 3, 2, 1, 1][i - 3];
                 let (text, color) = match v {
-                    Some(v) if i >= 6 => (format!("{v:.decimals$}"), error_color(p, v.to_radians())),
+                    Some(v) if i >= 6 => {
+                        let hand = if row.by_hand[i - 6] { "by hand " } else { "" };
+                        (format!("{hand}{v:.decimals$}"), error_color(p, v.to_radians()))
+                    }
                     Some(v) => (format!("{v:.decimals$}"), p.strong),
                     None => ("–".to_owned(), p.weak),
                 };
@@ -260,6 +266,7 @@ mod tests {
             finger: None,
             review: Review::Todo,
             numbers: [v, None, None, None, None],
+            by_hand: [false; 2],
         };
         for down in [false, true] {
             let mut rows = vec![row(0, None), row(1, Some(2.0)), row(2, Some(1.0))];

@@ -3,7 +3,9 @@
 use touch2touch::app::command::Command;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{MaskSource, Theme, Workspace};
+use touch2touch::app::workbench::{Layer, SceneTool, WorkbenchCommand};
 use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::hand::HandAxis;
 
 use super::rig::Rig;
 
@@ -44,6 +46,20 @@ fn pictures_for_the_docs() {
         rig.shoot(&format!("{name}-demo-inspect"));
         rig.send(Command::SetWorkspace(Workspace::Align));
         rig.shoot(&format!("{name}-demo-align"));
+        for layer in [Layer::Residuals, Layer::Reasons] {
+            rig.send(Command::Workbench(WorkbenchCommand::SetLayer(layer)));
+            rig.shoot(&format!("{name}-demo-align-{}", layer.name()).to_lowercase());
+        }
+        rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
+        rig.send(Command::Workbench(WorkbenchCommand::SetBothClouds(true)));
+        rig.shoot(&format!("{name}-demo-align-both"));
+        rig.send(Command::Workbench(WorkbenchCommand::SetBothClouds(false)));
+        rig.send(Command::Workbench(WorkbenchCommand::SetTool(SceneTool::Pose)));
+        rig.send(Command::Workbench(WorkbenchCommand::SetSixDof(true)));
+        rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::Y, 0.002)));
+        rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::Pitch, 0.1)));
+        rig.shoot(&format!("{name}-demo-align-hand"));
+        rig.send(Command::Workbench(WorkbenchCommand::SetTool(SceneTool::Look)));
         rig.send(Command::SetWorkspace(Workspace::Label));
         rig.shoot(&format!("{name}-demo-label"));
         rig.send(Command::SetMaskSource(MaskSource::Unet));

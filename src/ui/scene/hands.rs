@@ -52,8 +52,9 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
     }
     let hand = bench.hand(source).cloned();
     let pose = hand.as_ref().map_or_else(|| cx.state.hand_begins(source), |hand| hand.pose);
-    let size = vec2((rect.width() - 44.0).min(430.0), 84.0);
-    let place = Rect::from_min_size(pos2(rect.left() + 8.0, rect.bottom() - 84.0 - size.y), size);
+    let lines = if pose.is_planar() { 4.0 } else { 5.0 };
+    let size = vec2((rect.width() - 44.0).min(430.0), 30.0 + 14.0 * lines);
+    let place = Rect::from_min_size(pos2(rect.left() + 8.0, rect.bottom() - 90.0 - size.y), size);
     let builder = UiBuilder::new().max_rect(place).id_salt(("hand", source as usize));
     ui.scope_builder(builder, |ui| {
         ui.painter().rect(place, 4.0, cx.p.panel.gamma_multiply(0.95), (1.0, cx.p.accent), egui::StrokeKind::Inside);
@@ -61,8 +62,16 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
         ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
             ui.set_clip_rect(place.intersect(ui.clip_rect()));
             ui.spacing_mut().item_spacing = vec2(4.0, 1.0);
-            ui.label(RichText::new(place_text(pose)).size(12.0).color(cx.p.strong));
-            let (text, color) = cost_text(cx, hand.as_ref(), pose);
+            let mut text = place_text(pose);
+            if let Some(off) = off_truth(cx.state, pose) {
+                let (angle, position) = (units::text_deg(off.angle_rad), units::text_mm(off.position_m));
+                text += &format!("   ({angle}, {position} off truth)");
+            }
+            ui.label(RichText::new(text).size(SMALL).color(cx.p.strong));
+            if !pose.is_planar() {
+                ui.label(RichText::new(tilt_text(pose)).size(SMALL).color(cx.p.strong));
+            }
+            let (text, color) = cost_text(cx, hand.as_ref());
             ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(
                 "Outline: distance of the contact points to the tool's outline in the plane, inside counted as zero. \
                  Surface: distance to the tool's surface in space. Of at most 512 contact points",
@@ -95,40 +104,29 @@ fn small_button(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, source
     }
 }
 
-/// The six numbers, those out of the plane only where they are not zero.
+/// The three numbers out of the plane.
+fn tilt_text(pose: HandPose) -> String {
+    let (pitch, yaw) = (pose.pitch_rad.to_degrees(), pose.yaw_rad.to_degrees());
+    format!("x {:+.2} mm   pitch {pitch:+.1}°   yaw {yaw:+.1}°", units::mm(pose.x_m))
+}
+
+/// The three numbers in the plane.
 pub(super) fn place_text(pose: HandPose) -> String {
     let planar = pose.planar;
     // The angle as everywhere on screen: of the tool's inverse motion, as the lab reports it.
     let angle = planar.inverse().theta_rad;
-    let mut text = format!(
-        "y {:+.2}  z {:+.2} mm   angle {:+.1}°",
-        units::mm(planar.y_m),
-        units::mm(planar.z_m),
-        angle.to_degrees()
-    );
-    if !pose.is_planar() {
-        text += &format!(
-            "   x {:+.2} mm  pitch {:+.1}°  yaw {:+.1}°",
-            units::mm(pose.x_m),
-            pose.pitch_rad.to_degrees(),
-            pose.yaw_rad.to_degrees()
-        );
-    }
-    text
+    format!("y {:+.2}  z {:+.2} mm   angle {:+.1}°", units::mm(planar.y_m), units::mm(planar.z_m), angle.to_degrees())
 }
 
-/// What the pose costs, against where it began; and how far it is off the truth, where that is known.
-fn cost_text(cx: &Cx<'_>, hand: Option<&HandTry>, pose: HandPose) -> (String, Color32) {
+/// What the pose costs, against where it began.
+fn cost_text(cx: &Cx<'_>, hand: Option<&HandTry>) -> (String, Color32) {
     let Some(hand) = hand else {
         return ("Move the tool by keys or by its handles".into(), cx.p.weak);
     };
-    let mut text = match (hand.cost, hand.began_cost) {
+    let text = match (hand.cost, hand.began_cost) {
         (Some(now), Some(before)) => costs(now, before),
         _ => "cost: the contact points are not there yet".into(),
     };
-    if let Some(off) = off_truth(cx.state, pose) {
-        text += &format!(" · off truth {} {}", units::text_deg(off.angle_rad), units::text_mm(off.position_m));
-    }
     let better = hand.cost.zip(hand.began_cost).is_some_and(|(a, b)| a.cost_m2 <= b.cost_m2);
     (text, if better { cx.p.good } else { cx.p.caution })
 }

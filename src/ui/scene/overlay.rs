@@ -31,7 +31,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, output: 
     axes_and_scale(cx.p, &painter, &camera, output, rect);
     let mut y = rect.top() + 8.0;
     let x = rect.left() + 10.0;
-    let width = rect.width() - 20.0;
+    // The buttons at the right edge stay free.
+    let width = rect.width() - 52.0;
     let mut write = |text: String, size: f32, color: Color32| {
         let font = FontId::proportional(size);
         let galley = painter.layout(text, font, color, width);
