@@ -76,6 +76,7 @@ impl Rig {
         rig.send(Command::LogSeen(u64::MAX));
         rig.send(Command::SetMaskSource(MaskSource::Truth));
         rig.send(Command::SetWorkspace(Workspace::Align));
+        rig.front("Layers");
         let middle = rig.in_view([0.5, 0.5]);
         rig.move_to(middle);
         rig.send(Command::Ui(UiRequest::Camera(CameraPreset::Right)));
@@ -83,6 +84,13 @@ impl Rig {
         assert!(rig.model().pose(MEASURED).ready().is_some());
         assert_eq!(rig.model().workbench.side, MEASURED, "the pointer says which side");
         Some(rig)
+    }
+
+    /// Brings the tab of a pane to the front, wherever the workspace has it.
+    fn front(&mut self, tab: &str) {
+        self.harness.get_all_by_label(tab).next().unwrap_or_else(|| panic!("no tab {tab:?}")).click();
+        self.harness.step();
+        self.settle();
     }
 
     fn asks_to_repaint(&self) -> bool {
@@ -291,12 +299,11 @@ fn what_no_pane_shows_is_not_computed_and_rest_is_rest() {
     assert!(rig.model().pose(MEASURED).ready().is_some());
     assert!(rig.model().results.runs.is_empty() && rig.model().results.layers.is_empty());
     rig.send(Command::SetWorkspace(Workspace::Align));
+    rig.front("Layers");
     assert_eq!(rig.model().results.layers.len(), 1, "for the side in hand, not for both");
     assert!(!rig.model().selection.panes.contains(&Pane::Poses));
     let clouds = rig.model().results.clouds.len();
-    rig.harness.get_all_by_label("Poses").next().unwrap().click();
-    rig.harness.step();
-    rig.settle();
+    rig.front("Poses");
     assert!(rig.model().selection.panes.contains(&Pane::Poses));
     assert_eq!(rig.model().results.clouds.len(), clouds + 2, "one more for each finger");
     let truth = rig.model().truth().unwrap();

@@ -53,7 +53,7 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
     let hand = bench.hand(source).cloned();
     let pose = hand.as_ref().map_or_else(|| cx.state.hand_begins(source), |hand| hand.pose);
     let lines = if pose.is_planar() { 4.0 } else { 5.0 };
-    let size = vec2((rect.width() - 44.0).min(430.0), 30.0 + 14.0 * lines);
+    let size = vec2((rect.width() - 44.0).min(430.0), 17.0 + 14.0 * lines);
     let place = Rect::from_min_size(pos2(rect.left() + 8.0, rect.bottom() - 90.0 - size.y), size);
     let builder = UiBuilder::new().max_rect(place).id_salt(("hand", source as usize));
     ui.scope_builder(builder, |ui| {
