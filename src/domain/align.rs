@@ -12,6 +12,7 @@
 
 pub mod basin;
 pub mod both_ways;
+mod certify;
 pub mod correspond;
 pub mod field;
 pub mod icp;
@@ -66,23 +67,37 @@ pub struct AlignConfig {
     pub max_iterations: usize,
     /// Best starts that are refined with all points.
     pub keep: usize,
+    /// Look-ups after which a proof is given up.
+    pub budget: usize,
+    /// Share of the cost by which an answer may miss the best and still count as proved.
+    pub gap: f64,
     /// Where the pose is expected: what the ladder searches, and whether the answer was found there.
     pub prior: Prior,
     /// Keep per-iteration states and per-point residuals.
     pub record: bool,
 }
 
+impl AlignConfig {
+    /// The answer with a proof: branch and bound over the prior, whatever a cheaper search would say. Some ten to
+    /// a hundred milliseconds.
+    pub fn certified() -> Self {
+        Self { rungs: vec![Rung::Certified], ..Self::default() }
+    }
+}
+
 impl Default for AlignConfig {
     fn default() -> Self {
         Self {
             starts: Vec::new(),
-            rungs: vec![Rung::Single, Rung::Several, Rung::Grid],
+            rungs: vec![Rung::Single, Rung::Several, Rung::Grid, Rung::Certified],
             accept: Accept::default(),
             points: 2048,
             scout_points: 128,
             kernels_m: vec![8e-3, 2e-3, 1e-3],
             max_iterations: 20,
             keep: 2,
+            budget: 30_000_000,
+            gap: 0.02,
             prior: Prior::default(),
             record: false,
         }
@@ -280,7 +295,10 @@ pub struct RungAttempt {
 pub struct Certificate {
     /// Whether no pose in the box is cheaper by more than the gap. `false`: the budget was used up first.
     pub certified: bool,
-    /// Cost per point of the answer, square metres.
+    /// Points that the costs are about: thinned, so that the proof takes milliseconds. The answer is then refined
+    /// on all.
+    pub points: usize,
+    /// Cost per point of the best pose found, square metres.
     pub cost_m2: f64,
     /// No pose in the box costs less than this per point, square metres; proved even where `certified` is false.
     pub lower_bound_m2: f64,

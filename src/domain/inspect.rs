@@ -52,7 +52,7 @@ pub fn basin_map(
 
 /// Whether the registration compares with the silhouette's field rather than with model points.
 pub fn uses_field(engine: Engine) -> bool {
-    engine == Engine::DistanceField
+    matches!(engine, Engine::DistanceField | Engine::Certified)
 }
 
 /// What contact points are compared with at any step of a run, prepared once per tool.

@@ -36,6 +36,8 @@ pub enum Engine {
     /// Robust registration on the distance field of the tool's silhouette.
     #[default]
     DistanceField,
+    /// The same with a proof by branch and bound.
+    Certified,
     /// The lab's planar point-to-point loop.
     LabIcp,
     /// Point to point on the silhouette.
@@ -62,6 +64,7 @@ impl Engine {
     pub fn label(self) -> &'static str {
         match self {
             Self::DistanceField => "ICP (distance field)",
+            Self::Certified => "ICP (distance field), certified",
             Self::LabIcp => "ICP (paper)",
             Self::PlanarPointToPoint => "ICP point-point, planar",
             Self::PlanarPointToPlane => "ICP point-plane, planar",
@@ -76,6 +79,9 @@ impl Engine {
     pub fn description(self) -> &'static str {
         match self {
             Self::DistanceField => "Robust least squares on the distance field of the silhouette: the default",
+            Self::Certified => {
+                "The default's answer with a proof: branch and bound, no pose of the prior is 2 % better"
+            }
             Self::LabIcp => "The paper's loop: planar point to point, one start, up to 200 iterations, no rejection",
             Self::PlanarPointToPoint => {
                 "Planar, nearest model points, far pairs left out, closed-form steps, ten starts"
@@ -92,6 +98,7 @@ impl Engine {
     pub fn registration(self) -> Box<dyn Register> {
         match self {
             Self::DistanceField => Box::new(AlignConfig::default()),
+            Self::Certified => Box::new(AlignConfig::certified()),
             Self::LabIcp => Box::new(LabIcpConfig::default()),
             Self::PlanarPointToPoint => Box::new(IcpConfig::planar_point_to_point()),
             Self::PlanarPointToPlane => Box::new(IcpConfig::planar_point_to_plane()),

@@ -6,18 +6,19 @@
 //! is already close.
 //!
 //! Why a ladder: one start in the middle of the prior finds the best pose of nearly every grasp. An answer that does
-//! not look right is checked by five starts, then by a grid. A direction that the points leave open (a straight rod
+//! not look right is checked by five starts, then by a grid, then by branch and bound. A direction that the points leave open (a straight rod
 //! slides) is no reason to climb when everything else fits: a search finds lower costs, and along the valley there is
 //! none, so such an answer is taken and flagged.
 
 use glam::DVec2;
 
+use super::certify::certify;
 use super::field::batch::{Cloud, State};
 use super::observability::of_cloud;
 use super::search::{Progress, Search};
 use super::{
-    AlignConfig, AlignError, AlignReport, DistanceField, Fate, MIN_POINTS, Observability, PointFit, Prior, Run, Rung,
-    RungAttempt, Verdict, clean,
+    AlignConfig, AlignError, AlignReport, Certificate, DistanceField, Fate, MIN_POINTS, Observability, PointFit, Prior,
+    Run, Rung, RungAttempt, Verdict, clean,
 };
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::sampling::spread;
@@ -116,6 +117,7 @@ struct Answer {
     inlier_share: f64,
     seen: Observability,
     lookups: usize,
+    certificate: Option<Certificate>,
     trace: Vec<super::TraceStep>,
 }
 
@@ -176,13 +178,39 @@ impl<'a> Problem<'a> {
         match rung {
             Rung::Fixed => Err(AlignError::Config { what: "rungs" }),
             Rung::Single => self.descend(rung, vec![PlanarPose::default()], self.search(), None),
-            Rung::Several | Rung::Certified => self.descend(rung, several(prior), self.search(), earlier),
+            Rung::Certified => self.certified(earlier),
+            Rung::Several => self.descend(rung, several(prior), self.search(), earlier),
             Rung::Grid => {
                 let mut search = self.search();
                 let starts = self.knots(&mut search, earlier);
                 self.descend(rung, starts, search, earlier)
             }
         }
+    }
+
+    /// Several starts, and then a proof that nothing in the prior is better, or what is.
+    fn certified(&self, earlier: Option<&Earlier>) -> Result<Answer, AlignError> {
+        let config = self.config;
+        let kernel = final_kernel(config);
+        let mut answer = self.descend(Rung::Certified, several(&config.prior), self.search(), None)?;
+        let mut search = self.search();
+        // The proof begins with the best that is known.
+        let known = earlier.map(|e| e.refined).filter(|e| e.cost < answer.best().cost);
+        let mut best = Progress::new(known.unwrap_or(*answer.best()).state);
+        search.descend_quietly(&mut best, &self.middle, kernel);
+        let (certificate, best) = certify(&mut search, &self.middle, config, kernel, best);
+        answer.lookups += search.lookups + certificate.lookups;
+        // What the proof came upon is refined like any other start; it only counts if it is cheaper on all points.
+        let state = State::from_pose(answer.pose, self.centroid);
+        if !best.state.is_near(&state) {
+            let start = best.state.to_pose(self.centroid);
+            let better = self.descend(Rung::Certified, vec![start], self.search(), None)?;
+            if better.best().cost < answer.best().cost {
+                answer = Answer { lookups: answer.lookups + better.lookups, ..better };
+            }
+        }
+        answer.certificate = Some(certificate);
+        Ok(answer)
     }
 
     fn fixed(&self, starts: &[PlanarPose]) -> Result<Answer, AlignError> {
@@ -307,6 +335,7 @@ impl<'a> Problem<'a> {
             winner,
             scouted: scouted[winner],
             lookups: search.lookups,
+            certificate: None,
             trace: search.trace,
             starts,
             runs,
@@ -341,7 +370,7 @@ impl<'a> Problem<'a> {
             winner: answer.winner,
             rung: answer.rung,
             ladder,
-            certificate: None,
+            certificate: answer.certificate,
             iterations: runs.iter().map(|r| r.iterations).sum(),
             lookups: answer.lookups,
             offered: points_yz.len(),
@@ -397,6 +426,9 @@ fn check(config: &AlignConfig) -> Result<(), AlignError> {
     }
     if config.keep == 0 {
         return bad("keep");
+    }
+    if !(config.gap > 0.0 && config.gap < 1.0) {
+        return bad("gap");
     }
     if config.max_iterations == 0 {
         return bad("max_iterations");

@@ -122,6 +122,13 @@ impl<'a> Search<'a> {
         self.descend(run, at, points, kernel, STEP_FINE_M);
     }
 
+    /// A descent that leaves no trace.
+    pub(super) fn descend_quietly(&mut self, at: &mut Progress, points: &Cloud, kernel: f64) {
+        let record = std::mem::replace(&mut self.record, false);
+        self.descend(0, at, points, kernel, STEP_FINE_M);
+        self.record = record;
+    }
+
     /// Levenberg-Marquardt with one kernel width.
     ///
     /// The damping is the same in all directions, so that a direction without slope (a rod along itself) gets no

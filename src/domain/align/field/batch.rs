@@ -43,6 +43,16 @@ impl Cloud {
         Self { y, z, len, resting: 0 }
     }
 
+    /// The same points, those far from the centroid first: they move most, so they decide soonest.
+    pub(in crate::domain::align) fn outermost_first(&self) -> Self {
+        let mut order: Vec<usize> = (0..self.len).collect();
+        let squared = |i: usize| self.y[i] * self.y[i] + self.z[i] * self.z[i];
+        order.sort_by(|&a, &b| squared(b).total_cmp(&squared(a)));
+        let at = |i: usize, from: &[f32]| order.get(i).map_or(0.0, |&o| from[o]);
+        let (y, z) = (0..self.y.len()).map(|i| (at(i, &self.y), at(i, &self.z))).unzip();
+        Self { y, z, len: self.len, resting: self.resting }
+    }
+
     /// Points that it stands for.
     pub(in crate::domain::align) fn len(&self) -> usize {
         self.len + self.resting
@@ -145,6 +155,38 @@ struct Read {
     r: [f32; LANES],
     gy: [f32; LANES],
     gz: [f32; LANES],
+    /// Cells, and whether a lane lies off the grid.
+    index: [usize; LANES],
+    off: bool,
+}
+
+/// The size of a box of states.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::domain::align) struct Extent {
+    /// Half widths: angle (radians), y, z (metres).
+    pub(in crate::domain::align) half: [f64; 3],
+    /// Farthest way of a point in it: metres, and metres for each metre from the centroid.
+    pub(in crate::domain::align) shift: f64,
+    pub(in crate::domain::align) turn: f64,
+}
+
+impl Extent {
+    pub(in crate::domain::align) fn new(half: [f64; 3]) -> Self {
+        Self { half, shift: half[1].hypot(half[2]), turn: 2.0 * (0.5 * half[0]).sin() }
+    }
+
+    /// The farthest way of a point at most `radius` from the centroid, metres.
+    pub(in crate::domain::align) fn way(&self, radius: f64) -> f64 {
+        self.shift + self.turn * radius
+    }
+}
+
+/// For each cell, between which values the slope of the field lies in a window around it: middle and half range by y
+/// and z, metres per cell.
+pub(in crate::domain::align) struct Slopes {
+    cells: Vec<[f32; 4]>,
+    /// How far the window reaches from anywhere in the cell, metres.
+    pub(in crate::domain::align) reach: f64,
 }
 
 /// Where the lanes lie on the grid.
@@ -171,7 +213,7 @@ impl DistanceField {
         // Neighbours in an image are neighbours here: often all of a step are on the silhouette.
         let mut whole_steps = 0;
         for (y, z) in cloud.chunks() {
-            let Read { ay, az, mut r, gy, gz } = self.read(&motion, y, z);
+            let Read { ay, az, mut r, gy, gz, .. } = self.read(&motion, y, z);
             if left < LANES {
                 r[left..].fill(0.0);
             }
@@ -262,7 +304,7 @@ impl DistanceField {
         let mut sums = [[0f32; LANES]; 9];
         let mut left = cloud.len;
         for (y, z) in cloud.chunks() {
-            let Read { ay, az, mut r, gy, gz } = self.read(&motion, y, z);
+            let Read { ay, az, mut r, gy, gz, .. } = self.read(&motion, y, z);
             if left < LANES {
                 r[left..].fill(f32::INFINITY);
             }
@@ -298,11 +340,128 @@ impl DistanceField {
         }
     }
 
+    /// What the cloud costs at least anywhere in a box of states about `state`, and what it costs at `state` itself
+    /// (square metres).
+    ///
+    /// Without `slopes`: in the box a point moves by at most its way, its distance to the silhouette shrinks by no more
+    /// than that (see [`widened`]), and the kernel grows with the distance. The sums stop at `enough`.
+    ///
+    /// With `slopes`, of a window at least as wide as every way: where the field is nearly straight within the way of a
+    /// point, the kernel of its distance lies above its tangent less what bends, and tangents of different points
+    /// cancel. Near the best pose that is a far better bound, because there the sum has no slope.
+    pub(in crate::domain::align) fn bound(
+        &self,
+        cloud: &Cloud,
+        state: State,
+        kernel: f64,
+        extent: Extent,
+        slopes: Option<&Slopes>,
+        enough: f64,
+    ) -> (f64, f64) {
+        /// Steps between two looks at the sum.
+        const LOOK: usize = 4;
+        /// Below this share of the kernel's width it bends up, so that it lies above its tangent.
+        const CONVEX: f32 = 0.577;
+        let motion = Motion::new(self, state);
+        let square = (kernel * kernel) as f32;
+        let convex_m = CONVEX * kernel as f32;
+        let (shift, turn) = ((extent.shift / CELL_M) as f32, extent.turn as f32);
+        let bow = 0.5 * (extent.half[0] * extent.half[0]) as f32;
+        let zero = [0f32; LANES];
+        let (mut low, mut here) = (zero, zero);
+        let mut slope = [zero; 3];
+        let mut left = cloud.len;
+        let sum = |lanes: &[f32; LANES]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+        for (i, (y, z)) in cloud.chunks().enumerate() {
+            let Read { ay, az, mut r, index, off, .. } = self.read(&motion, y, z);
+            if left < LANES {
+                r[left..].fill(0.0);
+            }
+            left = left.saturating_sub(LANES);
+            let (mut arm, mut way, mut least, mut at) = (zero, zero, zero, zero);
+            for l in 0..LANES {
+                arm[l] = (y[l] * y[l] + z[l] * z[l]).sqrt();
+                way[l] = shift + turn * arm[l];
+                let r0 = if r[l] > 0.0 { r[l] } else { 0.0 };
+                let near = r[l] - widened(way[l]);
+                let near = if near > 0.0 { near } else { 0.0 };
+                at[l] = r0 * r0 * square / (square + r0 * r0);
+                least[l] = near * near * square / (square + near * near);
+                here[l] += at[l];
+            }
+            let Some(slopes) = slopes.filter(|_| !off) else {
+                for l in 0..LANES {
+                    low[l] += least[l];
+                }
+                if slopes.is_none() && i % LOOK == LOOK - 1 && sum(&low) >= enough {
+                    break;
+                }
+                continue;
+            };
+            let mut ranges = [zero; 4];
+            for (l, index) in index.iter().enumerate() {
+                let cell = slopes.cells[*index];
+                for (range, value) in ranges.iter_mut().zip(cell) {
+                    range[l] = value;
+                }
+            }
+            let [my, mz, hy, hz] = ranges;
+            for l in 0..LANES {
+                let r0 = if r[l] > 0.0 { r[l] } else { 0.0 };
+                let ratio = square / (square + r0 * r0);
+                let pull = 2.0 * r0 * ratio * ratio;
+                let change = widened(way[l]);
+                let bends = if r0 + change > convex_m { 0.25 * change * change } else { 0.0 };
+                let steep = my[l].abs() + mz[l].abs();
+                let lost = pull * ((hy[l] + hz[l]) * way[l] + steep * bow * arm[l]) + bends;
+                let tangent = if lost < 0.5 * (at[l] - least[l]) { 1.0 } else { 0.0 };
+                low[l] += tangent * (at[l] - lost) + (1.0 - tangent) * least[l];
+                let pull = tangent * pull;
+                slope[0][l] += pull * (mz[l] * ay[l] - my[l] * az[l]);
+                slope[1][l] += pull * my[l];
+                slope[2][l] += pull * mz[l];
+            }
+        }
+        let fall: f64 = slope
+            .iter()
+            .zip(extent.half)
+            .zip([1.0, 1.0 / CELL_M, 1.0 / CELL_M])
+            .map(|((lanes, half), scale)| sum(lanes).abs() * half * scale)
+            .sum();
+        // Less what the sums may have been rounded up.
+        ((sum(&low) * (1.0 - 1e-5) - fall * (1.0 + 1e-5)).max(0.0), sum(&here))
+    }
+
+    /// The part of the cloud that may lie outside the silhouette somewhere in a box of states as in
+    /// [`Self::bound`]; `into` is overwritten. The others cost nothing anywhere in it.
+    pub(in crate::domain::align) fn undecided(&self, cloud: &Cloud, state: State, extent: Extent, into: &mut Cloud) {
+        let motion = Motion::new(self, state);
+        let (shift, turn) = ((extent.shift / CELL_M) as f32, extent.turn as f32);
+        into.y.clear();
+        into.z.clear();
+        let mut left = cloud.len;
+        for (y, z) in cloud.chunks() {
+            let r = self.read(&motion, y, z).r;
+            for l in 0..LANES.min(left) {
+                if r[l] + widened(shift + turn * (y[l] * y[l] + z[l] * z[l]).sqrt()) > 0.0 {
+                    into.y.push(y[l]);
+                    into.z.push(z[l]);
+                }
+            }
+            left = left.saturating_sub(LANES);
+        }
+        into.len = into.y.len();
+        into.resting = cloud.resting + cloud.len - into.len;
+        let padded = into.len.next_multiple_of(LANES);
+        into.y.resize(padded, 0.0);
+        into.z.resize(padded, 0.0);
+    }
+
     /// What the field says about a step of points.
     #[inline]
     fn read(&self, motion: &Motion, y: &[f32; LANES], z: &[f32; LANES]) -> Read {
         let zero = [0f32; LANES];
-        let mut read = Read { ay: zero, az: zero, r: zero, gy: zero, gz: zero };
+        let mut read = Read { ay: zero, az: zero, r: zero, gy: zero, gz: zero, index: [0; LANES], off: false };
         for l in 0..LANES {
             read.ay[l] = motion.cos * y[l] - motion.sin * z[l];
             read.az[l] = motion.sin * y[l] + motion.cos * z[l];
@@ -319,7 +478,38 @@ impl DistanceField {
         if at.off {
             self.correct_off_grid(motion, &mut read);
         }
+        (read.index, read.off) = (at.index, at.off);
         read
+    }
+
+    /// [`Slopes`] for windows of one, two and four cells around each cell.
+    pub(in crate::domain::align) fn slopes(&self) -> [Slopes; 3] {
+        // Kept as greatest values of (-y, y, -z, z), so that joining windows is one maximum.
+        let (columns, rows) = (self.columns, self.rows);
+        // At the border of the grid nothing is known of what comes behind.
+        let unknown = [CELL_M as f32 * 100.0; 4];
+        let mut greatest = vec![unknown; columns * rows];
+        for row in 1..rows - 2 {
+            for column in 1..columns - 2 {
+                let at = row * columns + column;
+                let [a, b] = [self.values[at], self.values[at + 1]];
+                let [c, d] = [self.values[at + columns], self.values[at + columns + 1]];
+                let (near, far, left, right) = (b - a, d - c, c - a, d - b);
+                greatest[at] = [-near.min(far), near.max(far), -left.min(right), left.max(right)];
+            }
+        }
+        let mut window = 0;
+        [1usize, 2, 4].map(|reach| {
+            greatest = widen(&greatest, columns, reach - window);
+            window = reach;
+            let cells = greatest
+                .iter()
+                .map(|[down, up, back, front]| {
+                    [0.5 * (up - down), 0.5 * (front - back), 0.5 * (up + down), 0.5 * (front + back)]
+                })
+                .collect();
+            Slopes { cells, reach: reach as f64 * CELL_M }
+        })
     }
 
     #[inline]
@@ -372,6 +562,35 @@ impl DistanceField {
             }
         }
     }
+}
+
+/// By how much (metres) the interpolated field can differ between two places `way` cells apart.
+///
+/// Interpolating is taking the mean over the four cells with weights that are a product of two two-valued
+/// distributions. Coupled monotonically, the weights of two places differ by `way` in the mean, with a variance of at
+/// most 1/4 along each axis; so the mean distance is at most `sqrt(way^2 + 1/2)`, and also at most the sum along the
+/// axes, `sqrt(2) way`.
+#[inline]
+fn widened(way: f32) -> f32 {
+    let (far, near) = ((way * way + 0.5).sqrt(), std::f32::consts::SQRT_2 * way);
+    (if far < near { far } else { near }) * CELL_M as f32
+}
+
+/// The greatest values within `reach` cells along both axes.
+fn widen(values: &[[f32; 4]], columns: usize, reach: usize) -> Vec<[f32; 4]> {
+    let greater =
+        |a: [f32; 4], b: [f32; 4]| -> [f32; 4] { std::array::from_fn(|i| if b[i] > a[i] { b[i] } else { a[i] }) };
+    let (mut from, mut to) = (values.to_vec(), values.to_vec());
+    let count = values.len();
+    // Rows run into each other at their ends, which only makes windows at the border larger.
+    for step in std::iter::repeat_n(1, reach).chain(std::iter::repeat_n(columns, reach)) {
+        let inner = from[..count - 2 * step].iter().zip(&from[step..]).zip(&from[2 * step..]);
+        for (out, ((a, b), c)) in to[step..count - step].iter_mut().zip(inner) {
+            *out = greater(greater(*a, *b), *c);
+        }
+        std::mem::swap(&mut from, &mut to);
+    }
+    from
 }
 
 /// Between 0 and `high`; not a number becomes 0.

@@ -212,3 +212,64 @@ fn recording_changes_nothing_and_tells_the_whole_way() {
         assert!(errors(other.end, recorded.grasp_from_object) > (0.1, 0.0));
     }
 }
+
+/// A cross with a share of the points in a blob beside it, which no pose explains.
+fn with_blob(share: f64) -> Vec<DVec2> {
+    let blob = (1200.0 * share) as usize;
+    let mut points = cross_contacts(1200 - blob, pose(8.0, 0.001, -0.002), 3e-4, 7);
+    points.extend((0..blob).map(|i| {
+        let radius = 0.004 * (i as f64 / blob as f64).sqrt();
+        DVec2::new(0.021, 0.022) + DVec2::from_angle(i as f64 * 2.4) * radius
+    }));
+    points
+}
+
+#[test]
+fn every_rung_is_reached_by_the_scene_that_needs_it() {
+    use Rung::{Certified, Grid, Several, Single};
+    let climb = |points: &[DVec2], config: &AlignConfig| {
+        let report = align(points, field(), config).unwrap();
+        assert_eq!(report.ladder.last().unwrap().rung, report.rung);
+        assert_eq!(report.lookups, report.ladder.iter().map(|a| a.lookups).sum::<usize>());
+        assert_eq!(report.certificate.is_some(), report.rung == Certified);
+        let (angle, _) = errors(report.grasp_from_object, pose(8.0, 0.001, -0.002));
+        assert!(angle < 1.5, "{angle} deg on the rung {}", report.rung);
+        report.ladder.iter().map(|a| (a.rung, a.verdict)).collect::<Vec<_>>()
+    };
+    let config = AlignConfig::default();
+    assert_eq!(climb(&with_blob(0.0), &config), [(Single, Verdict::Accepted)]);
+    // A fifth is a bad mask: five starts agree, and the answer is believed.
+    assert_eq!(climb(&with_blob(0.225), &config), [(Single, Verdict::Cost), (Several, Verdict::Accepted)]);
+    // A third is too much for every test: all is searched, and the answer carries its proof.
+    let refused = climb(&with_blob(0.33), &config);
+    assert_eq!(refused.iter().map(|a| a.0).collect::<Vec<_>>(), [Single, Several, Grid, Certified]);
+    assert!(refused[..3].iter().all(|a| matches!(a.1, Verdict::Cost | Verdict::OutsidePrior)), "{refused:?}");
+    assert_eq!(refused[3].1, Verdict::Last);
+    // Descents that do not see far: only the grid has a start that is close enough.
+    let blind = AlignConfig { kernels_m: vec![4e-4], max_iterations: 3, ..AlignConfig::default() };
+    let refused = climb(&with_blob(0.0), &blind);
+    assert_eq!(refused.last(), Some(&(Grid, Verdict::Accepted)), "{refused:?}");
+}
+
+#[test]
+fn a_single_rung_is_taken_as_it_is() {
+    for rung in [Rung::Single, Rung::Several, Rung::Grid, Rung::Certified] {
+        let config = AlignConfig { rungs: vec![rung], ..AlignConfig::default() };
+        let report = align(&with_blob(0.33), field(), &config).unwrap();
+        assert_eq!((report.rung, report.ladder.len(), report.ladder[0].verdict), (rung, 1, Verdict::Last));
+        assert!(rung.to_string().len() > 3 && report.ladder[0].cost_m2 > 0.2e-6);
+        assert_eq!((report.trace.capacity(), report.fits.capacity()), (0, 0));
+        let recorded = align(&with_blob(0.33), field(), &AlignConfig { record: true, ..config }).unwrap();
+        assert_eq!(report, AlignReport { trace: Vec::new(), fits: Vec::new(), ..recorded.clone() });
+        assert!(!recorded.trace.is_empty());
+    }
+}
+
+#[test]
+fn a_rod_does_not_climb() {
+    let rod = DistanceField::from_mesh(&cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.06))).unwrap();
+    let points = filled(&[DVec2::new(0.003, 0.02)], 0.0, 800, pose(9.0, 0.001, 0.0), 3e-4, 1);
+    let report = align(&points, &rod, &AlignConfig::default()).unwrap();
+    assert!(report.is_degenerate());
+    assert_eq!((report.rung, report.ladder[0].verdict), (Rung::Single, Verdict::Last));
+}
