@@ -245,10 +245,22 @@ fn every_rung_is_reached_by_the_scene_that_needs_it() {
     assert_eq!(refused.iter().map(|a| a.0).collect::<Vec<_>>(), [Single, Several, Grid, Certified]);
     assert!(refused[..3].iter().all(|a| matches!(a.1, Verdict::Cost | Verdict::OutsidePrior)), "{refused:?}");
     assert_eq!(refused[3].1, Verdict::Last);
-    // Descents that do not see far: only the grid has a start that is close enough.
-    let blind = AlignConfig { kernels_m: vec![4e-4], max_iterations: 3, ..AlignConfig::default() };
-    let refused = climb(&with_blob(0.0), &blind);
-    assert_eq!(refused.last(), Some(&(Grid, Verdict::Accepted)), "{refused:?}");
+}
+
+#[test]
+fn a_far_pose_is_found_by_more_starts() {
+    // A gripper that may hold the tool anywhere within 20 mm: one start slides off along a bar.
+    let truth = pose(8.0, -0.015, -0.016);
+    let points = cross_contacts(1200, truth, 3e-4, 7);
+    let prior = Prior { theta_rad: 0.2, shift_m: 0.02 };
+    for second in [Rung::Several, Rung::Grid] {
+        let config = AlignConfig { rungs: vec![Rung::Single, second], prior, ..AlignConfig::default() };
+        let report = align(&points, field(), &config).unwrap();
+        let climbed: Vec<_> = report.ladder.iter().map(|a| (a.rung, a.verdict)).collect();
+        assert_eq!(climbed, [(Rung::Single, Verdict::OutsidePrior), (second, Verdict::Accepted)]);
+        let (angle, shift) = errors(report.grasp_from_object, truth);
+        assert!(angle < 0.5 && shift < 3e-4, "{angle} deg, {shift} m");
+    }
 }
 
 #[test]
