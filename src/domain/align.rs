@@ -1,9 +1,11 @@
 //! Registration: contact points to the planar in-hand pose of the tool.
 //!
-//! Two engines, one kind of result:
+//! Registrations of several kinds behind one trait ([`Register`]), one kind of result:
 //! * [`align`]: robust Levenberg-Marquardt on a [`DistanceField`] of the tool's silhouette, from a few starts. The
 //!   default. Points outside the outline pay their distance, points on the silhouette pay nothing.
 //! * [`lab_icp()`]: the lab's planar point-to-point loop, reproduced for comparison.
+//! * [`icp`]: planar and spatial ICP put together from small values, the peers of the default.
+//! * [`refine`]: from the planar pose to all six degrees of freedom.
 //!
 //! A result is a value ([`AlignReport`]): the pose with everything that says whether to believe it. What is only
 //! needed to look inside a run (per-iteration states, per-point residuals) is recorded on request.
@@ -14,6 +16,7 @@ pub mod basin;
 pub mod both_ways;
 mod certify;
 pub mod correspond;
+mod directions;
 pub mod field;
 pub mod icp;
 pub mod lab_icp;
@@ -21,6 +24,7 @@ mod linear;
 mod observability;
 mod planar;
 pub mod reason;
+pub mod refine;
 mod register;
 mod search;
 #[cfg(test)]
@@ -34,11 +38,13 @@ use serde::{Deserialize, Serialize};
 use super::frames::PlanarPose;
 
 pub use both_ways::{BothWays, both_ways};
+pub use directions::{Directions, Distances};
 pub use field::{DistanceField, FieldError, FieldSample};
 pub use icp::IcpConfig;
-pub use lab_icp::{LabIcpConfig, lab_icp};
+pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub use observability::{DEGENERATE_BELOW, MotionEllipse, Observability, observability};
 pub use planar::align;
+pub use refine::RefineConfig;
 pub use register::{Ask, Register, Scene};
 
 /// Length that makes an angle comparable with a shift: one radian counts as this many metres.
@@ -453,31 +459,6 @@ pub struct PointFit {
     pub weight: f32,
     /// What it counts as.
     pub fate: Fate,
-}
-
-/// Distances between contacts and model points, seen along the closing axis, at the final pose.
-///
-/// The two directions answer different questions: contacts far from the model are a wrong mask or a wrong pose; model
-/// points far from every contact are mostly parts that nothing touched.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Directions {
-    /// From every contact to its nearest model point.
-    pub scene_to_model: Distances,
-    /// From every model point to its nearest contact.
-    pub model_to_scene: Distances,
-}
-
-/// One direction of [`Directions`].
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Distances {
-    /// Root mean square of all distances, metres.
-    pub rms_m: f64,
-    /// Share of the distances up to 1 mm.
-    pub overlap: f64,
-    /// Share of the distances up to 15 mm: the "fitness" that the lab computes and does not use.
-    pub fitness_15mm: f64,
-    /// Root mean square of those, metres; from model to scene it is by this that the lab chooses among starts.
-    pub rms_15mm_m: f64,
 }
 
 /// Centroid and size of the finite points, computed about a local origin in f64.

@@ -3,7 +3,9 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::align::{AlignConfig, AlignError, AlignReport, Ask, IcpConfig, LabIcpConfig, Register, Scene};
+use super::align::{
+    AlignConfig, AlignError, AlignReport, Ask, Directions, IcpConfig, LabIcpConfig, RefineConfig, Register, Scene,
+};
 use super::cloud::{CloudError, ContactCloud, FingerCloud, lift};
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Mask};
@@ -52,6 +54,8 @@ pub enum Engine {
     PointToPlane,
     /// Generalized-ICP in space.
     Gicp,
+    /// The default in the plane, then against the triangles in space.
+    Refined,
 }
 
 impl Engine {
@@ -72,6 +76,7 @@ impl Engine {
             Self::PointToPoint => "ICP point-point, 6 DoF",
             Self::PointToPlane => "ICP point-plane, 6 DoF",
             Self::Gicp => "GICP, 6 DoF",
+            Self::Refined => "Refined, 6 DoF",
         }
     }
 
@@ -87,10 +92,17 @@ impl Engine {
                 "Planar, nearest model points, far pairs left out, closed-form steps, ten starts"
             }
             Self::PlanarPointToPlane => "Planar, distance along the outline's normals, robust kernel, ten starts",
-            Self::PlanarGicp => "Planar, surface to surface with both sides' normals, robust kernel, ten starts",
+            Self::PlanarGicp => "Planar, surface to surface with both sides' normals, Huber's kernel, ten starts",
             Self::PointToPoint => "Six degrees of freedom, nearest model points, far pairs left out, ten starts",
-            Self::PointToPlane => "Six degrees of freedom, distance along the surface's normals, robust, ten starts",
-            Self::Gicp => "Six degrees of freedom, surface to surface with both sides' normals, robust, ten starts",
+            Self::PointToPlane => {
+                "Six degrees of freedom, distance along the surface's normals, far pairs left out, ten starts"
+            }
+            Self::Gicp => {
+                "Six degrees of freedom, surface to surface with both sides' normals, Huber's kernel, ten starts"
+            }
+            Self::Refined => {
+                "The default, then robust point to plane against the triangles with six degrees of freedom"
+            }
         }
     }
 
@@ -106,6 +118,7 @@ impl Engine {
             Self::PointToPoint => Box::new(IcpConfig::point_to_point()),
             Self::PointToPlane => Box::new(IcpConfig::point_to_plane()),
             Self::Gicp => Box::new(IcpConfig::gicp()),
+            Self::Refined => Box::new(RefineConfig::default()),
         }
     }
 }
@@ -216,13 +229,18 @@ pub fn register_with(
     tool: &ToolModel,
     ask: Ask<'_>,
 ) -> Result<AlignReport, AlignError> {
-    registration.run(&Scene::new(points), tool, ask)
+    let scene = Scene::new(points);
+    let mut report = registration.run(&scene, tool, ask)?;
+    if ask.record {
+        report.directions = Directions::at(scene.yz(), tool.silhouette(), report.grasp_from_object);
+    }
+    Ok(report)
 }
 
 /// Imprints, cameras and masks to the tool's pose in the hand. `record` keeps per-iteration states and per-point
 /// residuals (see [`AlignReport`]).
 ///
-/// Cost: well under a millisecond with the distance field, up to some hundred with the lab's loop.
+/// Cost: well under a millisecond with the distance field, up to some hundred with the others.
 ///
 /// # Errors
 /// [`PoseError`]; nothing is guessed from too few or misplaced points.
@@ -232,8 +250,22 @@ pub fn estimate(
     engine: Engine,
     record: bool,
 ) -> Result<PoseReport, PoseError> {
+    estimate_with(fingers, tool, engine, &*engine.registration(), Ask { starts: None, record })
+}
+
+/// The same with other settings of the engine, or from other starts.
+///
+/// # Errors
+/// [`PoseError`].
+pub fn estimate_with(
+    fingers: &Fingers<'_>,
+    tool: &ToolModel,
+    engine: Engine,
+    registration: &dyn Register,
+    ask: Ask<'_>,
+) -> Result<PoseReport, PoseError> {
     let cloud = contact_cloud(fingers)?;
-    let report = register(&cloud.points, tool, engine, record)?;
+    let report = register_with(registration, &cloud.points, tool, ask)?;
     Ok(PoseReport {
         engine,
         grasp_from_object: report.grasp_from_object,

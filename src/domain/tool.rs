@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::align::icp::Samples;
 use super::align::lab_icp::LAB_MODEL_POINTS;
-use super::align::{DistanceField, FieldError};
+use super::align::{DistanceField, FieldError, LabModel};
 use super::mesh::distance::MeshError;
 use super::mesh::{MeshDistance, TriMesh};
 
@@ -42,6 +42,7 @@ pub struct ToolModel {
     /// Only the peers look at these, so they are built when first asked for.
     samples: OnceLock<Samples>,
     silhouette: OnceLock<Samples>,
+    lab: OnceLock<LabModel>,
 }
 
 impl ToolModel {
@@ -54,12 +55,26 @@ impl ToolModel {
         let distance = MeshDistance::new(&mesh)?;
         let surface = mesh.sample_surface_with_normals(LAB_MODEL_POINTS, MODEL_SEED);
         let model_points = surface.iter().map(|(p, _)| DVec2::new(p.y, p.z)).collect();
-        Ok(Self { mesh, field, distance, model_points, surface, samples: OnceLock::new(), silhouette: OnceLock::new() })
+        Ok(Self {
+            mesh,
+            field,
+            distance,
+            model_points,
+            surface,
+            samples: OnceLock::new(),
+            silhouette: OnceLock::new(),
+            lab: OnceLock::new(),
+        })
     }
 
     /// Points of the surface with the normals of their triangles, in space.
     pub fn samples(&self) -> &Samples {
         self.samples.get_or_init(|| Samples::in_space(&self.surface))
+    }
+
+    /// The same points as the lab's loop sees them.
+    pub fn lab_model(&self) -> &LabModel {
+        self.lab.get_or_init(|| LabModel::new(&self.surface.iter().map(|(p, _)| *p).collect::<Vec<_>>()))
     }
 
     /// The same points projected along the closing axis (x = 0). Those on the outline of the silhouette carry its

@@ -12,8 +12,9 @@ use strum::IntoEnumIterator as _;
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::domain::align::AlignReport;
+use crate::domain::align::{AlignReport, Ask, LabIcpConfig, PaperTrap, Register, lab_starts};
 use crate::domain::dataset::PairId;
+use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::hand::{AcceptedPose, HandPose};
 use crate::domain::metrics::AngleSummary;
@@ -40,6 +41,18 @@ pub(super) struct PoseArgs {
     /// The registration: the key of one, `default`, `lab` (the paper's), or `all`, one after the other.
     #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = parse_engines())]
     engine: Engines,
+    /// Start here instead of where the registration would: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as
+    /// `10,0,-2`. Repeat for several.
+    #[arg(long = "start", value_name = "DEG,MM,MM", value_parser = parse_start, allow_hyphen_values = true)]
+    starts: Vec<PlanarPose>,
+    /// Give the paper's registration its ten random starts, drawn from this seed.
+    #[arg(long, value_name = "SEED", conflicts_with = "starts")]
+    paper_starts: Option<u64>,
+    /// Switch on a trap of the paper's registration: `wrong-frame` (starts are applied in the wrong frame),
+    /// `rmse-choice` (chosen by model-to-contact distance within 15 mm), `fixed-iterations` (no stop test).
+    /// Repeat for several.
+    #[arg(long = "paper-trap", value_name = "TRAP", value_parser = parse_trap)]
+    paper_traps: Vec<PaperTrap>,
     /// Take only this many pairs, spread evenly over the dataset.
     #[arg(long)]
     limit: Option<usize>,
@@ -80,6 +93,34 @@ pub(super) fn parse_engines() -> impl TypedValueParser<Value = Engines> {
             key => key.parse().into_iter().collect(),
         })
     })
+}
+
+fn parse_start(text: &str) -> Result<PlanarPose, String> {
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|n| n.trim().parse().ok()).filter(|n: &f64| n.is_finite()).collect();
+    let (&[degrees, y_mm, z_mm], 3) = (numbers.as_slice(), text.split(',').count()) else {
+        return Err("three numbers are needed: degrees, millimetres along y, millimetres along z".to_owned());
+    };
+    Ok(PlanarPose { theta_rad: degrees.to_radians(), y_m: y_mm * 1e-3, z_m: z_mm * 1e-3 })
+}
+
+fn parse_trap(text: &str) -> Result<PaperTrap, String> {
+    text.parse().map_err(|_| {
+        let names: Vec<&'static str> = PaperTrap::iter().map(Into::into).collect();
+        format!("the traps are {}", names.join(", "))
+    })
+}
+
+/// The registration as the arguments want it.
+fn registration(args: &PoseArgs, engine: Engine) -> Box<dyn Register> {
+    if engine != Engine::LabIcp {
+        return engine.registration();
+    }
+    let mut config = LabIcpConfig { traps: args.paper_traps.clone(), ..LabIcpConfig::default() };
+    if let Some(seed) = args.paper_starts {
+        config.starts = lab_starts(seed);
+    }
+    Box::new(config)
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -254,7 +295,9 @@ fn pose_cases(
         .iter()
         .map(|&engine| {
             let start = Instant::now();
-            let result = pose::estimate(&fingers, tool, engine, args.trace);
+            let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
+            let ask = Ask { starts, record: args.trace };
+            let result = pose::estimate_with(&fingers, tool, engine, &*registration(args, engine), ask);
             let ms = start.elapsed().as_secs_f64() * 1e3;
             let found = result.as_ref().ok().map(|r| r.object_from_grasp);
             Case {

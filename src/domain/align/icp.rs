@@ -9,6 +9,7 @@
 mod policy;
 mod problem;
 mod samples;
+mod tree;
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,7 @@ use crate::domain::tool::ToolModel;
 
 pub use policy::{Dof, Kernel, Rejector, Residual, Solver, Target};
 use problem::{Problem, State, Sums};
+pub(super) use samples::Matcher;
 pub use samples::Samples;
 
 /// A step that moves no point by more than about this, metres, ends the search with a wide kernel.
@@ -115,14 +117,20 @@ impl IcpConfig {
         Self { target: Target::Surface, dof: Dof::Full, ..Self::planar_point_to_point() }
     }
 
-    /// Point to plane in space with a redescending kernel.
+    /// Point to plane in space; pairs more than 3 mm apart are left out. A redescending kernel would let go of the
+    /// few contacts beside the tool, which alone tell the angle.
     pub fn point_to_plane() -> Self {
-        Self { target: Target::Surface, dof: Dof::Full, ..Self::planar_point_to_plane() }
+        Self { residual: Residual::PointToPlane, solver: Solver::LevenbergMarquardt, ..Self::point_to_point() }
     }
 
-    /// Generalized-ICP in space with a redescending kernel.
+    /// Generalized-ICP in space with Huber's kernel; pairs more than 2 mm apart are left out.
     pub fn gicp() -> Self {
-        Self { residual: Residual::Generalized, ..Self::point_to_plane() }
+        Self {
+            residual: Residual::Generalized,
+            kernels: vec![Kernel::Huber { width_m: 5e-4 }],
+            rejector: Rejector::MaxDistance { distance_m: 2e-3 },
+            ..Self::point_to_plane()
+        }
     }
 
     fn check(&self) -> Result<(), AlignError> {
@@ -141,6 +149,10 @@ impl IcpConfig {
         }
         if self.target == Target::Silhouette && self.dof == Dof::Full {
             return bad("dof");
+        }
+        // Seen along the closing axis the contacts fill an area: they have no surface, and so no normals.
+        if self.target == Target::Silhouette && self.residual == Residual::Generalized {
+            return bad("residual");
         }
         if !(self.anchor.is_finite() && self.anchor >= 0.0) {
             return bad("anchor");
@@ -171,7 +183,7 @@ impl Register for IcpConfig {
         let chosen: Vec<DVec3> = spread(clean.points.len(), self.points).into_iter().map(|i| clean.points[i]).collect();
         let chosen_yz: Vec<DVec2> = chosen.iter().map(|p| DVec2::new(p.y, p.z)).collect();
         check_overlap(chosen_yz.iter().copied(), &tool.field, starts)?;
-        let mut problem = Problem::new(self, tool, &chosen, clean.centroid);
+        let mut problem = Problem::new(self, tool, &chosen, &clean.points, clean.centroid);
         if problem.model_points() < MIN_POINTS {
             return Err(AlignError::EmptyModel { got: problem.model_points() });
         }
@@ -318,7 +330,7 @@ impl IcpConfig {
     /// Every offered point at the final state.
     fn fits(&self, tool: &ToolModel, clean: &CleanScene, state: State) -> Vec<PointFit> {
         let kernel = self.kernels[self.kernels.len() - 1];
-        let mut problem = Problem::new(self, tool, &clean.points, clean.centroid);
+        let mut problem = Problem::new(self, tool, &clean.points, &clean.points, clean.centroid);
         problem.look(state, kernel, state);
         let mut outcome = problem.outcome(kernel);
         clean
@@ -331,3 +343,6 @@ impl IcpConfig {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,16 +1,23 @@
 //! The lab's planar ICP, reproduced for comparison: point to point, every contact point to its nearest model point,
 //! a closed-form rotation, a fixed number of iterations, one start at the identity, no rejection of outliers.
 //!
-//! Source: the lab's touch2touch repository, `evaluation/pose_estimators.py` lines 153-281, reimplemented from a
-//! description. Two things differ without changing a result: the k-d tree stays with the model and the contacts are
-//! moved instead, and the loop ends early once the correspondences repeat, because then every later iteration
-//! repeats too. One thing differs on purpose: too few points are an error, not the previous sample's pose.
+//! The lab's multi-start variant has three traps; each can be switched on to see what it does to a pose.
+//!
+//! Source: the lab's touch2touch repository, `evaluation/pose_estimators.py` lines 153-281 and
+//! `ICP_dataset_cal.py` lines 127-153, reimplemented from a description. Two things differ without changing a result:
+//! the k-d tree stays with the model and the contacts are moved instead, and the loop ends early once the
+//! correspondences repeat, because then every later iteration repeats too. One thing differs on purpose: too few
+//! points are an error, not the previous sample's pose.
 
-use glam::DVec2;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::register::{Ask, Register, Scene};
+use super::icp::{Matcher, Samples};
+use super::register::{Ask, Register, Scene, check_overlap, clean_scene};
 use super::{AlignError, AlignReport, Fate, PointFit, Prior, Run, Rung, Stop, TraceStep, observability};
 use crate::domain::frames::PlanarPose;
 use crate::domain::tool::ToolModel;
@@ -19,23 +26,111 @@ use crate::domain::tool::ToolModel;
 pub const LAB_MIN_POINTS: usize = 4;
 /// Points the lab samples from the CAD model's surface.
 pub const LAB_MODEL_POINTS: usize = 5000;
+/// Starts of the lab's multi-start variant.
+pub const LAB_STARTS: usize = 10;
 /// Distance below which a contact counts as an inlier in the report, metres; the loop itself does not use it.
 const INLIER_M: f64 = 1e-3;
+/// Beyond this, metres, the lab's choice among starts does not look.
+const GATE_M: f64 = 0.015;
 
-/// What [`lab_icp()`] may vary; the default is the lab's.
+/// A property of the lab's multi-start variant that spoils poses without a word.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    strum::EnumIter,
+    strum::EnumString,
+    strum::IntoStaticStr,
+    strum::Display,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum PaperTrap {
+    /// The start is a turn about the closing axis, but is applied in the plane of the loop, whose normal that axis
+    /// is not: asking for 22.5 degrees turns the model by about one, and a shift along z goes out of the plane. So
+    /// all starts are nearly the same one. What was applied is the start of the report's run; what was asked for
+    /// stands beside it.
+    WrongFrame,
+    /// Among several starts the one with the least distance from model to contacts wins, over the model points that
+    /// have a contact within 15 mm. A pose with few such points is rewarded, one without any wins with zero.
+    RmseChoice,
+    /// All iterations are run, converged or not, so nothing tells a pose that came to rest from one that still
+    /// moves.
+    FixedIterations,
+}
+
+impl PaperTrap {
+    /// What it does, in one line.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::WrongFrame => "Starts are applied in the wrong frame: 22.5° asked for turns the model by about 1°",
+            Self::RmseChoice => {
+                "The start with the least model-to-contact distance within 15 mm wins: little overlap pays"
+            }
+            Self::FixedIterations => "All 200 iterations are run and none tells whether the pose came to rest",
+        }
+    }
+}
+
+/// What [`lab_icp()`] may vary; the default is what the lab evaluates with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LabIcpConfig {
     /// Iterations; the lab always runs all 200.
     pub iterations: usize,
-    /// Pose to start from, `grasp_from_object`; the lab uses the identity.
-    pub start: PlanarPose,
+    /// Poses to start from, `grasp_from_object`; the lab uses the identity. Not empty.
+    pub starts: Vec<PlanarPose>,
+    /// The lab's traps; none by default.
+    pub traps: Vec<PaperTrap>,
     /// Keep per-iteration states and per-point residuals.
     pub record: bool,
 }
 
 impl Default for LabIcpConfig {
     fn default() -> Self {
-        Self { iterations: 200, start: PlanarPose::default(), record: false }
+        Self { iterations: 200, starts: vec![PlanarPose::default()], traps: Vec::new(), record: false }
+    }
+}
+
+impl LabIcpConfig {
+    fn has(&self, trap: PaperTrap) -> bool {
+        self.traps.contains(&trap)
+    }
+}
+
+/// The starts of the lab's multi-start variant: ten draws *with replacement* from ten angles within 22.5 degrees and
+/// ten shifts within 10 mm along each axis, so that on average only six to seven of the angles occur.
+pub fn lab_starts(seed: u64) -> Vec<PlanarPose> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut draw = |limit: f64| limit * (f64::from(rng.random_range(0..10u32)) / 4.5 - 1.0);
+    (0..LAB_STARTS)
+        .map(|_| PlanarPose { theta_rad: draw(22.5f64.to_radians()), y_m: draw(0.01), z_m: draw(0.01) })
+        .collect()
+}
+
+/// What the lab's loop compares with.
+#[derive(Clone, Debug)]
+pub struct LabModel {
+    /// Metres, object frame.
+    points: Arc<[DVec3]>,
+    /// The same along the closing axis, in the same order.
+    flat: Samples,
+}
+
+impl LabModel {
+    /// From points of the surface, metres, object frame. Those that are not finite are left out.
+    pub fn new(points: &[DVec3]) -> Self {
+        let points: Arc<[DVec3]> = points.iter().copied().filter(|p| p.is_finite()).collect();
+        let pairs: Vec<(DVec3, DVec3)> = points.iter().map(|p| (p.with_x(0.0), DVec3::ZERO)).collect();
+        Self { flat: Samples::in_plane(&pairs), points }
+    }
+
+    fn yz(&self, item: u32) -> DVec2 {
+        let p = self.points[item as usize];
+        DVec2::new(p.y, p.z)
     }
 }
 
@@ -43,96 +138,85 @@ impl Register for LabIcpConfig {
     fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError> {
         let mut config = self.clone();
         config.record = ask.record;
-        match ask.starts {
-            Some([start]) => config.start = *start,
-            Some(_) => return Err(AlignError::Config { what: "starts" }),
-            None => {}
+        if let Some(starts) = ask.starts {
+            config.starts = starts.to_vec();
         }
-        let mut report = lab_icp(scene.yz(), &tool.model_points, &config)?;
+        let finite = scene.yz().iter().copied().filter(|p| p.is_finite());
+        // The loop pulls the model to whatever there is, so that its end no longer shows that there was nothing.
+        if finite.clone().count() >= LAB_MIN_POINTS {
+            check_overlap(finite, &tool.field, &config.starts)?;
+        }
+        let mut report = lab_icp(scene.points(), tool.lab_model(), &config)?;
         report.observability = Some(observability(scene.yz(), &tool.field, report.grasp_from_object));
         Ok(report)
     }
 }
 
-/// Aligns model points (object frame) to contact points (grasp frame), both `(y, z)` in metres.
+/// Aligns model points (object frame) to contact points (grasp frame), metres.
 ///
-/// Points that are not finite are dropped and counted. The reported cost is the mean squared distance.
+/// Points that are not finite are dropped and counted. The reported cost is the mean squared distance in the plane.
 ///
 /// # Errors
 /// [`AlignError`] for fewer than four contact or model points, coincident contacts, or a start that is not finite.
-pub fn lab_icp(points_yz: &[DVec2], model_points: &[DVec2], config: &LabIcpConfig) -> Result<AlignReport, AlignError> {
-    if !config.start.is_finite() {
-        return Err(AlignError::Config { what: "start" });
+pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Result<AlignReport, AlignError> {
+    if config.starts.is_empty() || config.starts.iter().any(|s| !s.is_finite()) {
+        return Err(AlignError::Config { what: "starts" });
     }
     if config.iterations == 0 {
         return Err(AlignError::Config { what: "iterations" });
     }
-    let scene = super::clean(points_yz, LAB_MIN_POINTS)?;
-    let model: Vec<[f64; 2]> = model_points.iter().filter(|p| p.is_finite()).map(|p| p.to_array()).collect();
-    if model.len() < LAB_MIN_POINTS {
-        return Err(AlignError::EmptyModel { got: model.len() });
+    let clean = clean_scene(&Scene::new(points), LAB_MIN_POINTS)?;
+    if model.points.len() < LAB_MIN_POINTS {
+        return Err(AlignError::EmptyModel { got: model.points.len() });
     }
-    let tree =
-        ImmutableKdTree::<f64, 2>::new_from_slice(&model).map_err(|_| AlignError::EmptyModel { got: model.len() })?;
-    let count = scene.points.len();
-    let mut pose = config.start;
-    let mut nearest = vec![u32::MAX; count];
-    let mut trace = Vec::new();
-    let mut lookups = 0;
-    let mut iterations = 0;
-    let mut stop = Stop::IterationLimit;
-    while iterations < config.iterations {
-        let matched = match_all(&tree, &scene.points, pose, &mut nearest);
-        lookups += count;
-        note(config, &mut trace, iterations, pose, &matched, count);
-        if !matched.changed {
-            stop = Stop::FixedPoint;
-            break;
-        }
-        pose = closed_form(&scene.points, scene.centroid, &model, &nearest);
-        iterations += 1;
-    }
-    let matched = match_all(&tree, &scene.points, pose, &mut nearest);
-    lookups += count;
-    if stop == Stop::IterationLimit {
-        note(config, &mut trace, iterations, pose, &matched, count);
-    }
-    let fits = if config.record { fits(&tree, points_yz, pose) } else { Vec::new() };
-    let run = Run {
-        requested: config.start,
-        start: config.start,
-        end: pose,
-        cost_m2: matched.squares / count as f64,
-        iterations,
-        stop,
+    let scene: Vec<DVec2> = clean.points.iter().map(|p| DVec2::new(p.y, p.z)).collect();
+    let centroid = DVec2::new(clean.centroid.y, clean.centroid.z);
+    let count = scene.len();
+    let mut paper = Loop { config, model, scene, centroid, nearest: vec![0; count], lookups: 0, trace: Vec::new() };
+    let ends: Vec<End> = (0..config.starts.len()).map(|run| paper.run(run)).collect();
+    let chooser: Vec<f64> = if config.has(PaperTrap::RmseChoice) {
+        let contacts: Vec<(DVec3, DVec3)> = clean.points.iter().map(|p| (*p, DVec3::ZERO)).collect();
+        let contacts = Samples::in_space(&contacts);
+        ends.iter().map(|end| gated_rmse(model, &contacts, end.run.end)).collect()
+    } else {
+        ends.iter().map(|end| end.run.cost_m2).collect()
     };
+    let winner = (0..ends.len()).min_by(|&a, &b| chooser[a].total_cmp(&chooser[b])).unwrap_or(0);
+    let End { run, matched } = ends[winner];
+    let fits = if config.record { fits(&model.flat, points, run.end) } else { Vec::new() };
     Ok(AlignReport {
-        grasp_from_object: pose,
+        grasp_from_object: run.end,
         grasp_from_object_6dof: None,
-        converged: stop.converged(),
-        stop,
-        start: config.start,
-        runs: vec![run],
-        winner: 0,
+        converged: run.stop.converged(),
+        stop: run.stop,
+        start: run.start,
+        runs: ends.iter().map(|e| e.run).collect(),
+        winner,
         rung: Rung::Fixed,
         ladder: Vec::new(),
         certificate: None,
-        iterations,
-        lookups,
-        offered: points_yz.len(),
-        not_finite: scene.not_finite,
+        iterations: ends.iter().map(|e| e.run.iterations).sum(),
+        lookups: paper.lookups,
+        offered: points.len(),
+        not_finite: clean.not_finite,
         used: count,
         inlier_share: matched.inliers as f64 / count as f64,
         inlier_rms_m: (matched.inlier_squares / (matched.inliers as f64).max(1.0)).sqrt(),
-        within_prior: Prior::default().allows(pose),
+        within_prior: Prior::default().allows(run.end),
         observability: None,
         directions: None,
-        trace,
+        trace: paper.trace,
         fits,
     })
 }
 
-#[derive(Default)]
+#[derive(Clone, Copy)]
+struct End {
+    run: Run,
+    matched: Matched,
+}
+
+#[derive(Clone, Copy, Default)]
 struct Matched {
     changed: bool,
     squares: f64,
@@ -140,165 +224,168 @@ struct Matched {
     inlier_squares: f64,
 }
 
-/// The nearest model point of every contact under `pose`.
-fn match_all(tree: &ImmutableKdTree<f64, 2>, scene: &[DVec2], pose: PlanarPose, nearest: &mut [u32]) -> Matched {
-    let object_from_grasp = pose.inverse();
-    let mut matched = Matched::default();
-    for (p, slot) in scene.iter().zip(nearest) {
-        let (item, squared) = nearest_model_point(tree, object_from_grasp.transform_yz(*p));
-        matched.changed |= *slot != item;
-        *slot = item;
-        matched.squares += squared;
+impl Matched {
+    fn add(&mut self, squared: f64) {
+        self.squares += squared;
         if squared <= INLIER_M * INLIER_M {
-            matched.inliers += 1;
-            matched.inlier_squares += squared;
+            self.inliers += 1;
+            self.inlier_squares += squared;
         }
     }
-    matched
 }
 
-fn nearest_model_point(tree: &ImmutableKdTree<f64, 2>, in_object: DVec2) -> (u32, f64) {
-    let found = tree.query(&in_object.to_array()).nearest_one::<SquaredEuclidean<f64>>().execute();
-    (found.item, found.distance)
+struct Loop<'a> {
+    config: &'a LabIcpConfig,
+    model: &'a LabModel,
+    scene: Vec<DVec2>,
+    centroid: DVec2,
+    nearest: Vec<u32>,
+    lookups: usize,
+    trace: Vec<TraceStep>,
+}
+
+impl Loop<'_> {
+    /// The iterations from one of the starts.
+    fn run(&mut self, run: usize) -> End {
+        let requested = self.config.starts[run];
+        let limit = self.config.iterations;
+        let never_stop = self.config.has(PaperTrap::FixedIterations);
+        let mut matcher = Matcher::new(self.scene.len());
+        let mut stop = Stop::IterationLimit;
+        let mut iterations = 0;
+        let mut pose = requested;
+        let mut start = requested;
+        if self.config.has(PaperTrap::WrongFrame) {
+            let (applied, matched) = self.first_in_the_wrong_frame(requested);
+            start = applied;
+            self.note(run, 0, applied, &matched);
+            pose = self.closed_form();
+            iterations = 1;
+        }
+        while iterations < limit {
+            let matched = self.match_all(&mut matcher, pose);
+            self.note(run, iterations, pose, &matched);
+            if !matched.changed && !never_stop {
+                stop = Stop::FixedPoint;
+                break;
+            }
+            pose = self.closed_form();
+            iterations += 1;
+        }
+        let matched = self.match_all(&mut matcher, pose);
+        if stop == Stop::IterationLimit {
+            self.note(run, iterations, pose, &matched);
+        }
+        self.lookups += matcher.lookups;
+        let cost_m2 = matched.squares / self.scene.len() as f64;
+        End { run: Run { requested, start, end: pose, cost_m2, iterations, stop }, matched }
+    }
+
+    /// The nearest model point of every contact under `pose`.
+    fn match_all(&mut self, matcher: &mut Matcher, pose: PlanarPose) -> Matched {
+        let object_from_grasp = pose.inverse();
+        let mut matched = Matched::default();
+        for (i, p) in self.scene.iter().enumerate() {
+            let q = object_from_grasp.transform_yz(*p);
+            let (item, changed) = matcher.find(&self.model.flat, i, DVec3::new(0.0, q.x, q.y));
+            self.nearest[i] = item;
+            matched.changed |= changed;
+            matched.add(self.model.yz(item).distance_squared(q));
+        }
+        matched
+    }
+
+    /// The first pairing of [`PaperTrap::WrongFrame`]. The loop works in the plane of (z, y) with -x as the third
+    /// coordinate; the start, a turn about its *first* axis and a shift along the second and third, is applied to
+    /// those. That squeezes y instead of turning the plane. The planar pose nearest to this is what was applied.
+    fn first_in_the_wrong_frame(&mut self, requested: PlanarPose) -> (PlanarPose, Matched) {
+        let (sin, cos) = requested.theta_rad.sin_cos();
+        let moved: Vec<DVec2> =
+            self.model.points.iter().map(|p| DVec2::new(p.y * cos + p.x * sin + requested.y_m, p.z)).collect();
+        let pairs: Vec<(DVec3, DVec3)> = moved.iter().map(|p| (DVec3::new(0.0, p.x, p.y), DVec3::ZERO)).collect();
+        let tree = Samples::in_plane(&pairs);
+        let mut matched = Matched { changed: true, ..Matched::default() };
+        for (p, slot) in self.scene.iter().zip(&mut self.nearest) {
+            let (item, _) = tree.nearest(DVec3::new(0.0, p.x, p.y));
+            *slot = item;
+            matched.add(moved[item as usize].distance_squared(*p));
+        }
+        self.lookups += self.scene.len();
+        let whole: Vec<DVec2> = self.model.points.iter().map(|p| DVec2::new(p.y, p.z)).collect();
+        let mean = moved.iter().sum::<DVec2>() / moved.len() as f64;
+        (rigid(&moved, mean, |i| whole[i]), matched)
+    }
+
+    /// The pose that brings the pairs closest.
+    fn closed_form(&self) -> PlanarPose {
+        rigid(&self.scene, self.centroid, |i| self.model.yz(self.nearest[i]))
+    }
+
+    fn note(&mut self, run: usize, iteration: usize, grasp_from_object: PlanarPose, matched: &Matched) {
+        if self.config.record {
+            let points = self.scene.len();
+            self.trace.push(TraceStep {
+                run,
+                iteration,
+                grasp_from_object,
+                grasp_from_object_6dof: None,
+                cost_m2: matched.squares / points as f64,
+                inlier_share: matched.inliers as f64 / points as f64,
+                kernel_m: f64::INFINITY,
+                points,
+            });
+        }
+    }
 }
 
 /// The rigid motion of the model that brings the pairs closest: `grasp_from_object`.
 ///
 /// The rotation is read from the 2 x 2 correlation directly, which unlike an SVD cannot return a reflection.
-fn closed_form(scene: &[DVec2], scene_centroid: DVec2, model: &[[f64; 2]], nearest: &[u32]) -> PlanarPose {
-    let model_point = |item: u32| DVec2::from_array(model[item as usize]);
-    let model_centroid = nearest.iter().map(|&i| model_point(i)).sum::<DVec2>() / nearest.len() as f64;
+fn rigid(scene: &[DVec2], scene_mean: DVec2, model: impl Fn(usize) -> DVec2) -> PlanarPose {
+    let model_mean = (0..scene.len()).map(&model).sum::<DVec2>() / scene.len() as f64;
     let (mut dot, mut cross) = (0.0, 0.0);
-    for (p, item) in scene.iter().zip(nearest) {
-        let (s, m) = (*p - scene_centroid, model_point(*item) - model_centroid);
+    for (i, p) in scene.iter().enumerate() {
+        let (s, m) = (*p - scene_mean, model(i) - model_mean);
         dot += m.dot(s);
         cross += m.perp_dot(s);
     }
     let theta_rad = cross.atan2(dot);
-    let shift = scene_centroid - DVec2::from_angle(theta_rad).rotate(model_centroid);
+    let shift = scene_mean - DVec2::from_angle(theta_rad).rotate(model_mean);
     PlanarPose { theta_rad, y_m: shift.x, z_m: shift.y }
 }
 
-fn note(
-    config: &LabIcpConfig,
-    trace: &mut Vec<TraceStep>,
-    iteration: usize,
-    grasp_from_object: PlanarPose,
-    matched: &Matched,
-    points: usize,
-) {
-    if config.record {
-        trace.push(TraceStep {
-            run: 0,
-            iteration,
-            grasp_from_object,
-            grasp_from_object_6dof: None,
-            cost_m2: matched.squares / points as f64,
-            inlier_share: matched.inliers as f64 / points as f64,
-            kernel_m: f64::INFINITY,
-            points,
-        });
+/// The number of [`PaperTrap::RmseChoice`]: over the model points with a contact within the gate, in space, metres.
+/// Zero if there is none, as in the lab's tool for it.
+fn gated_rmse(model: &LabModel, contacts: &Samples, pose: PlanarPose) -> f64 {
+    let (mut sum, mut count) = (0.0, 0usize);
+    for p in model.points.iter() {
+        let yz = pose.transform_yz(DVec2::new(p.y, p.z));
+        let q = DVec3::new(p.x, yz.x, yz.y);
+        let (item, _) = contacts.nearest(q);
+        let squared = contacts.point(item).distance_squared(q);
+        if squared <= GATE_M * GATE_M {
+            sum += squared;
+            count += 1;
+        }
     }
+    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
 }
 
-fn fits(tree: &ImmutableKdTree<f64, 2>, points: &[DVec2], pose: PlanarPose) -> Vec<PointFit> {
+fn fits(flat: &Samples, points: &[DVec3], pose: PlanarPose) -> Vec<PointFit> {
     let object_from_grasp = pose.inverse();
     points
         .iter()
         .map(|p| {
-            if p.is_finite() {
-                let (_, squared) = nearest_model_point(tree, object_from_grasp.transform_yz(*p));
-                PointFit { residual_m: squared.sqrt() as f32, weight: 1.0, fate: Fate::Inlier }
-            } else {
-                PointFit { residual_m: f32::NAN, weight: 0.0, fate: Fate::NotFinite }
+            if !p.is_finite() {
+                return PointFit { residual_m: f32::NAN, weight: 0.0, fate: Fate::NotFinite };
             }
+            let q = object_from_grasp.transform_yz(DVec2::new(p.y, p.z));
+            let q = DVec3::new(0.0, q.x, q.y);
+            let (item, _) = flat.nearest(q);
+            PointFit { residual_m: flat.point(item).distance(q) as f32, weight: 1.0, fate: Fate::Inlier }
         })
         .collect()
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::domain::align::testing::{cross, cross_contacts};
-
-    /// The loop as written in the source's words: the model is moved, every nearest point is searched in full, all
-    /// iterations are run.
-    fn literal(scene: &[DVec2], model: &[DVec2], iterations: usize) -> PlanarPose {
-        let mut pose = PlanarPose::default();
-        let mean = |v: &[DVec2]| v.iter().sum::<DVec2>() / v.len() as f64;
-        for _ in 0..iterations {
-            let moved: Vec<DVec2> = model.iter().map(|m| pose.transform_yz(*m)).collect();
-            let paired: Vec<DVec2> = scene
-                .iter()
-                .map(|s| {
-                    let near = |i: &usize, j: &usize| {
-                        moved[*i].distance_squared(*s).total_cmp(&moved[*j].distance_squared(*s))
-                    };
-                    model[(0..model.len()).min_by(near).unwrap()]
-                })
-                .collect();
-            let (mu_s, mu_m) = (mean(scene), mean(&paired));
-            let mut w = [[0.0; 2]; 2];
-            for (s, m) in scene.iter().zip(&paired) {
-                // The lab's plane is (z, y), so its rotation has the other sign.
-                let (s, m) = ([s.y - mu_s.y, s.x - mu_s.x], [m.y - mu_m.y, m.x - mu_m.x]);
-                for i in 0..2 {
-                    for j in 0..2 {
-                        w[i][j] += s[i] * m[j];
-                    }
-                }
-            }
-            let phi = (w[1][0] - w[0][1]).atan2(w[0][0] + w[1][1]);
-            let t = mu_s - DVec2::from_angle(-phi).rotate(mu_m);
-            pose = PlanarPose { theta_rad: -phi, y_m: t.x, z_m: t.y };
-        }
-        pose
-    }
-
-    fn model(count: usize) -> Vec<DVec2> {
-        cross().sample_surface(count, 1).iter().map(|p| DVec2::new(p.y, p.z)).collect()
-    }
-
-    #[test]
-    fn equals_the_literal_loop_in_every_iteration() {
-        let truth = PlanarPose { theta_rad: 0.15, y_m: 0.002, z_m: -0.003 };
-        let scene = cross_contacts(300, truth, 2e-4, 5);
-        let model = model(400);
-        for iterations in [1, 2, 7, 60] {
-            let config = LabIcpConfig { iterations, ..LabIcpConfig::default() };
-            let ours = lab_icp(&scene, &model, &config).unwrap().grasp_from_object;
-            let theirs = literal(&scene, &model, iterations);
-            assert!((ours.theta_rad - theirs.theta_rad).abs().to_degrees() < 1e-6, "{ours:?} {theirs:?}");
-            assert!((ours.y_m - theirs.y_m).hypot(ours.z_m - theirs.z_m) < 1e-12);
-        }
-    }
-
-    #[test]
-    fn stops_early_at_a_fixed_point_and_reports_it() {
-        let truth = PlanarPose { theta_rad: -0.05, y_m: 0.001, z_m: 0.001 };
-        let scene = cross_contacts(600, truth, 1e-4, 2);
-        let config = LabIcpConfig { record: true, ..LabIcpConfig::default() };
-        let report = lab_icp(&scene, &model(2000), &config).unwrap();
-        assert_eq!(report.stop, Stop::FixedPoint);
-        assert!(report.converged && report.iterations < 200);
-        assert_eq!(report.trace.len(), report.iterations + 1);
-        assert_eq!(report.trace[0].grasp_from_object, PlanarPose::default());
-        assert_eq!(report.trace.last().unwrap().grasp_from_object, report.grasp_from_object);
-        assert!((report.lab_angle_rad() - 0.05).abs() < 0.02, "the lab's sign");
-        assert_eq!(report.fits.len(), 600);
-    }
-
-    #[test]
-    fn too_few_and_degenerate_inputs_are_errors() {
-        let config = LabIcpConfig::default();
-        let model = model(100);
-        let few = cross_contacts(3, PlanarPose::default(), 0.0, 1);
-        assert_eq!(lab_icp(&few, &model, &config), Err(AlignError::TooFewPoints { got: 3, needed: 4 }));
-        let same = vec![DVec2::new(0.01, 0.02); 50];
-        assert!(matches!(lab_icp(&same, &model, &config), Err(AlignError::Coincident { .. })));
-        let scene = cross_contacts(50, PlanarPose::default(), 0.0, 1);
-        assert_eq!(lab_icp(&scene, &[DVec2::NAN; 9], &config), Err(AlignError::EmptyModel { got: 0 }));
-        let same_model = vec![DVec2::new(0.001, 0.002); 5000];
-        assert!(lab_icp(&scene, &same_model, &config).unwrap().grasp_from_object.is_finite());
-    }
-}
+mod tests;

@@ -60,6 +60,10 @@ impl Register for AlignConfig {
         let mut config = self.clone();
         config.record = ask.record;
         if let Some(starts) = ask.starts {
+            if starts.is_empty() {
+                // Without any, the ladder would choose.
+                return Err(AlignError::Config { what: "starts" });
+            }
             config.starts = starts.to_vec();
         }
         align(scene.yz(), &tool.field, &config)

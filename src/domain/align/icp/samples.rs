@@ -1,69 +1,52 @@
 //! Model points with normals, and the nearest of them to a contact point.
 
-use std::fmt;
-use std::num::NonZero;
 use std::sync::Arc;
 
 use glam::DVec3;
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
-enum Tree {
-    /// Over y and z alone: a third coordinate that is always zero would waste every third level.
-    Plane(ImmutableKdTree<f64, 2>),
-    Space(ImmutableKdTree<f64, 3>),
-    /// The tree takes no empty list.
-    Empty,
+use super::tree::{Tree, Two};
+
+#[derive(Debug)]
+enum Index {
+    /// Over y and z alone.
+    Plane(Tree<2>),
+    Space(Tree<3>),
 }
 
 /// Points with unit normals (zero where there is none), metres, object frame, under a k-d tree.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Samples {
-    points: Vec<DVec3>,
-    normals: Vec<DVec3>,
-    tree: Arc<Tree>,
+    points: Arc<[DVec3]>,
+    normals: Arc<[DVec3]>,
+    index: Arc<Index>,
 }
-
-impl fmt::Debug for Samples {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Samples").field("points", &self.points.len()).finish_non_exhaustive()
-    }
-}
-
-const TWO: NonZero<usize> = NonZero::new(2).expect("two is not zero");
 
 impl Samples {
     /// Compares in all three coordinates. Pairs that are not finite are left out.
     pub fn in_space(pairs: &[(DVec3, DVec3)]) -> Self {
-        Self::new(pairs, |points| {
-            let points: Vec<[f64; 3]> = points.iter().map(DVec3::to_array).collect();
-            ImmutableKdTree::new_from_slice(&points).map_or(Tree::Empty, Tree::Space)
-        })
+        Self::new(pairs, |points| Index::Space(Tree::new(&points.iter().map(DVec3::to_array).collect::<Vec<_>>())))
     }
 
     /// Compares in y and z only. Pairs that are not finite are left out.
     pub fn in_plane(pairs: &[(DVec3, DVec3)]) -> Self {
-        Self::new(pairs, |points| {
-            let points: Vec<[f64; 2]> = points.iter().map(|p| [p.y, p.z]).collect();
-            ImmutableKdTree::new_from_slice(&points).map_or(Tree::Empty, Tree::Plane)
-        })
+        Self::new(pairs, |points| Index::Plane(Tree::new(&points.iter().map(|p| [p.y, p.z]).collect::<Vec<_>>())))
     }
 
-    fn new(pairs: &[(DVec3, DVec3)], tree: impl Fn(&[DVec3]) -> Tree) -> Self {
-        // The tree would take a NaN and answer every query with nonsense.
+    fn new(pairs: &[(DVec3, DVec3)], index: impl Fn(&[DVec3]) -> Index) -> Self {
+        // A NaN would make every comparison, and so the tree, meaningless.
         let (points, normals): (Vec<DVec3>, Vec<DVec3>) =
             pairs.iter().filter(|(p, n)| p.is_finite() && n.is_finite()).copied().unzip();
-        let tree = if points.is_empty() { Tree::Empty } else { tree(&points) };
-        Self { points, normals, tree: Arc::new(tree) }
+        Self { index: Arc::new(index(&points)), points: points.into(), normals: normals.into() }
     }
 
     /// How many there are.
     pub fn len(&self) -> usize {
-        if matches!(*self.tree, Tree::Empty) { 0 } else { self.points.len() }
+        self.points.len()
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.len() == 0
+        self.points.is_empty()
     }
 
     /// A point, metres, object frame.
@@ -83,37 +66,11 @@ impl Samples {
 
     /// The nearest point and how much farther the second nearest is, metres. `p` must be finite; the list not empty.
     pub(in crate::domain::align) fn nearest(&self, p: DVec3) -> (u32, f64) {
-        let lead = |found: &mut dyn Iterator<Item = (u32, f64)>| {
-            let (item, first) = found.next().unwrap_or((0, 0.0));
-            let second = found.next().map_or(f64::INFINITY, |(_, d)| d);
-            (item, second.sqrt() - first.sqrt())
+        let Two { items, squared } = match &*self.index {
+            Index::Plane(tree) => tree.two_nearest(&[p.y, p.z]),
+            Index::Space(tree) => tree.two_nearest(&p.to_array()),
         };
-        match &*self.tree {
-            Tree::Plane(tree) => {
-                let found = tree.query(&[p.y, p.z]).nearest_n::<SquaredEuclidean<f64>>(TWO).execute();
-                lead(&mut found.iter().map(|f| (f.item, f.distance)))
-            }
-            Tree::Space(tree) => {
-                let found = tree.query(&p.to_array()).nearest_n::<SquaredEuclidean<f64>>(TWO).execute();
-                lead(&mut found.iter().map(|f| (f.item, f.distance)))
-            }
-            Tree::Empty => (0, 0.0),
-        }
-    }
-
-    /// Up to `count` nearest points, nearest first.
-    pub(super) fn neighbours(&self, p: DVec3, count: NonZero<usize>) -> Vec<u32> {
-        match &*self.tree {
-            Tree::Plane(tree) => {
-                let found = tree.query(&[p.y, p.z]).nearest_n::<SquaredEuclidean<f64>>(count).execute();
-                found.iter().map(|f| f.item).collect()
-            }
-            Tree::Space(tree) => {
-                let found = tree.query(&p.to_array()).nearest_n::<SquaredEuclidean<f64>>(count).execute();
-                found.iter().map(|f| f.item).collect()
-            }
-            Tree::Empty => Vec::new(),
-        }
+        (items[0], squared[1].sqrt() - squared[0].sqrt())
     }
 }
 
