@@ -179,7 +179,9 @@ fn meshes(cx: &Cx<'_>, source: ImprintSource, seconds: f64, scene: &mut SceneDat
             }
             (None, Some(registered)) => {
                 let pose = layers::swayed(cx, source, registered, seconds);
-                show("CAD", pose.to_affine(), cx.p.cad, Look::Solid);
+                // Coloured points are what is looked at: the model lets them through.
+                let colored = cx.local.layer_colors[source as usize].is_some();
+                show("CAD", pose.to_affine(), cx.p.cad, if colored { Look::XRay } else { Look::Solid });
             }
             (None, None) => {}
         }

@@ -14,7 +14,7 @@ use crate::domain::colormap::Range;
 use crate::domain::frames::PlanarPose;
 use crate::domain::sensor::Finger;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
-use crate::gpu::points::{CloudItem, PointColors};
+use crate::gpu::points::{CloudItem, PointColors, PointSize};
 use crate::ui::cx::Cx;
 use crate::ui::layers::{RESIDUAL_MAP, reason_rgb};
 
@@ -71,6 +71,8 @@ pub(super) fn paint(cx: &Cx<'_>, source: ImprintSource, finger: Finger, item: &m
     item.revision = colors.revision;
     item.style.map = RESIDUAL_MAP;
     item.style.range = colors.range;
+    // Larger than uncoloured ones: a colour has to be told from the next.
+    item.style.size = PointSize::Metres(0.000_6);
 }
 
 /// How well the registered pose of a side is determined.

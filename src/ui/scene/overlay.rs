@@ -181,9 +181,10 @@ fn residual_bar(cx: &Cx<'_>, painter: &egui::Painter, source: ImprintSource, rec
     let font = FontId::proportional(10.0);
     for (share, anchor) in [(0.0, Align2::LEFT_TOP), (0.5, Align2::CENTER_TOP), (1.0, Align2::RIGHT_TOP)] {
         let mm = units::mm(layers.range_m) * f64::from(share);
-        let text = if share == 1.0 { format!("{mm:.0} mm residual") } else { format!("{mm:.0}") };
+        let text = if share == 1.0 { format!("{mm:.0} mm") } else { format!("{mm:.0}") };
         painter.text(pos2(bar.left() + bar.width() * share, bar.bottom() + 1.0), anchor, text, font.clone(), cx.p.text);
     }
+    painter.text(bar.right_top() - vec2(0.0, 3.0), Align2::RIGHT_BOTTOM, "residual", font, cx.p.text);
     if let Some(kernel) = layers.kernel_m {
         let x = bar.left() + bar.width() * (kernel / layers.range_m) as f32;
         painter.vline(x, bar.top() - 3.0..=bar.bottom(), Stroke::new(1.5, cx.p.strong));
