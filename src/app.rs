@@ -15,6 +15,7 @@ pub mod document;
 pub mod effect;
 pub mod error;
 pub mod history;
+pub mod inspect;
 pub mod jobs;
 pub mod keys;
 pub mod library;

@@ -3,6 +3,7 @@
 //! With `--json`, standard output carries exactly one JSON object; progress, notes and errors go to standard error.
 //! The exit code is 0 only when everything asked for was done.
 
+mod basin;
 mod bench;
 mod contact_mask;
 mod doctor;
@@ -44,6 +45,8 @@ enum Verb {
     Generate(generate::GenerateArgs),
     /// Estimate in-hand poses from measured or predicted imprints.
     Pose(pose::PoseArgs),
+    /// Where starts of the registration lead, for one pair: the numbers behind the basin map.
+    Basin(Box<basin::BasinArgs>),
     /// Contact masks.
     #[command(subcommand)]
     Masks(masks::MasksVerb),
@@ -79,6 +82,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Simulate(args)) => simulate::run(&args),
         Some(Verb::Generate(args)) => generate::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
+        Some(Verb::Basin(args)) => basin::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
         Some(Verb::Bench(verb)) => bench::run(&verb),

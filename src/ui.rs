@@ -5,9 +5,11 @@
 
 pub mod app;
 pub mod theme;
+mod timemachine;
 pub mod widget;
 
 mod bars;
+mod basin;
 mod browser;
 mod cx;
 mod dialogs;

@@ -2,6 +2,7 @@
 //! thread, so that every order of events can be had on purpose.
 
 mod double;
+mod inspect;
 mod masks;
 mod random;
 mod whole;

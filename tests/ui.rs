@@ -7,5 +7,6 @@ mod layout;
 mod look;
 mod rig;
 
+mod inspect;
 mod job;
 mod workbench;

@@ -4,7 +4,8 @@ use strum::{EnumIter, IntoEnumIterator};
 
 use super::command::{CameraPreset, Command, Pane, UiRequest};
 use super::document::Review;
-use super::keys::{ImprintSource, PoseEngine, ShiftMode};
+use super::inspect::{InspectCommand, Inspected};
+use super::keys::{ImprintSource, PoseEngine, Request, ShiftMode};
 use super::library::Place;
 use super::settings::{ColourRange, MaskTool, Theme, Workspace};
 use super::state::State;
@@ -73,6 +74,8 @@ pub enum Key {
     Minus,
     Equals,
     Backtick,
+    Comma,
+    Period,
     Questionmark,
     Exclamationmark,
 }
@@ -94,6 +97,8 @@ impl Key {
             Self::Minus => "-".into(),
             Self::Equals => "=".into(),
             Self::Backtick => "`".into(),
+            Self::Comma => ",".into(),
+            Self::Period => ".".into(),
             Self::Questionmark => "?".into(),
             Self::Exclamationmark => "!".into(),
             _ => name.strip_prefix("Num").map_or(name.clone(), ToOwned::to_owned),
@@ -280,6 +285,14 @@ actions! {
     RevertHand, Pose, "Revert the pose by hand", "Gives the pose set by hand up (Esc)", [];
     MeasureDistance, Pose, "Measure distance", "Measures between two points clicked in 3D", [plain(K::Y)];
     MeasureAngle, Pose, "Measure angle", "Measures the angle at the second of three points clicked in 3D", [shift(K::Y)];
+    StepBack, Pose, "Previous step", "Shows the step before in the time machine", [plain(K::Comma)];
+    StepForward, Pose, "Next step", "Shows the next step in the time machine", [plain(K::Period)];
+    FirstStep, Pose, "First step", "Shows the pose that the registration began at", [shift(K::Comma)];
+    LastStep, Pose, "Last step", "Shows the pose that the registration ended at", [shift(K::Period)];
+    PlaySteps, Pose, "Play the steps", "Lets the steps go by, or stops; with the pointer in the time machine or a 3D view", [plain(K::Space)];
+    PinStep, Pose, "Pin this step", "Keeps the step for comparison with another", [plain(K::J)];
+    OwnStarts, Pose, "All own starts", "Back from a single start to those of the registration", [];
+    Correspondences, Pose, "Correspondences", "Draws lines from contact points to where they are pulled, or not", [];
     NextPoseEngine, Pose, "Other registration", "Goes through the registrations", [];
 
     LockRange, View, "Lock the colour range", "Keeps the colours from pair to pair, or fits them to each", [plain(K::O)];
@@ -394,6 +407,8 @@ impl Action {
                     Some(Command::CancelStroke)
                 } else if let Some(command) = escape(state) {
                     Some(Command::Workbench(command))
+                } else if state.tasks.demanded.iter().any(|r| matches!(r, Request::Basin(_))) {
+                    Some(Command::Inspect(InspectCommand::StopBasin))
                 } else {
                     when(!state.tasks.running.is_empty(), Command::CancelAll)
                 }
@@ -440,6 +455,16 @@ impl Action {
             Self::IcpFromHere => bench(in_hand(state), WorkbenchCommand::StartIcp),
             Self::AcceptHand => bench(editable && state.workbench.hand.is_some(), WorkbenchCommand::AcceptHand),
             Self::RevertHand => bench(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand),
+            Self::StepBack => inspect(state, |s| s.at > 0, InspectCommand::By(-1)),
+            Self::StepForward => inspect(state, |s| !s.is_last(), InspectCommand::By(1)),
+            Self::FirstStep => inspect(state, |s| s.at > 0, InspectCommand::Begin),
+            Self::LastStep => inspect(state, |s| !s.is_last(), InspectCommand::End),
+            Self::PlaySteps => {
+                inspect(state, |s| s.inspection.num_steps(s.run) > 1, InspectCommand::Play(!state.inspect.playing))
+            }
+            Self::PinStep => inspect(state, |_| true, InspectCommand::Pin),
+            Self::OwnStarts => when(state.inspect.start.is_some(), Command::Inspect(InspectCommand::Start(None))),
+            Self::Correspondences => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines)),
             Self::NextPoseEngine => next_of::<PoseEngine>(&settings.pose_engine).map(Command::SetPoseEngine),
 
             Self::LockRange => {
@@ -508,6 +533,12 @@ fn escape(state: &State) -> Option<WorkbenchCommand> {
     } else {
         bench.picked.map(|_| WorkbenchCommand::Pick(None))
     }
+}
+
+/// A command of the time machine, where it is on screen and shows a step for which it can do something.
+fn inspect(state: &State, useful: impl Fn(Inspected<'_>) -> bool, command: InspectCommand) -> Option<Command> {
+    let shown = state.selection.panes.contains(&Pane::TimeMachine).then(|| state.inspected())??;
+    useful(shown).then_some(Command::Inspect(command))
 }
 
 /// Accepts the pose shown, or withdraws it if it is the accepted one.

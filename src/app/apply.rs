@@ -2,6 +2,7 @@
 
 mod answers;
 mod generate;
+mod inspect;
 mod masks;
 mod preferences;
 mod workbench;
@@ -113,6 +114,7 @@ fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
             reorder(state);
         }
         Command::AcceptPose(source, accept) => masks::accept_pose(state, source, accept, effects),
+        Command::Inspect(command) => inspect::step(state, command),
         Command::Save => save_all(state, effects),
         Command::ExportMasks(folder) => {
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
@@ -205,6 +207,7 @@ fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>) {
     state.selection.pair = Some(pair);
     state.selection.hover_point = None;
     state.workbench.leave_pair();
+    inspect::rewind(state);
     // What failed while it was only loaded ahead was not reported then.
     if let Some(key) = state.pair_key()
         && let Some(err) = state.tasks.failed.get(&Request::Sample(key))

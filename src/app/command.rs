@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use super::document::{PairLabels, Review};
 use super::error::TaskError;
+use super::inspect::{InspectCommand, Inspection};
 use super::keys::{DatasetSeq, ImprintSource, PoseEngine, Recipe, Request, ShiftMode};
 use super::library::{BundleInfo, Place, Sort};
 use super::results::{Clouds, Comparison, LayerResult, PoseResult, Prediction};
@@ -19,6 +20,7 @@ use super::settings::{
 };
 use super::tasks::{Progress, Ticket};
 use super::workbench::WorkbenchCommand;
+use crate::domain::align::basin::Basin;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::Sample;
@@ -48,6 +50,10 @@ pub enum Pane {
     SceneMeasured,
     /// The predicted cloud on the CAD model.
     ScenePredicted,
+    /// The steps of a registration.
+    TimeMachine,
+    /// Where starts lead.
+    BasinMap,
     /// The generator.
     Generate,
     /// The mask tools.
@@ -214,6 +220,8 @@ pub enum Command {
     DoneAndNext,
     /// Accepts the pose shown for an imprint, or withdraws it.
     AcceptPose(ImprintSource, bool),
+    /// Moves about in the time machine and the basin map.
+    Inspect(InspectCommand),
     /// Writes all labels and settings now.
     Save,
     /// Writes the masks to a folder for UNet training.
@@ -341,6 +349,10 @@ pub enum Computed {
     Pose(Arc<PoseResult>),
     /// Of [`Request::Layers`].
     Layers(Arc<LayerResult>),
+    /// Of [`Request::Inspection`].
+    Inspection(Arc<Inspection>),
+    /// Of [`Request::Basin`].
+    Basin(Arc<Basin>),
 }
 
 /// A pair whose labels are to be written.

@@ -9,6 +9,7 @@ pub use crate::domain::diffusion::Sampler;
 pub use crate::domain::postprocess::ShiftMode;
 
 use super::settings::RuntimeChoice;
+use crate::domain::align::basin::Plane;
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
 use crate::domain::sensor::Finger;
@@ -183,7 +184,7 @@ pub struct PoseKey {
     pub engine: PoseEngine,
 }
 
-/// A planar pose that compares and hashes by its bits.
+/// A pose (`grasp_from_object`) that compares and hashes by its bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PoseBits([u64; 3]);
 
@@ -210,6 +211,15 @@ pub struct RunKey {
     pub start: Option<PoseBits>,
 }
 
+/// A basin map.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct BasinKey {
+    /// What is registered, and how.
+    pub pose: PoseKey,
+    /// Which starts are tried.
+    pub plane: Plane,
+}
+
 /// A result that is computed because a visible pane shows it. Ordered, hashable: it is its own key.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Request {
@@ -233,6 +243,10 @@ pub enum Request {
     Run(RunKey),
     /// Reasons, residuals and distances of a recorded registration from the engine's own starts.
     Layers(PoseKey),
+    /// The steps of a recorded registration, made ready to be looked through.
+    Inspection(RunKey),
+    /// Where starts lead.
+    Basin(BasinKey),
     /// A small picture of a pair's measured imprint.
     Thumbnail(PairKey),
 }
@@ -248,7 +262,9 @@ impl Request {
             Self::Cloud(key)
             | Self::Pose(PoseKey { cloud: key, .. })
             | Self::Layers(PoseKey { cloud: key, .. })
-            | Self::Run(RunKey { pose: PoseKey { cloud: key, .. }, .. }) => {
+            | Self::Run(RunKey { pose: PoseKey { cloud: key, .. }, .. })
+            | Self::Inspection(RunKey { pose: PoseKey { cloud: key, .. }, .. })
+            | Self::Basin(BasinKey { pose: PoseKey { cloud: key, .. }, .. }) => {
                 key.parts.iter().flatten().next().map(|(imprint, _)| imprint.touch().pair.dataset)
             }
         }

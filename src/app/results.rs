@@ -6,8 +6,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec3;
 
-use super::keys::{CloudKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, RunKey, ShiftMode, TouchKey};
+use super::inspect::Inspection;
+use super::keys::{BasinKey, CloudKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, RunKey, ShiftMode, TouchKey};
 use super::services::{Generated, NamedTool};
+use crate::domain::align::basin::Basin;
 use crate::domain::align::reason::{Reason, ReasonCounts};
 use crate::domain::align::{AlignReport, BothWays, PointFit, TraceStep};
 use crate::domain::frames::PlanarPose;
@@ -275,6 +277,10 @@ pub struct Results {
     pub runs: Cache<RunKey, PoseResult>,
     /// Their layers.
     pub layers: Cache<PoseKey, LayerResult>,
+    /// Their steps.
+    pub inspections: Cache<RunKey, Inspection>,
+    /// Basin maps.
+    pub basins: Cache<BasinKey, Basin>,
     /// Tools.
     pub tools: Cache<String, NamedTool>,
     /// The prediction shown for each touch: the last one generated, or the one chosen.
@@ -283,6 +289,10 @@ pub struct Results {
     pub made: BTreeMap<TouchKey, Vec<Recipe>>,
     /// The last cloud and pose of a pair and imprint: shown dimmed while the next is computed.
     pub latest: BTreeMap<(PairKey, ImprintSource), (Option<CloudKey>, Option<PoseKey>)>,
+    /// The last recorded registration, for the same purpose.
+    pub latest_inspections: BTreeMap<(PairKey, ImprintSource), RunKey>,
+    /// The last basin map, for the same purpose.
+    pub latest_basins: BTreeMap<(PairKey, ImprintSource), BasinKey>,
 }
 
 const MIB: usize = 1 << 20;
@@ -301,10 +311,14 @@ impl Default for Results {
             poses: Cache::new(32 * MIB),
             runs: Cache::new(32 * MIB),
             layers: Cache::new(16 * MIB),
+            inspections: Cache::new(64 * MIB),
+            basins: Cache::new(32 * MIB),
             tools: Cache::new(128 * MIB),
             chosen: BTreeMap::new(),
             made: BTreeMap::new(),
             latest: BTreeMap::new(),
+            latest_inspections: BTreeMap::new(),
+            latest_basins: BTreeMap::new(),
         }
     }
 }
@@ -322,10 +336,14 @@ impl Results {
         self.poses.clear();
         self.runs.clear();
         self.layers.clear();
+        self.inspections.clear();
+        self.basins.clear();
         self.tools.clear();
         self.chosen.clear();
         self.made.clear();
         self.latest.clear();
+        self.latest_inspections.clear();
+        self.latest_basins.clear();
     }
 }
 

@@ -9,6 +9,7 @@ use super::command::{Hover, Pane};
 use super::document::Document;
 use super::error::TaskError;
 use super::history::History;
+use super::inspect::Inspect;
 use super::keys::{PairKey, TouchKey};
 use super::library::Library;
 use super::results::Results;
@@ -25,6 +26,8 @@ pub struct State {
     pub library: Library,
     /// What is looked at.
     pub selection: Selection,
+    /// What of a registration is looked at.
+    pub inspect: Inspect,
     /// What a person made.
     pub document: Document,
     /// What can be undone.

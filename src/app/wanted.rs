@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::command::Pane;
+use super::inspect::INSPECT_PANES;
 use super::keys::{
     CloudKey, ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, PairKey, PoseKey, Recipe, Request, TouchKey,
 };
@@ -356,14 +357,18 @@ impl State {
     }
 
     /// What stands in place of a result that is not cached.
-    fn missing<T: ?Sized>(&self, request: &Request) -> Lookup<'_, T> {
+    pub(super) fn missing<T: ?Sized>(&self, request: &Request) -> Lookup<'_, T> {
         match self.tasks.failed.get(request) {
             Some(err) => Lookup::Failed(err),
             None => Lookup::Waiting,
         }
     }
 
-    fn missing_but<'a, T: ?Sized>(&'a self, request: Option<Request>, before: Option<&'a T>) -> Lookup<'a, T> {
+    pub(super) fn missing_but<'a, T: ?Sized>(
+        &'a self,
+        request: Option<Request>,
+        before: Option<&'a T>,
+    ) -> Lookup<'a, T> {
         match (request.and_then(|request| self.tasks.failed.get(&request)), before) {
             (Some(err), _) => Lookup::Failed(err),
             (None, Some(before)) => Lookup::Stale(before),
@@ -388,7 +393,7 @@ impl State {
 }
 
 /// Panes that show something of the selected pair.
-const PAIR_PANES: [Pane; 13] = [
+const PAIR_PANES: [Pane; 15] = [
     Pane::GelRaw,
     Pane::GelReference,
     Pane::GelDifference,
@@ -397,6 +402,8 @@ const PAIR_PANES: [Pane; 13] = [
     Pane::Error,
     Pane::SceneMeasured,
     Pane::ScenePredicted,
+    Pane::TimeMachine,
+    Pane::BasinMap,
     Pane::Generate,
     Pane::Masks,
     Pane::Layers,
@@ -441,34 +448,40 @@ impl Wanted<'_> {
         };
         let scene_measured = needed(measured, Pane::SceneMeasured, Pane::ScenePredicted);
         let scene_predicted = needed(predicted, Pane::ScenePredicted, Pane::SceneMeasured);
+        let inspected = state.is_visible(&INSPECT_PANES).then_some(state.inspect.source);
+        let cloud_measured = scene_measured || inspected == Some(measured);
+        let cloud_predicted = scene_predicted || inspected == Some(predicted);
 
         let shown = state.selection.fingers();
         for finger in Finger::BOTH {
             let on_screen = shown.contains(&finger);
             let image = state.is_visible(&[Pane::Predicted]) && on_screen;
             let compared = state.is_visible(&[Pane::Error, Pane::Metrics]) && on_screen;
-            if image || compared || scene_predicted {
+            if image || compared || cloud_predicted {
                 self.imprint(finger, pair.finger(finger));
             }
             if compared {
                 self.comparison(finger, pair.finger(finger));
             }
             let drawn = on_screen && (state.settings.mask_visible || state.is_visible(&[Pane::Masks]));
-            if scene_measured || (drawn && state.is_visible(&[Pane::Measured])) {
+            if cloud_measured || (drawn && state.is_visible(&[Pane::Measured])) {
                 self.mask(measured, finger);
             }
-            if scene_predicted || (drawn && state.is_visible(&[Pane::Predicted])) {
+            if cloud_predicted || (drawn && state.is_visible(&[Pane::Predicted])) {
                 self.mask(predicted, finger);
             }
         }
         // While the pen is down the cloud would be out of date before it is there.
         if state.document.stroke.is_none() {
-            for (visible, source) in [(scene_measured, measured), (scene_predicted, predicted)] {
-                if visible {
-                    self.cloud_and_pose(source);
+            for (cloud, pose, source) in
+                [(cloud_measured, scene_measured, measured), (cloud_predicted, scene_predicted, predicted)]
+            {
+                if cloud && self.cloud(source) && pose {
+                    self.pose(source);
                     self.workbench(source);
                 }
             }
+            self.inspection();
         }
     }
 
@@ -522,23 +535,48 @@ impl Wanted<'_> {
         }
     }
 
-    fn cloud_and_pose(&mut self, source: ImprintSource) {
+    /// Asks for the cloud and the tool; whether both are there.
+    fn cloud(&mut self, source: ImprintSource) -> bool {
         let state = self.state;
         self.tool();
         if !state.document.stored.contains_key(state.pair_name()) {
-            return;
+            return false;
         }
         let Ok(Some(key)) = state.cloud_key(source) else {
-            return;
+            return false;
         };
-        if !state.results.clouds.contains(&key) {
-            return self.ask(false, Request::Cloud(key));
+        let there = state.results.clouds.contains(&key);
+        self.ask(there, Request::Cloud(key));
+        there && state.tool().ready().is_some()
+    }
+
+    fn pose(&mut self, source: ImprintSource) {
+        if let Ok(Some(key)) = self.state.pose_key(source) {
+            self.ask(self.state.results.poses.contains(&key), Request::Pose(key));
         }
-        let Ok(Some(key)) = state.pose_key(source) else {
+    }
+
+    /// The recorded run, and the map of starts last: it takes the longest.
+    fn inspection(&mut self) {
+        let state = self.state;
+        let Ok(Some(cloud)) = state.cloud_key(state.inspect.source) else {
             return;
         };
-        if state.tool().ready().is_some() {
-            self.ask(state.results.poses.contains(&key), Request::Pose(key));
+        if !state.results.clouds.contains(&cloud) || state.tool().ready().is_none() {
+            return;
+        }
+        if state.shows_steps(state.inspect.source)
+            && let Ok(Some(key)) = state.inspection_key()
+        {
+            match state.results.runs.contains(&key) {
+                true => self.ask(state.results.inspections.contains(&key), Request::Inspection(key)),
+                false => self.ask(state.results.inspections.contains(&key), Request::Run(key)),
+            }
+        }
+        if state.is_visible(&[Pane::BasinMap])
+            && let Ok(Some(key)) = state.basin_key()
+        {
+            self.ask(state.results.basins.contains(&key), Request::Basin(key));
         }
     }
 

@@ -11,7 +11,7 @@ use super::frames::PlanarPose;
 use super::mesh::sampling::spread;
 use super::pose::{Engine, ToolModel, register, register_from};
 
-/// Contact points per run of a basin map with the distance field: as many as the answer is computed from.
+/// Contact points per run of a basin map with the distance field: more move its ends by less than a line is wide.
 const MAP_POINTS: usize = 512;
 /// The same with registrations that ask a tree for every point and iteration: 651 runs must take about a second.
 const MAP_POINTS_COSTLY: usize = 96;

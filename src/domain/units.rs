@@ -5,14 +5,23 @@ pub fn mm(metres: f64) -> f64 {
     metres * 1e3
 }
 
+/// A number with fixed decimals that never reads `-0.00`.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(size) if size.bytes().all(|b| matches!(b, b'0' | b'.')) => size.to_owned(),
+        _ => text,
+    }
+}
+
 /// `8.42 mm`: lengths are shown with two decimals.
 pub fn text_mm(metres: f64) -> String {
-    format!("{:.2} mm", mm(metres))
+    format!("{} mm", fixed(mm(metres), 2))
 }
 
 /// `12.3°`: angles are shown with one decimal.
 pub fn text_deg(radians: f64) -> String {
-    format!("{:.1}°", radians.to_degrees())
+    format!("{}°", fixed(radians.to_degrees(), 1))
 }
 
 /// The angle brought into (-π, π].
@@ -35,6 +44,7 @@ mod tests {
         assert!((angle_error(359f64.to_radians(), 1f64.to_radians()) - 2f64.to_radians()).abs() < 1e-12);
         assert!((angle_error(0.3, 0.3 + std::f64::consts::TAU)).abs() < 1e-12);
         assert_eq!(text_deg(-0.1), "-5.7°");
+        assert_eq!((fixed(-0.0004, 2), fixed(-0.006, 2), fixed(-1.0, 0)), ("0.00".into(), "-0.01".into(), "-1".into()));
         assert_eq!(text_mm(0.00842), "8.42 mm");
     }
 }

@@ -285,7 +285,7 @@ fn pose_cases(
     } else {
         Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
     };
-    let (mask_name, masks) = masks(args, sample, tool, &imprints, predicted, predictor)?;
+    let (mask_name, masks) = masks(&args.mask, sample, tool, &imprints, predicted, predictor)?;
     let fingers = Finger::BOTH.map(|f| {
         let camera = sample.finger(f)?.bubble.as_ref()?.camera.as_ref()?;
         Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
@@ -323,15 +323,15 @@ fn pose_cases(
 }
 
 /// The contact masks and the name of their source.
-fn masks(
-    args: &PoseArgs,
+pub(super) fn masks(
+    args: &MaskArgs,
     sample: &Sample,
     tool: &ToolModel,
     imprints: &[Option<DepthMap>; 2],
     predicted: bool,
     predictor: &mut Predictor,
 ) -> anyhow::Result<(&'static str, [Option<Mask>; 2])> {
-    let source = match args.mask.mask {
+    let source = match args.mask {
         MaskFrom::Auto if !predicted && sample.grasp_from_object.is_some() => MaskFrom::Cad,
         // The truth must not leak into the pose of a prediction unless it was asked for.
         MaskFrom::Auto => MaskFrom::Unet,
@@ -345,7 +345,7 @@ fn masks(
             continue;
         };
         let truth = sample.grasp_from_object;
-        masks[finger.index()] = Some(contact_mask(source, &args.mask, imprint, bubble, Some(tool), truth, predictor)?);
+        masks[finger.index()] = Some(contact_mask(source, args, imprint, bubble, Some(tool), truth, predictor)?);
     }
     Ok((source.key(), masks))
 }

@@ -17,6 +17,7 @@ use super::scene_view::Device;
 use super::theme::{DARK, LIGHT};
 use super::widget::image_canvas::ViewTransform;
 use super::{bars, layout, log as log_pane, palette, pane, scene, shortcuts, theme};
+use crate::app::action::Action;
 use crate::app::command::{Command, Pane, UiRequest};
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
@@ -353,7 +354,7 @@ impl eframe::App for StudioApp {
         self.local.visible_next = BTreeSet::new();
         self.local.readout = None;
         self.local.hover_claimed = false;
-        self.local.hovered_pane = None;
+        self.local.hovered_before = self.local.hovered_pane.take();
         let workspace = self.state.settings.workspace;
         let stored = self.state.settings.layouts.get(workspace.name());
         let mut tree = self.trees.remove(&workspace).unwrap_or_else(|| layout::restore(stored, workspace));
@@ -375,9 +376,10 @@ impl eframe::App for StudioApp {
             };
             let covered =
                 cx.state.selection.palette || cx.state.selection.shortcut_sheet || cx.local.dialogs.is_path_box_open();
-            let state = cx.state;
-            for action in shortcuts::pressed(&ctx, covered, |action| action.command(state).is_some()) {
-                if action == crate::app::action::Action::CancelJobs && cx.local.maximised.take().is_some() {
+            let (state, over) = (cx.state, cx.local.hovered_before);
+            let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
+            for action in shortcuts::pressed(&ctx, covered, possible) {
+                if action == Action::CancelJobs && cx.local.maximised.take().is_some() {
                     continue;
                 }
                 match action.command(state) {

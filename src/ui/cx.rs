@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::dialogs::Dialogs;
 use super::palette::PaletteState;
 use super::saved::Saved;
-use super::scene::{Gizmo, LayerColors};
+use super::scene::{Gizmo, LayerColors, StepLines};
 use super::scene_view::{Device, SceneView};
 use super::theme::Palette;
 use super::widget::image_canvas::ViewTransform;
@@ -127,6 +127,10 @@ pub(super) struct Local {
     pub gizmo: Gizmo,
     /// The CAD model as the renderer takes them.
     pub mesh: Option<SceneMesh>,
+    /// Correspondences of the step that the time machine shows.
+    pub step_lines: Option<StepLines>,
+    /// When the last step went by while playing, seconds.
+    pub played_at: Option<f64>,
     /// Counts what was made for the renderer.
     pub revision: u64,
     /// Half the range of the error's colours, millimetres.
@@ -147,6 +151,8 @@ pub(super) struct Local {
     pub maximised: Option<Pane>,
     /// The pane under the pointer.
     pub hovered_pane: Option<Pane>,
+    /// The same in the frame before: keys come before the panes.
+    pub hovered_before: Option<Pane>,
     /// The stroke being drawn.
     pub painting: Option<Painting>,
     /// The number under the pointer, for the status bar and the clipboard.
@@ -188,6 +194,8 @@ impl Local {
             layer_colors: [None, None],
             gizmo: Gizmo::default(),
             mesh: None,
+            step_lines: None,
+            played_at: None,
             revision: 0,
             error_mm: 4.0,
             filter: String::new(),
@@ -198,6 +206,7 @@ impl Local {
             palette: PaletteState::default(),
             maximised: None,
             hovered_pane: None,
+            hovered_before: None,
             painting: None,
             readout: None,
             readout_before: None,

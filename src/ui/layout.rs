@@ -12,7 +12,7 @@ use crate::app::command::Pane;
 use crate::app::settings::Workspace;
 
 /// Part of the stored text: a layout of another version is not even tried.
-const FORMAT: &str = "touch2touch-layout-1";
+const FORMAT: &str = "touch2touch-layout-2";
 
 /// The panes of a workspace.
 pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
@@ -33,9 +33,20 @@ pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
             Metrics,
             Log,
         ],
-        Workspace::Align => {
-            &[Browser, ScenePredicted, SceneMeasured, Measured, Predicted, Layers, Poses, Metrics, Generate, Log]
-        }
+        Workspace::Align => &[
+            Browser,
+            ScenePredicted,
+            SceneMeasured,
+            TimeMachine,
+            BasinMap,
+            Measured,
+            Predicted,
+            Layers,
+            Poses,
+            Metrics,
+            Generate,
+            Log,
+        ],
         Workspace::Label => {
             &[Browser, Masks, Measured, Predicted, SceneMeasured, ScenePredicted, GelDifference, Metrics, Log]
         }
@@ -89,12 +100,14 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
         }
         Workspace::Align => {
             let browser = b.tabs(&[Browser]);
-            let (scene_p, scene_m) = (b.tabs(&[ScenePredicted]), b.tabs(&[SceneMeasured]));
-            let layers = b.tabs(&[Layers, Poses]);
-            let metrics = b.tabs(&[Metrics, Measured, Predicted, Generate, Log]);
-            let scenes = b.row(&[(scene_p, 1.0), (scene_m, 1.0)]);
-            let right = b.column(&[(layers, 1.16), (metrics, 0.84)]);
-            b.row(&[(browser, 0.165), (scenes, 0.625), (right, 0.21)])
+            let (scene_m, scene_p) = (b.tabs(&[SceneMeasured, Measured]), b.tabs(&[ScenePredicted, Predicted]));
+            let steps = b.tabs(&[TimeMachine]);
+            let basin = b.tabs(&[BasinMap, Layers, Poses]);
+            let metrics = b.tabs(&[Metrics, Generate, Log]);
+            let scenes = b.row(&[(scene_m, 1.0), (scene_p, 1.0)]);
+            let centre = b.column(&[(scenes, 1.15), (steps, 0.85)]);
+            let right = b.column(&[(basin, 1.2), (metrics, 0.8)]);
+            b.row(&[(browser, 0.13), (centre, 0.64), (right, 0.23)])
         }
         Workspace::Label => {
             let browser = b.tabs(&[Browser]);

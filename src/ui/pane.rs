@@ -5,8 +5,9 @@ use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles,
 
 use super::cx::Cx;
 use super::theme::{SMALL, medium};
+use super::timemachine;
 use super::widget::help;
-use super::{browser, generate, images, layers, log, masks, metrics, poses, scene, settings_pane, table};
+use super::{basin, browser, generate, images, layers, log, masks, metrics, poses, scene, settings_pane, table};
 use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
 
@@ -22,6 +23,8 @@ pub(super) fn title(pane: Pane) -> &'static str {
         Pane::Error => "Error",
         Pane::SceneMeasured => "3D measured",
         Pane::ScenePredicted => "3D predicted",
+        Pane::TimeMachine => "Time machine",
+        Pane::BasinMap => "Basin map",
         Pane::Generate => "Generate",
         Pane::Masks => "Mask",
         Pane::Layers => "Layers",
@@ -45,6 +48,8 @@ fn tooltip(pane: Pane) -> &'static str {
         Pane::Error => "Predicted minus measured: blue too shallow, red too deep",
         Pane::SceneMeasured => "The measured surface on the CAD model, grasp frame",
         Pane::ScenePredicted => "The predicted surface on the CAD model, grasp frame",
+        Pane::TimeMachine => "The steps of a registration, forwards and backwards",
+        Pane::BasinMap => "Where starts lead; a click on one loads its run into the time machine",
         Pane::Generate => "Predicts the Soft Bubble imprint",
         Pane::Masks => "Corrects the contact mask",
         Pane::Layers => "Residuals, drop reasons, distances both ways and the weak direction of a registration",
@@ -77,6 +82,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         }
         Pane::SceneMeasured => scene::show(cx, ui, ImprintSource::Measured),
         Pane::ScenePredicted => scene::show(cx, ui, ImprintSource::Predicted),
+        Pane::TimeMachine => timemachine::show(cx, ui),
+        Pane::BasinMap => basin::show(cx, ui),
         Pane::Generate => generate::show(cx, ui),
         Pane::Masks => masks::show(cx, ui),
         Pane::Layers => layers::show(cx, ui),
@@ -98,6 +105,8 @@ fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
             help::mark(ui, title(pane), help::IMAGE);
         }
         Pane::SceneMeasured | Pane::ScenePredicted => help::mark(ui, title(pane), help::SCENE),
+        Pane::TimeMachine => help::mark(ui, title(pane), help::STEPS),
+        Pane::BasinMap => help::mark(ui, title(pane), help::BASIN),
         _ => {}
     }
 }

@@ -6,6 +6,7 @@ mod hands;
 mod layers;
 mod measure;
 mod overlay;
+mod steps;
 
 use eframe::egui::{self, Ui};
 use glam::DAffine3;
@@ -27,6 +28,7 @@ use crate::gpu::view::{Camera, Preset};
 pub(super) use gizmo::Gizmo;
 pub(super) use layers::LayerColors;
 pub(super) use overlay::{angle_text, error_color, pose_details};
+pub(super) use steps::StepLines;
 
 /// How near the pointer must be to a point to mean it, physical pixels.
 const PICK_PX: f64 = 9.0;
@@ -63,6 +65,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     }
     build::update_mesh(cx);
     layers::update(cx, source);
+    steps::update(cx, source);
     let label = match source {
         ImprintSource::Measured => "3D view, measured",
         ImprintSource::Predicted => "3D view, predicted",

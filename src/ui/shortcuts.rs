@@ -6,7 +6,7 @@ use strum::IntoEnumIterator as _;
 use super::cx::Cx;
 use super::theme::{Palette, SMALL, section};
 use crate::app::action::{Action, Group, Key, Shortcut};
-use crate::app::command::Command;
+use crate::app::command::{Command, Pane};
 
 /// The toolkit's name of a key.
 fn key_of(key: Key) -> EKey {
@@ -33,7 +33,7 @@ pub(super) fn pressed(ctx: &egui::Context, covered: bool, possible: impl Fn(Acti
     ctx.input_mut(|input| {
         // The most specific first: Ctrl + Shift + Z is not Ctrl + Z.
         let mut all: Vec<(Action, Shortcut)> =
-            Action::iter().flat_map(|a| a.shortcuts().iter().map(move |s| (a, *s))).collect();
+            Action::iter().filter(|a| possible(*a)).flat_map(|a| a.shortcuts().iter().map(move |s| (a, *s))).collect();
         all.sort_by_key(|(_, s)| std::cmp::Reverse(u8::from(s.ctrl) + u8::from(s.shift) + u8::from(s.alt)));
         for (action, s) in all {
             if typing && !s.ctrl && !matches!(s.key, Key::F1 | Key::F5 | Key::F11 | Key::F12) {
@@ -67,6 +67,12 @@ pub(super) fn pressed(ctx: &egui::Context, covered: bool, possible: impl Fn(Acti
         }
     });
     actions
+}
+
+/// Whether an action's keys mean it while the pointer is over a pane. Space presses what has the focus elsewhere.
+pub(super) fn fits_pane(action: Action, over: Option<Pane>) -> bool {
+    const PLAYERS: [Pane; 3] = [Pane::TimeMachine, Pane::SceneMeasured, Pane::ScenePredicted];
+    action != Action::PlaySteps || over.is_some_and(|pane| PLAYERS.contains(&pane))
 }
 
 /// The window with all actions and their keys.

@@ -1,13 +1,18 @@
 //! Nothing to see is an error, and pictures for people.
 
 use touch2touch::app::command::Command;
+use touch2touch::app::inspect::{BasinColour, InspectCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{MaskSource, Theme, Workspace};
 use touch2touch::app::workbench::{Layer, SceneTool, WorkbenchCommand};
 use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::hand::HandAxis;
 
 use super::rig::Rig;
+
+/// A start so far off that the run from it ends elsewhere.
+const STRAY: PlanarPose = PlanarPose { theta_rad: -0.7, y_m: 0.008, z_m: 0.0 };
 
 /// Every workspace draws something in both themes and sizes.
 #[test]
@@ -45,7 +50,18 @@ fn pictures_for_the_docs() {
         rig.send(Command::Generate);
         rig.shoot(&format!("{name}-demo-inspect"));
         rig.send(Command::SetWorkspace(Workspace::Align));
+        rig.send(Command::Inspect(InspectCommand::Pin));
+        rig.send(Command::Inspect(InspectCommand::Begin));
+        rig.send(Command::Inspect(InspectCommand::Pin));
+        rig.send(Command::Inspect(InspectCommand::By(4)));
         rig.shoot(&format!("{name}-demo-align"));
+        rig.send(Command::Inspect(InspectCommand::Colour(BasinColour::Winner)));
+        rig.send(Command::Inspect(InspectCommand::Start(Some(STRAY))));
+        rig.shoot(&format!("{name}-demo-align-start"));
+        rig.send(Command::Inspect(InspectCommand::Start(None)));
+        for pin in 0..2 {
+            rig.send(Command::Inspect(InspectCommand::Unpin(pin)));
+        }
         for layer in [Layer::Residuals, Layer::Reasons] {
             rig.send(Command::Workbench(WorkbenchCommand::SetLayer(layer)));
             rig.shoot(&format!("{name}-demo-align-{}", layer.name()).to_lowercase());

@@ -12,7 +12,7 @@ use super::super::library::{BundleKind, OpenDataset, Place};
 use super::super::results::Prediction;
 use super::super::state::State;
 use super::super::tasks::{Level, Ticket};
-use super::{cancel_all, is_selected, masks, preferences, remember, reorder, workbench};
+use super::{cancel_all, inspect, is_selected, masks, preferences, remember, reorder, workbench};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
 
@@ -111,6 +111,8 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.selection.hover = None;
     state.selection.hover_point = None;
     state.workbench.leave_pair();
+    inspect::rewind(state);
+    state.inspect.pins = [None, None];
     let (pairs, problems) = (opened.source.index().pairs.len(), opened.source.problems().len());
     let (level, hint) = match problems {
         0 => (Level::Info, None),
@@ -184,6 +186,20 @@ fn store(state: &mut State, request: Request, computed: Computed) {
         (Request::Layers(key), Computed::Layers(layers)) => {
             let size = layers.bytes();
             results.layers.insert(key, layers, size);
+        }
+        (Request::Inspection(key), Computed::Inspection(inspection)) => {
+            if let Some(place) = place_of(&key.pose.cloud.parts) {
+                state.results.latest_inspections.insert(place, key.clone());
+            }
+            let size = inspection.bytes();
+            state.results.inspections.insert(key, inspection, size);
+        }
+        (Request::Basin(key), Computed::Basin(basin)) => {
+            if let Some(place) = place_of(&key.pose.cloud.parts) {
+                state.results.latest_basins.insert(place, key.clone());
+            }
+            let size = basin.bytes();
+            state.results.basins.insert(key, basin, size);
         }
         (request, _) => log::error!("the result of {request:?} is of another kind"),
     }

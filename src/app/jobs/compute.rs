@@ -6,9 +6,11 @@ use super::super::error::TaskError;
 use super::super::keys::{MaskRecipe, PoseEngine, ShiftMode};
 use super::super::results::{Clouds, Comparison, FingerCloud, PoseResult, Prediction};
 use super::super::services::NamedTool;
+use super::JobCx;
+use crate::domain::align::basin::{Basin, BasinConfig, Plane};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
-use crate::domain::inspect::recorded;
+use crate::domain::inspect::{basin_map, recorded};
 use crate::domain::mesh::TriMesh;
 use crate::domain::metrics::{self, SsimRange};
 use crate::domain::pose::{ToolModel, register};
@@ -204,6 +206,27 @@ pub fn run(
         ms,
         report,
     })
+}
+
+/// Where starts lead.
+///
+/// # Errors
+/// If the job was told to stop, or no start led anywhere.
+pub fn basin(
+    clouds: &Clouds,
+    tool: &ToolModel,
+    engine: PoseEngine,
+    plane: Plane,
+    cx: &JobCx,
+) -> Result<Basin, TaskError> {
+    const WHAT: &str = "Basin map";
+    let config = BasinConfig::new(plane);
+    let map = basin_map(&clouds.contact_points(), tool, engine, &config, || cx.cancel.is_cancelled())
+        .ok_or_else(|| TaskError::cancelled(WHAT))?;
+    match map.cells.iter().find_map(|cell| cell.failure.as_deref()) {
+        Some(why) if map.basins.is_empty() => Err(TaskError::new(WHAT, why)),
+        _ => Ok(map),
+    }
 }
 
 /// A small picture of the measured imprint of the right finger, else of the left, else nothing (an empty image).

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::super::command::Computed;
 use super::super::error::TaskError;
+use super::super::inspect::Inspection;
 use super::super::keys::{CloudKey, ImprintKey, MaskRecipe, MaskVersion, PairKey, Request, RunKey, TouchKey};
 use super::super::services::SharedServices;
 use super::super::state::State;
@@ -223,6 +224,32 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Box::new(move |_| {
                     let masks = [masks[0].as_deref(), masks[1].as_deref()];
                     Ok(Computed::Layers(Arc::new(inspect::layers(&clouds, masks, &tool.model, &run)?)))
+                }),
+            )
+        }
+        Request::Inspection(key) => {
+            let clouds = results.clouds.get(&key.pose.cloud)?.clone();
+            let tool = results.tools.get(&key.pose.tool.to_string())?.clone();
+            let run = results.runs.get(key)?.clone();
+            let engine = key.pose.engine;
+            job(
+                Lane::Compute,
+                "Steps of the registration".into(),
+                Box::new(move |_| {
+                    let points = clouds.contact_points();
+                    Ok(Computed::Inspection(Arc::new(Inspection::new(run, points, &tool.model, engine))))
+                }),
+            )
+        }
+        Request::Basin(key) => {
+            let clouds = results.clouds.get(&key.pose.cloud)?.clone();
+            let tool = results.tools.get(&key.pose.tool.to_string())?.clone();
+            let (engine, plane) = (key.pose.engine, key.plane);
+            job(
+                Lane::Compute,
+                "Basin map".into(),
+                Box::new(move |cx| {
+                    Ok(Computed::Basin(Arc::new(compute::basin(&clouds, &tool.model, engine, plane, cx)?)))
                 }),
             )
         }

@@ -1,6 +1,6 @@
 //! Queues and threads. A job that panics is caught here and becomes an ordinary failure.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex};
@@ -11,7 +11,7 @@ use strum::IntoEnumIterator as _;
 use super::super::command::Command;
 use super::super::error::TaskError;
 use super::super::jobs::prepare::{Body, RequestJob};
-use super::super::jobs::{JobCx, Lane};
+use super::super::jobs::{Cancel, JobCx, Lane};
 use super::super::keys::Request;
 use super::{JobId, Wake, lock};
 
@@ -38,8 +38,8 @@ struct Queue {
     ordered: VecDeque<Job>,
     /// Jobs that a pane wants: replaced as a whole when it wants something else.
     demanded: VecDeque<Job>,
-    /// Requests taken from `demanded` whose answer was not handled yet.
-    started: BTreeSet<Request>,
+    /// Requests taken from `demanded` whose answer was not handled yet, with the flag that stops them.
+    started: BTreeMap<Request, Cancel>,
     closing: bool,
 }
 
@@ -53,7 +53,7 @@ impl Queue {
         }
         let job = self.demanded.pop_front()?;
         if let JobId::Request(request) = &job.id {
-            self.started.insert(request.clone());
+            self.started.insert(request.clone(), job.cx.cancel.clone());
         }
         Some(job)
     }
@@ -119,15 +119,23 @@ impl Lanes {
         })
     }
 
-    /// Makes `wanted`, in this order, what waits: what is not wanted any more is dropped, what runs goes on.
+    /// Makes `wanted`, in this order, what waits: what is not wanted any more is dropped, or told to stop if it runs.
     pub(super) fn demand(&mut self, wanted: &[Request], mut prepare: impl FnMut(&Request) -> Option<RequestJob>) {
         let started: BTreeSet<Request> = self
             .lanes
             .iter()
-            .flat_map(|state| lock(&state.queue).started.iter().cloned().collect::<Vec<_>>())
+            .flat_map(|state| lock(&state.queue).started.keys().cloned().collect::<Vec<_>>())
             .collect();
         if wanted == self.demanded && started.iter().all(|r| wanted.contains(r)) && self.all_placed(wanted, &started) {
             return;
+        }
+        // What runs for nobody is told to stop; what cannot stop ends and lands under its key.
+        for state in &self.lanes {
+            for (request, cancel) in &lock(&state.queue).started {
+                if !wanted.contains(request) {
+                    cancel.cancel();
+                }
+            }
         }
         let mut fresh: Vec<VecDeque<Job>> = self.lanes.iter().map(|_| VecDeque::new()).collect();
         for request in wanted.iter().filter(|r| !started.contains(r)) {
@@ -144,7 +152,7 @@ impl Lanes {
         for (state, mut jobs) in self.lanes.iter().zip(fresh) {
             let mut queue = lock(&state.queue);
             // A thread may have started one since `started` was read.
-            jobs.retain(|job| !matches!(&job.id, JobId::Request(r) if queue.started.contains(r)));
+            jobs.retain(|job| !matches!(&job.id, JobId::Request(r) if queue.started.contains_key(r)));
             queue.demanded = jobs;
             state.filled.notify_all();
         }

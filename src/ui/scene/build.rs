@@ -5,7 +5,7 @@ use std::sync::Arc;
 use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
-use super::layers;
+use super::{layers, steps};
 use crate::app::keys::{CloudKey, ImprintSource};
 use crate::app::results::{Clouds, FingerCloud};
 use crate::domain::sensor::Finger;
@@ -59,6 +59,7 @@ pub(super) fn scene_of(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Scen
     picked(cx, source, &mut scene);
     meshes(cx, source, seconds, &mut scene);
     scene.lines.extend(layers::ellipse(cx, source));
+    steps::add(cx, source, &mut scene);
     guides(cx, &mut scene);
     scene
 }
@@ -162,7 +163,8 @@ fn meshes(cx: &Cx<'_>, source: ImprintSource, seconds: f64, scene: &mut SceneDat
             shading: Shading::Smooth,
             style,
         };
-        let registered = state.pose(source).shown().map(|pose| pose.grasp_from_object);
+        // The step that is looked at, else what was registered.
+        let registered = steps::pose(cx, source).or_else(|| Some(state.pose(source).shown()?.grasp_from_object));
         let mut show = |name: &str, world_from_mesh: DAffine3, color: Color32, look: Look| {
             let opacity = if look == Look::Solid { 0.9 } else { 0.6 };
             scene.meshes.push(item(name, MeshStyle { world_from_mesh, color: rgb(color), opacity, look }));

@@ -42,15 +42,22 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, output: 
         painter.galley(pos2(x, y), galley, color);
         y += height + 3.0;
     };
-    match cx.state.pose(source) {
-        Lookup::Ready(pose) | Lookup::Stale(pose) => {
-            let (text, color) = angle_text(cx.p, pose);
-            write(text, 16.0, color);
-            write(pose_details(pose), 11.0, cx.p.weak);
+    let step = step_text(cx, source);
+    let stepping = step.is_some();
+    if let Some((text, color, details)) = step {
+        write(text, 16.0, color);
+        write(details, 11.0, cx.p.weak);
+    } else {
+        match cx.state.pose(source) {
+            Lookup::Ready(pose) | Lookup::Stale(pose) => {
+                let (text, color) = angle_text(cx.p, pose);
+                write(text, 16.0, color);
+                write(pose_details(pose), 11.0, cx.p.weak);
+            }
+            Lookup::Waiting => write("Pose: computing…".into(), 12.0, cx.p.weak),
+            Lookup::Failed(err) => write(format!("No pose: {}", err.why), 12.0, cx.p.wrong),
+            Lookup::Absent(absent) => write(format!("No pose: {}", lower_first(absent)), 12.0, cx.p.weak),
         }
-        Lookup::Waiting => write("Pose: computing…".into(), 12.0, cx.p.weak),
-        Lookup::Failed(err) => write(format!("No pose: {}", err.why), 12.0, cx.p.wrong),
-        Lookup::Absent(absent) => write(format!("No pose: {}", lower_first(absent)), 12.0, cx.p.weak),
     }
     if let Some(pose) = cx.state.by_hand(source) {
         let mut text = format!("Accepted by hand: {}", hands::place_text(pose));
@@ -60,7 +67,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, output: 
         write(text, 11.0, cx.p.good);
     }
     // The poses of both sides against each other and against the truth, in the picture.
-    if let Some(apart) = cx.state.sides_apart() {
+    // Not while another pose than the registered one is shown.
+    if let Some(apart) = cx.state.sides_apart().filter(|_| !stepping) {
         let mut text = difference("Measured and predicted", "apart", apart);
         if let (Some(truth), Some(pose)) = (cx.state.truth(), cx.state.pose(source).ready()) {
             let off = PoseDifference::between(pose.grasp_from_object, truth);
@@ -69,7 +77,32 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, output: 
         write(text, 11.0, cx.p.weak);
     }
     legend(cx, ui, source, rect);
+    super::steps::show_legend(cx, ui, source, rect);
     sides(cx, ui, source, rect);
+}
+
+/// Angle and figures of the step shown, where that is not the registered pose.
+fn step_text(cx: &Cx<'_>, source: ImprintSource) -> Option<(String, Color32, String)> {
+    let shown = cx.state.inspected_in(source)?;
+    if shown.is_last() && cx.state.inspect.start.is_none() && shown.run == shown.inspection.report().winner {
+        return None;
+    }
+    let angle = units::wrap_angle(-shown.step.grasp_from_object.theta_rad);
+    let (mut text, mut color) = (units::text_deg(angle), cx.p.strong);
+    if let Some(truth) = cx.state.truth() {
+        let truth = units::wrap_angle(-truth.theta_rad);
+        let error = units::angle_error(angle, truth);
+        text += &format!(" (true {}, error {})", units::text_deg(truth), units::text_deg(error));
+        color = error_color(cx.p, error);
+    }
+    let last = shown.inspection.num_steps(shown.run).saturating_sub(1);
+    let details = format!(
+        "step {} of {last}, start {} · {:.0} % inliers",
+        shown.at,
+        shown.run + 1,
+        shown.step.inlier_share * 100.0
+    );
+    Some((text, color, details))
 }
 
 /// Buttons that turn the view, at the right edge.
@@ -231,6 +264,7 @@ fn legend(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
             }
         }
     }
+    entries.extend(super::steps::legend_entries(cx, source).into_iter().map(|(c, text)| (c, text.to_owned())));
     let mut y = rect.bottom() - 14.0;
     for (color, text) in entries.into_iter().rev() {
         painter.circle_filled(pos2(rect.left() + 14.0, y), 4.0, color);

@@ -35,6 +35,23 @@ pub const SCENE: &[(&str, &str)] = &[
     ("V", "next layer"),
 ];
 
+/// Controls of the time machine.
+pub const STEPS: &[(&str, &str)] = &[
+    ("Drag in the curves", "scrub"),
+    ("Click on a curve", "show that start and step"),
+    (", and .", "previous and next step"),
+    ("Shift with them", "first and last step"),
+    ("Space", "play or pause, also over a 3D view"),
+    ("J", "pin the step for comparison"),
+];
+
+/// Mouse controls of the basin map.
+pub const BASIN: &[(&str, &str)] = &[
+    ("Hover", "the start asked for, the one applied, and the end"),
+    ("Click", "load that run into the time machine"),
+    ("Esc", "give up what is being computed"),
+];
+
 /// A question mark that lists `controls` under the pointer.
 pub fn mark(ui: &mut Ui, pane: &str, controls: &[(&str, &str)]) {
     let p = Palette::of(ui);

@@ -1,0 +1,108 @@
+//! The time machine and the basin map: moving about in what was recorded.
+
+use super::super::error::TaskError;
+use super::super::inspect::{InspectCommand, Pin};
+use super::super::keys::Request;
+use super::super::state::State;
+
+pub(super) fn step(state: &mut State, command: InspectCommand) {
+    match command {
+        InspectCommand::Source(source) => {
+            if state.inspect.source != source {
+                state.inspect.source = source;
+                rewind(state);
+            }
+        }
+        InspectCommand::Start(start) => {
+            let start = start.filter(|s| s.is_finite()).map(Into::into);
+            rewind(state);
+            // A run that was loaded is watched from where it began.
+            state.inspect.at = start.is_some().then_some(0);
+            state.inspect.start = start;
+        }
+        InspectCommand::Run(run) => {
+            state.inspect.run = Some(run);
+            state.inspect.at = None;
+            state.inspect.playing = false;
+        }
+        InspectCommand::Go { run, at } => {
+            state.inspect.run = Some(run);
+            state.inspect.playing = false;
+            go(state, at);
+        }
+        InspectCommand::By(by) => {
+            let Some(here) = state.inspected().map(|s| s.at) else { return };
+            let to = (here as i64).saturating_add(by).max(0) as usize;
+            go(state, to);
+            if state.inspect.at.is_none() || by < 0 {
+                state.inspect.playing = false;
+            }
+        }
+        InspectCommand::Begin => {
+            state.inspect.playing = false;
+            go(state, 0);
+        }
+        InspectCommand::End => {
+            state.inspect.playing = false;
+            state.inspect.at = None;
+        }
+        InspectCommand::Play(play) => {
+            let Some((last, steps)) = state.inspected().map(|s| (s.is_last(), s.inspection.num_steps(s.run))) else {
+                return;
+            };
+            state.inspect.playing = play && steps > 1;
+            if state.inspect.playing && last {
+                state.inspect.at = Some(0);
+            }
+        }
+        InspectCommand::Pin => pin(state),
+        InspectCommand::Unpin(which) => {
+            if let Some(pin) = state.inspect.pins.get_mut(which) {
+                *pin = None;
+            }
+        }
+        InspectCommand::Lines(lines) => state.inspect.lines = lines,
+        InspectCommand::Plane(plane) => state.inspect.plane = plane,
+        InspectCommand::Colour(colour) => state.inspect.colour = colour,
+        InspectCommand::StopBasin => {
+            // What failed is not wanted any more, until somebody asks for it again; the runtime stops it.
+            if let Ok(Some(key)) = state.basin_key()
+                && !state.results.basins.contains(&key)
+            {
+                state.tasks.failed.insert(Request::Basin(key), TaskError::cancelled("Basin map"));
+            }
+        }
+    }
+}
+
+/// Shows a step of the run shown; at its end the end is meant, however many steps another run has.
+fn go(state: &mut State, at: usize) {
+    let Some(steps) = state.inspected().map(|s| s.inspection.num_steps(s.run)) else { return };
+    state.inspect.at = (at + 1 < steps).then_some(at);
+}
+
+/// Back to the end of the winner of the registration's own starts: another pair or imprint is looked at.
+pub(super) fn rewind(state: &mut State) {
+    let inspect = &mut state.inspect;
+    (inspect.start, inspect.run, inspect.at, inspect.playing) = (None, None, None, false);
+}
+
+fn pin(state: &mut State) {
+    let (Some(shown), Some(pair)) = (state.inspected(), state.pair_key()) else { return };
+    let new = Pin {
+        pair,
+        source: state.inspect.source,
+        engine: state.settings.pose_engine,
+        run: shown.run,
+        at: shown.at,
+        grasp_from_object: shown.step.grasp_from_object,
+        cost_m2: shown.step.cost_m2,
+        kernel_m: shown.step.kernel_m,
+    };
+    let [first, second] = state.pins();
+    state.inspect.pins = match (first, second) {
+        (None, second) => [Some(new), second],
+        (Some(first), None) => [Some(first), Some(new)],
+        (Some(_), Some(second)) => [Some(second), Some(new)],
+    };
+}

@@ -1,0 +1,164 @@
+//! The time machine and the basin map, by keys and clicks.
+
+use eframe::egui::{Key, Modifiers, vec2};
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::inspect::InspectCommand;
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::{MaskSource, Workspace};
+use touch2touch::domain::align::basin::is_same_place;
+
+use super::rig::Rig;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+
+impl Rig {
+    fn tap(&mut self, modifiers: Modifiers, key: Key) {
+        self.harness.key_press_modifiers(modifiers, key);
+        self.harness.step();
+        self.settle();
+    }
+
+    /// Moves the pointer to a share of the widget's rectangle, and clicks there.
+    fn click_in(&mut self, label: &str, share: [f32; 2]) {
+        let rect = self.harness.get_by_label(label).rect();
+        let at = rect.min + vec2(share[0], share[1]) * rect.size();
+        self.harness.hover_at(at);
+        self.harness.step();
+        self.harness.drag_at(at);
+        self.harness.step();
+        self.harness.drop_at(at);
+        self.harness.step();
+        self.settle();
+    }
+
+    fn at(&self) -> [usize; 2] {
+        let shown = self.harness.state().state().inspected().expect("a step is shown");
+        [shown.run, shown.at]
+    }
+
+    /// The Align workspace on a grasp with its true contact.
+    fn align() -> Option<Self> {
+        let mut rig = Self::new(SIZE, 2)?;
+        rig.send(Command::DismissHint);
+        rig.send(Command::SetMaskSource(MaskSource::Truth));
+        assert!(rig.harness.state().state().results.inspections.is_empty(), "nobody looks yet");
+        rig.send(Command::SetWorkspace(Workspace::Align));
+        Some(rig)
+    }
+}
+
+#[test]
+fn scrub_by_keys_pin_two_and_compare() {
+    let Some(mut rig) = Rig::align() else { return };
+    let state = rig.harness.state().state();
+    assert!(state.selection.panes.contains(&Pane::TimeMachine) && state.selection.panes.contains(&Pane::BasinMap));
+    let shown = state.inspected().expect("the winner's last step");
+    let (run, last) = (shown.run, shown.at);
+    assert!(shown.is_last() && last > 3);
+    assert_eq!(
+        shown.step.grasp_from_object,
+        state.pose(ImprintSource::Measured).ready().unwrap().grasp_from_object,
+        "at its end it shows the registered pose"
+    );
+    rig.tap(Modifiers::NONE, Key::J);
+    rig.tap(Modifiers::NONE, Key::Comma);
+    rig.tap(Modifiers::NONE, Key::Comma);
+    assert_eq!(rig.at(), [run, last - 2]);
+    rig.tap(Modifiers::NONE, Key::Period);
+    assert_eq!(rig.at(), [run, last - 1]);
+    rig.tap(Modifiers::SHIFT, Key::Comma);
+    assert_eq!(rig.at(), [run, 0]);
+    rig.tap(Modifiers::NONE, Key::J);
+    rig.shoot("test-time-machine-pins");
+    let [Some(a), Some(b)] = rig.harness.state().state().pins() else { panic!("two pins") };
+    assert_eq!((a.at, b.at), (last, 0));
+    // Both columns and their difference are on screen.
+    assert!(rig.harness.get_all_by_label_contains("Angle °").next().is_some());
+    rig.harness.get_by_label("Let pin A go").click();
+    rig.harness.step();
+    rig.settle();
+    assert!(rig.harness.state().state().pins()[0].is_none());
+    // The slider, the buttons and the curves do the same.
+    rig.harness.get_by_label("Last step").click();
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(rig.at(), [run, last]);
+    rig.click_in("Cost and inliers over the steps", [0.35, 0.5]);
+    let [_, at] = rig.at();
+    assert!(at > 0 && at < last, "{at}");
+    // Another start by its button.
+    rig.harness.get_by_label("Start 1").click();
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(rig.at()[0], 0);
+    assert_eq!(rig.harness.state().state().results.inspections.len(), 1, "scrubbing registers nothing");
+}
+
+#[test]
+fn space_plays_where_the_pointer_is_over_the_steps() {
+    let Some(mut rig) = Rig::align() else { return };
+    let over = |rig: &mut Rig, label: &str| {
+        let rect = rig.harness.get_by_label(label).rect();
+        rig.harness.hover_at(rect.center());
+        rig.harness.step();
+        rig.settle();
+    };
+    over(&mut rig, "Filter samples");
+    rig.tap(Modifiers::NONE, Key::Space);
+    assert!(!rig.harness.state().state().inspect.playing, "Space is not for the list");
+    over(&mut rig, "3D view, measured");
+    let last = rig.at()[1];
+    rig.harness.key_press(Key::Space);
+    rig.harness.step();
+    rig.harness.step();
+    assert!(rig.harness.state().state().inspect.playing);
+    let mut seen = std::collections::BTreeSet::new();
+    // The harness' clock goes on by a quarter of a second per frame: two frames per step and some to spare.
+    for _ in 0..4 * (last + 2) {
+        seen.insert(rig.at()[1]);
+        rig.harness.step();
+    }
+    assert!(!rig.harness.state().state().inspect.playing, "it ends at the end");
+    assert_eq!(rig.at()[1], last);
+    assert_eq!(seen.len(), last + 1, "every step was shown: {seen:?}");
+    rig.settle();
+    // At rest nothing is drawn.
+    rig.harness.step();
+    let delays: Vec<_> = rig.harness.output().viewport_output.values().map(|v| v.repaint_delay).collect();
+    assert!(delays.iter().all(|d| *d > std::time::Duration::from_secs(3600)), "{delays:?}");
+}
+
+#[test]
+fn a_click_on_the_map_loads_that_run() {
+    let Some(mut rig) = Rig::align() else { return };
+    let own = rig.harness.state().state().inspection().ready().unwrap().num_runs();
+    rig.click_in("Map of starts", [0.9, 0.2]);
+    rig.shoot("test-basin-clicked");
+    let state = rig.harness.state().state();
+    let start = state.inspect.start.expect("a start was chosen").get();
+    let basin = state.basin().ready().unwrap();
+    let cell = basin.cells.iter().find(|c| c.requested == start).expect("it is a start of the grid");
+    // Right of the middle the angle grows; above it y does.
+    assert!(start.inverse().theta_rad > 0.4 && start.y_m > 0.004, "{start:?}");
+    let inspection = state.inspection().ready().expect("the run is there").clone();
+    assert_eq!((inspection.num_runs(), inspection.requested(0)), (1, Some(start)));
+    let arrival = cell.arrival.expect("the start leads somewhere");
+    let applied = inspection.applied(0).unwrap();
+    assert!(is_same_place(applied, arrival.applied), "the map and the time machine agree: {applied:?} {arrival:?}");
+    assert!((applied.theta_rad - start.theta_rad).abs() < 1e-9, "step 0 is the start");
+    assert_eq!(rig.at()[1], 0, "it is shown from where it began");
+    rig.harness.get_by_label("All own starts").click();
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(rig.harness.state().state().inspection().ready().unwrap().num_runs(), own);
+    // Out of sight the map is not computed, even when what it is made from changes.
+    rig.harness.get_by_label("Maximise Time machine").click();
+    rig.harness.step();
+    rig.settle();
+    let maps = rig.harness.state().state().results.basins.len();
+    rig.send(Command::SetMaskSource(MaskSource::Cad));
+    rig.send(Command::Inspect(InspectCommand::Colour(touch2touch::app::inspect::BasinColour::Winner)));
+    assert_eq!(rig.harness.state().state().results.basins.len(), maps);
+    assert_eq!(rig.harness.state().state().results.inspections.len(), 3, "the time machine is still on screen");
+}
