@@ -22,6 +22,8 @@ use clap::{Args, Parser, Subcommand};
 
 pub use output::Output;
 
+use crate::io::dataset::ToolScale;
+
 /// From a GelSlim touch to the Soft Bubble imprint and the in-hand pose of the same grasp.
 ///
 /// Without a verb the studio opens, on PATH or on the built-in demo.
@@ -68,6 +70,15 @@ pub struct Common {
     /// Print one JSON object on standard output.
     #[arg(long)]
     pub json: bool,
+}
+
+/// The option of the verbs that read CAD models.
+#[derive(Debug, Clone, Copy, Args)]
+struct ToolArgs {
+    /// Unit of the CAD models (tools_stls/*.stl): m, cm, mm, um, in, a factor to metres, or `auto` for the one that
+    /// makes them as large as a hand-held tool. Without it, what tools_stls/unit.txt says, else metres.
+    #[arg(long, value_name = "UNIT")]
+    tool_scale: Option<ToolScale>,
 }
 
 /// What a verb hands back: whether everything asked for was done.

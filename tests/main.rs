@@ -12,6 +12,7 @@ mod layers;
 mod models;
 mod pose;
 mod sim;
+mod stability;
 
 #[cfg(feature = "gui")]
 mod gpu;

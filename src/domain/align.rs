@@ -15,6 +15,7 @@
 pub mod basin;
 pub mod both_ways;
 mod certify;
+pub mod closed_form;
 pub mod correspond;
 mod directions;
 pub mod field;

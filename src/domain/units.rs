@@ -24,6 +24,15 @@ pub fn text_deg(radians: f64) -> String {
     format!("{}°", fixed(radians.to_degrees(), 1))
 }
 
+/// The factor to metres for a tool whose longest side is `size` in an unknown unit: 1 if it may be metres, else that
+/// of mm, cm, inch, µm or of a mesh scaled twice, whichever makes it as large as a hand-held tool first.
+/// `None` if none does.
+pub fn scale_to_metres(size: f64) -> Option<f64> {
+    /// Longest side of a hand-held tool, metres.
+    const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.004..=0.4;
+    [1.0, 1e-3, 1e-2, 0.0254, 1e-6, 1e3].into_iter().find(|scale| PLAUSIBLE_M.contains(&(size * scale)))
+}
+
 /// The angle brought into (-π, π].
 pub fn wrap_angle(radians: f64) -> f64 {
     let wrapped = radians.rem_euclid(std::f64::consts::TAU);

@@ -2,6 +2,7 @@
 
 mod canvas;
 mod cases;
+mod dataset;
 mod figures;
 mod front;
 mod peers;
@@ -20,12 +21,15 @@ pub(super) enum BenchVerb {
     Registration(registration::RegistrationArgs),
     /// Write fresh known grasps of the built-in simulator, for `bench registration`.
     Cases(cases::CasesArgs),
+    /// Seconds for a whole dataset on all cores, on simulated pairs.
+    Dataset(dataset::DatasetArgs),
 }
 
 pub(super) fn run(verb: &BenchVerb) -> VerbResult {
     match verb {
         BenchVerb::Registration(args) => registration::run(args),
         BenchVerb::Cases(args) => cases::run(args),
+        BenchVerb::Dataset(args) => dataset::run(args),
     }
 }
 

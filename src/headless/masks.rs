@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::{ModelArgs, Predictor};
-use super::{Common, Output, VerbResult};
+use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::PairId;
 use crate::domain::pose::ToolModel;
 use crate::domain::sensor::Finger;
@@ -39,6 +39,8 @@ pub(super) struct ExportArgs {
     pairs: Pairs,
     #[command(flatten)]
     mask: MaskArgs,
+    #[command(flatten)]
+    tool: ToolArgs,
     #[command(flatten)]
     model: ModelArgs,
     /// Decides which pair lands in which part.
@@ -79,7 +81,8 @@ struct Exported {
 pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let MasksVerb::Export(args) = verb;
     let Format::Unet = args.format;
-    let dataset = super::open(&args.input)?;
+    let mut dataset = super::open(&args.input)?;
+    dataset.tool_scale = args.tool.tool_scale;
     let store = MaskStore::for_dataset(&dataset)?;
     let stored = store.masks();
     let mut entries = Vec::new();

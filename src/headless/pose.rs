@@ -11,7 +11,7 @@ use strum::IntoEnumIterator as _;
 
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::{ModelArgs, Predictor};
-use super::{Common, Output, VerbResult};
+use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::align::{AlignReport, Ask, LabIcpConfig, PaperTrap, Register, lab_starts};
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
@@ -38,6 +38,8 @@ pub(super) struct PoseArgs {
     imprint: Imprints,
     #[command(flatten)]
     mask: MaskArgs,
+    #[command(flatten)]
+    tool: ToolArgs,
     /// The registration: the key of one, `default`, `lab` (the paper's), or `all`, one after the other.
     #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = parse_engines())]
     engine: Engines,
@@ -194,7 +196,8 @@ struct Report {
 
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let path = args.path.as_ref().or(args.input.as_ref()).expect("clap asks for one of the two");
-    let dataset = super::open(path)?;
+    let mut dataset = super::open(path)?;
+    dataset.tool_scale = args.tool.tool_scale;
     let ids = super::spread(dataset.index.pairs.len(), args.limit);
     let engines: &[Engine] = &args.engine.0;
     let imprints: &[&'static str] = match args.imprint {
@@ -264,7 +267,8 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
 
 pub(super) fn tool_model(dataset: &crate::io::dataset::Dataset, name: &str) -> anyhow::Result<ToolModel> {
     let mesh = dataset
-        .tool_mesh(name)?
+        .tool_mesh(name)
+        .map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))?
         .ok_or_else(|| anyhow::anyhow!("no CAD model (expected tools_stls/{name}.stl), so its grasps have no pose"))?;
     Ok(ToolModel::new(mesh)?)
 }

@@ -9,6 +9,7 @@
 mod demo;
 mod lab;
 mod pictures;
+mod tool_scale;
 
 use std::path::{Path, PathBuf};
 
@@ -19,9 +20,10 @@ use crate::domain::sample::Sample;
 
 use super::images::PictureError;
 use super::pt::PtError;
-use super::stl::{self, MeshError};
+use super::stl::MeshError;
 
 pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE};
+pub use tool_scale::{ToolScale, UNIT_FILE};
 
 /// Which kind of source a dataset is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -160,6 +162,8 @@ pub struct Dataset {
     pub index: Index,
     /// What is wrong with it, as far as names and folders tell.
     pub problems: Vec<Problem>,
+    /// What the numbers of the CAD files mean; without it, what [`UNIT_FILE`] beside them says, else metres.
+    pub tool_scale: Option<ToolScale>,
     source: Source,
 }
 
@@ -202,6 +206,7 @@ impl Dataset {
             kind: scan.kind,
             index: Index { pairs: scan.pairs },
             problems: scan.problems,
+            tool_scale: None,
             source: scan.source,
         })
     }
@@ -214,6 +219,7 @@ impl Dataset {
             kind: SourceKind::Demo,
             index: Index { pairs: demo::pairs() },
             problems: Vec::new(),
+            tool_scale: None,
             source: Source::Demo,
         }
     }
@@ -249,13 +255,13 @@ impl Dataset {
     /// The tool's CAD model in metres and the object frame; `None` where the dataset has none.
     ///
     /// # Errors
-    /// [`MeshError`] if there is a file that cannot be used.
+    /// [`MeshError`] if there is a file that cannot be used, or whose size cannot be metres.
     pub fn tool_mesh(&self, tool: &str) -> Result<Option<TriMesh>, MeshError> {
         if let Source::Demo = self.source {
             return Ok(demo::mesh(tool));
         }
         match self.tool_mesh_file(tool) {
-            Some(path) => stl::read(path).map(|file| Some(file.mesh)),
+            Some(path) => tool_scale::read_in_metres(path, self.tool_scale).map(Some),
             None => Ok(None),
         }
     }

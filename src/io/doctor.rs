@@ -105,7 +105,11 @@ fn tool_problems(dataset: &Dataset, tool: &str) -> Vec<Problem> {
                 let extent = (hi - lo).max_element();
                 problems.push(problem(
                     format!("the CAD model is {extent} units long: not metres"),
-                    format!("export it in metres (multiply by {scale})"),
+                    format!(
+                        "export it in metres (multiply by {scale}), or accept the scale: --tool-scale auto, or a file \
+                         {} beside it that says auto",
+                        super::dataset::UNIT_FILE
+                    ),
                 ));
             }
             if file.degenerate > 0 {

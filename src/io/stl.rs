@@ -46,6 +46,24 @@ pub enum MeshError {
         /// Position of the triangle in the file.
         triangle: usize,
     },
+    /// The model is too large or too small to be a tool in metres.
+    #[error("the CAD model is {size} long, which cannot be metres: scale it by {offered} ({})", file.display())]
+    Unit {
+        /// The file.
+        file: PathBuf,
+        /// Longest side of the bounding box, in the file's unit.
+        size: f64,
+        /// The factor that would bring it to metres.
+        offered: f64,
+    },
+    /// The file that names the unit of the models does not name one.
+    #[error("{reason} ({})", file.display())]
+    UnitFile {
+        /// The file.
+        file: PathBuf,
+        /// What was found and what may stand there.
+        reason: String,
+    },
     /// No triangle with an area.
     #[error("the mesh has no triangle with an area ({} degenerate ones) ({})", dropped, file.display())]
     Empty {
@@ -64,6 +82,8 @@ impl MeshError {
             | Self::NotStl { file, .. }
             | Self::Truncated { file, .. }
             | Self::NotFinite { file, .. }
+            | Self::Unit { file, .. }
+            | Self::UnitFile { file, .. }
             | Self::Empty { file, .. } => file,
         }
     }
@@ -74,6 +94,11 @@ impl MeshError {
             Self::Io { .. } => "check that the file exists and may be read",
             Self::NotStl { .. } => "export the part as STL from the CAD program",
             Self::Truncated { .. } => "copy or export the file again",
+            Self::Unit { .. } => {
+                "accept the scale with --tool-scale auto on the command line, or for good (in the studio, too) with a \
+                 file unit.txt beside the model that says auto, m, cm, mm, um, in or a factor"
+            }
+            Self::UnitFile { .. } => "write m, cm, mm, um, in, auto or a factor to metres into the file",
             Self::NotFinite { .. } | Self::Empty { .. } => "repair the mesh in the CAD program and export it again",
         }
     }
@@ -200,12 +225,10 @@ fn weld(path: &Path, corners: Vec<[[f32; 3]; 3]>) -> Result<StlFile, MeshError> 
     Ok(StlFile { mesh, degenerate, suggested_scale })
 }
 
-/// A tool that fits into a gripper is between 2 mm and 1 m long; anything else is in another unit.
+/// The factor that brings a model to metres whose size says that it is in another unit.
 fn suggested_scale(mesh: &TriMesh) -> Option<f64> {
     let [lo, hi] = mesh.bounds()?;
-    let extent = (hi - lo).max_element();
-    let fits = |scale: f64| (0.002..=1.0).contains(&(extent * scale));
-    if fits(1.0) { None } else { [1e-3, 1e-2, 1e3].into_iter().find(|&scale| fits(scale)) }
+    crate::domain::units::scale_to_metres((hi - lo).max_element()).filter(|&scale| scale != 1.0)
 }
 
 /// Writes a binary STL; coordinates are rounded to 32 bits.

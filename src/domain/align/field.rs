@@ -14,11 +14,6 @@ use crate::domain::mesh::TriMesh;
 pub const CELL_M: f64 = 0.25e-3;
 /// Border around the silhouette, metres: the prior's shift plus what a scene adds before it counts as lost anyway.
 const MARGIN_M: f64 = 0.012;
-/// Sizes (longest side of the bounding box, metres) that a hand-held tool in metres can have.
-const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.004..=0.4;
-/// Factors to metres that are offered for a mesh whose size is not plausible: mm, cm, inch, µm, and "scaled twice".
-const UNITS: [f64; 5] = [1e-3, 1e-2, 0.0254, 1e-6, 1e3];
-
 /// Why a mesh has no field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FieldError {
@@ -90,8 +85,8 @@ impl DistanceField {
         }
         let [low, high] = bounds.ok_or(FieldError::Empty)?;
         let size = (high - low).max_element();
-        if !PLAUSIBLE_M.contains(&size) {
-            let scale = UNITS.into_iter().find(|s| PLAUSIBLE_M.contains(&(size * s)));
+        let scale = crate::domain::units::scale_to_metres(size);
+        if scale != Some(1.0) {
             return Err(FieldError::Units { size, scale });
         }
         let silhouette = [DVec2::new(low.y, low.z), DVec2::new(high.y, high.z)];

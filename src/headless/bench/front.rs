@@ -108,6 +108,16 @@ pub(super) fn draw(title: &str, points: &[FrontPoint], default: &str) -> Canvas 
         let (x, mean, median) = (axes.x(p.median_ms), axes.y(p.mean_deg), axes.y(p.median_deg));
         taken.push([x - 7.0, mean - 7.0, x + 7.0, mean + 7.0]);
         taken.push([x - 5.0, median - 5.0, x + 5.0, median + 5.0]);
+        taken.push([x - 1.0, mean.min(median), x + 1.0, mean.max(median)]);
+    }
+    // The staircase is in the way of labels, too.
+    for pair in steps.windows(2) {
+        taken.push([pair[0][0], pair[0][1] - 2.0, pair[1][0], pair[0][1] + 2.0]);
+        taken.push([pair[1][0] - 2.0, pair[0][1].min(pair[1][1]), pair[1][0] + 2.0, pair[0][1].max(pair[1][1])]);
+    }
+    if let (Some(first), Some(last)) = (steps.first(), steps.last()) {
+        taken.push([first[0] - 2.0, TOP, first[0] + 2.0, first[1]]);
+        taken.push([last[0], last[1] - 2.0, RIGHT, last[1] + 2.0]);
     }
     for p in points {
         let colour = if p.peer { PEER } else { OURS };
@@ -122,6 +132,12 @@ pub(super) fn draw(title: &str, points: &[FrontPoint], default: &str) -> Canvas 
         c.disc([x, mean], 6.0, colour);
         let label = if p.name == default { format!("{} (default)", p.name) } else { p.name.clone() };
         let at = place(&label, [x, mean], &mut taken);
+        // A label that had to give way is joined to its point.
+        let (right, middle) = (at[0] > x, at[1] - 0.5 * LETTER);
+        if (middle - mean).abs() > 10.0 {
+            let end = if right { at[0] - 2.0 } else { at[0] + text_width(&label, LETTER) };
+            c.line([x, mean], [end, middle], 0.7, MUTED);
+        }
         c.text(at, LETTER, Anchor::Start, colour, label);
     }
     c

@@ -9,7 +9,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::figures::{Outcome, Summary};
-use super::registration::{EngineRow, Prepared, position_error_mm};
+use super::registration::{EngineRow, Prepared, offset, position_error_mm};
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
 use crate::domain::units::angle_error;
@@ -55,6 +55,7 @@ struct Found {
     y_m: Option<f64>,
     z_m: Option<f64>,
     ms: Option<f64>,
+    cpu_ms: Option<f64>,
 }
 
 /// Runs the script on the cases at the positions `chosen`.
@@ -116,6 +117,7 @@ pub(super) fn run(
 fn engine_row(row: Row, cases: &[Prepared], chosen: &[usize]) -> anyhow::Result<EngineRow> {
     ensure!(row.poses.len() == chosen.len(), "{}: {} answers for {} cases", row.name, row.poses.len(), chosen.len());
     let (mut error_deg, mut ms) = (vec![None; cases.len()], vec![None; cases.len()]);
+    let mut offset_mm = vec![None; cases.len()];
     let mut outcomes = Vec::new();
     for (found, &i) in row.poses.iter().zip(chosen) {
         let case = &cases[i];
@@ -123,6 +125,7 @@ fn engine_row(row: Row, cases: &[Prepared], chosen: &[usize]) -> anyhow::Result<
         let pose = PlanarPose { theta_rad: number(found.theta_rad), y_m: number(found.y_m), z_m: number(found.z_m) };
         let error = angle_error(pose.theta_rad, case.truth.theta_rad).to_degrees();
         (error_deg[i], ms[i]) = (Some(error).filter(|e| e.is_finite()), found.ms);
+        offset_mm[i] = found.theta_rad.map(|_| offset(pose, case.truth));
         outcomes.push(Outcome {
             stratum: case.stratum,
             straight: case.straight,
@@ -136,5 +139,15 @@ fn engine_row(row: Row, cases: &[Prepared], chosen: &[usize]) -> anyhow::Result<
             rung: None,
         });
     }
-    Ok(EngineRow { name: row.name, label: row.label, peer: true, summary: Summary::new(&outcomes), error_deg, ms })
+    let cpu: Vec<f64> = row.poses.iter().filter_map(|p| p.cpu_ms).collect();
+    Ok(EngineRow {
+        name: row.name,
+        label: row.label,
+        peer: true,
+        summary: Summary::new(&outcomes),
+        cpu_mean_ms: (!cpu.is_empty()).then(|| cpu.iter().sum::<f64>() / cpu.len() as f64),
+        error_deg,
+        ms,
+        offset_mm,
+    })
 }

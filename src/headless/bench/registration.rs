@@ -83,9 +83,14 @@ pub(super) struct EngineRow {
     pub(super) peer: bool,
     #[serde(flatten)]
     pub(super) summary: Summary,
+    /// Mean processor time of a pose, milliseconds, where the system tells: what is left of the times when other
+    /// programs are taken out.
+    pub(super) cpu_mean_ms: Option<f64>,
     /// One value per case in the order of `cases`, `null` where there is no pose or the case was not run.
     pub(super) error_deg: Vec<Option<f64>>,
     pub(super) ms: Vec<Option<f64>>,
+    /// Estimated minus true place (y, z), millimetres, likewise.
+    pub(super) offset_mm: Vec<Option<[f64; 2]>>,
 }
 
 #[derive(Debug, Serialize)]
@@ -140,7 +145,15 @@ struct Timed<T> {
     first: f64,
     median: f64,
     best: f64,
+    calls: usize,
     value: T,
+}
+
+/// Milliseconds that this thread has spent on a processor, where the system tells (Linux). Coarse: a few
+/// milliseconds. On a busy machine it says what a call costs, where the clock says how long one waits.
+fn thread_cpu_ms() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    Some(text.split(' ').next()?.parse::<f64>().ok()? / 1e6)
 }
 
 fn timed<T>(mut f: impl FnMut() -> T) -> Timed<T> {
@@ -158,7 +171,7 @@ fn timed<T>(mut f: impl FnMut() -> T) -> Timed<T> {
         all.push(ms);
     }
     let median = quantile(all.iter().copied(), 0.5).unwrap_or(first);
-    Timed { first, median, best: all.iter().copied().fold(f64::INFINITY, f64::min), value }
+    Timed { first, median, best: all.iter().copied().fold(f64::INFINITY, f64::min), calls: all.len(), value }
 }
 
 pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
@@ -254,6 +267,8 @@ fn measure(
             field_ms: fastest(&|| DistanceField::from_mesh(mesh).is_ok()),
             build_ms: fastest(&|| ToolModel::new(mesh.clone()).is_ok()),
         });
+        // Built when first asked for; asked for here, so that the first case of a tool is not charged for it.
+        std::hint::black_box((model.samples(), model.silhouette()));
         models.insert(number, model);
     }
     let prepared = prepare(set, args.masks)?;
@@ -270,19 +285,25 @@ fn measure(
     };
     let mut rows = Vec::new();
     for &engine in engines {
-        let mut outcomes = Vec::new();
+        let (mut outcomes, mut offset_mm, mut calls) = (Vec::new(), Vec::new(), 0);
+        let cpu_before = thread_cpu_ms();
         for case in &prepared {
             output.step(&engine.to_string());
             let model = &models[&case.tool];
             let result = timed(|| register(&case.points, model, engine, false));
+            calls += result.calls;
+            offset_mm.push(result.value.as_ref().ok().map(|r| offset(r.grasp_from_object, case.truth)));
             outcomes.push(outcome(case, result));
         }
+        let cpu = thread_cpu_ms().zip(cpu_before).map(|(after, before)| (after - before) / calls as f64);
         rows.push(EngineRow {
             name: engine.to_string(),
             label: engine.label().to_owned(),
             peer: false,
             error_deg: outcomes.iter().map(|o| Some(o.error_deg).filter(|e| e.is_finite())).collect(),
             ms: outcomes.iter().map(|o| Some(o.ms)).collect(),
+            cpu_mean_ms: cpu,
+            offset_mm,
             summary: Summary::new(&outcomes),
         });
     }
@@ -327,9 +348,15 @@ fn outcome(case: &Prepared, timed: Timed<Result<AlignReport, AlignError>>) -> Ou
     }
 }
 
+/// From the true to the estimated place (y, z), millimetres.
+pub(super) fn offset(estimated: PlanarPose, truth: PlanarPose) -> [f64; 2] {
+    [(estimated.y_m - truth.y_m) * 1e3, (estimated.z_m - truth.z_m) * 1e3]
+}
+
 /// Distance between the two places, millimetres.
-pub(super) fn position_error_mm(a: PlanarPose, b: PlanarPose) -> f64 {
-    (a.y_m - b.y_m).hypot(a.z_m - b.z_m) * 1e3
+pub(super) fn position_error_mm(estimated: PlanarPose, truth: PlanarPose) -> f64 {
+    let [y, z] = offset(estimated, truth);
+    y.hypot(z)
 }
 
 fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
@@ -379,11 +406,12 @@ fn text(report: &Report) -> String {
     for row in &report.engines {
         let f = &row.summary.all;
         text += &format!(
-            "{:width$} {:>4} {:>10} {:>10} {:>7} {:>8} {:>7.1} {:>7.1} {:>7.1} {:>7} {:>9}{}\n",
+            "{:width$} {:>4} {:>10} {:>10} {:>9} {:>7} {:>8} {:>7.1} {:>7.1} {:>7.1} {:>7} {:>9}{}\n",
             row.name,
             f.angles.count,
             number(f.median_ms, 3),
             number(f.p95_ms, 3),
+            number(row.cpu_mean_ms, 3),
             number(f.angles.mean_deg, 2),
             number(f.angles.median_deg, 2),
             f.angles.success_5,

@@ -2,13 +2,14 @@
 
 use std::num::NonZero;
 
-use glam::{DMat3, DMat4, DQuat, DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use super::IcpConfig;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
 use super::policy::{Dof, Kernel, Rejector, Residual, Solver, Target};
 use super::samples::{Matcher, Samples};
+use crate::domain::align::closed_form::closest_rotation;
 use crate::domain::align::linear::{Matrix, eigen_symmetric, solve_symmetric};
 use crate::domain::align::{ANGLE_SCALE_M, Fate};
 use crate::domain::frames::PlanarPose;
@@ -392,37 +393,4 @@ fn normals(points: &[DVec3], cloud: &[DVec3]) -> Vec<DVec3> {
             eigen_symmetric(spread).map_or(DVec3::ZERO, |(_, vectors)| DVec3::from_array(vectors[0]))
         })
         .collect()
-}
-
-/// The rotation `R` that makes `sum m . R a` largest for the correlation `sum a m^T`.
-///
-/// Directions that the correlation leaves open (collinear points) are not turned. A unit quaternion is a proper
-/// rotation always, so no reflection has to be repaired. `None` if a number is not finite.
-///
-/// Source: Horn, Closed-form solution of absolute orientation using unit quaternions, 1987.
-pub(super) fn closest_rotation(correlation: DMat3) -> Option<DQuat> {
-    /// Eigenvalues closer than this, relative to the largest entry, count as equal.
-    const EQUAL: f64 = 1e-9;
-    let s = |a: usize, m: usize| correlation.col(m)[a];
-    let n = DMat4::from_cols_array_2d(&[
-        [s(0, 0) + s(1, 1) + s(2, 2), s(1, 2) - s(2, 1), s(2, 0) - s(0, 2), s(0, 1) - s(1, 0)],
-        [s(1, 2) - s(2, 1), s(0, 0) - s(1, 1) - s(2, 2), s(0, 1) + s(1, 0), s(2, 0) + s(0, 2)],
-        [s(2, 0) - s(0, 2), s(0, 1) + s(1, 0), s(1, 1) - s(0, 0) - s(2, 2), s(1, 2) + s(2, 1)],
-        [s(0, 1) - s(1, 0), s(2, 0) + s(0, 2), s(1, 2) + s(2, 1), s(2, 2) - s(0, 0) - s(1, 1)],
-    ]);
-    let rows = n.to_cols_array_2d();
-    let (values, vectors) = eigen_symmetric(rows)?;
-    let largest = values[3].abs().max(values[0].abs());
-    // Of all best rotations the one nearest to none: the identity quaternion, projected.
-    let mut q = [0.0; 4];
-    for (value, vector) in values.iter().zip(&vectors) {
-        if values[3] - value <= EQUAL * largest {
-            for (sum, x) in q.iter_mut().zip(vector) {
-                *sum += x * vector[0];
-            }
-        }
-    }
-    let best = if q.iter().map(|x| x * x).sum::<f64>() > 1e-12 { q } else { vectors[3] };
-    let q = DQuat::from_xyzw(best[1], best[2], best[3], best[0]);
-    q.is_finite().then(|| q.normalize())
 }

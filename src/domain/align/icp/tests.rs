@@ -2,9 +2,9 @@ use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::problem::closest_rotation;
 use super::*;
 use crate::domain::align::RefineConfig;
+use crate::domain::align::closed_form::closest_rotation;
 use crate::domain::align::testing::{cross, cross_contacts, cuboid, disc, filled};
 use crate::domain::units::angle_error;
 

@@ -1,0 +1,133 @@
+//! The unit of CAD files: STL does not say which it is.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use crate::domain::mesh::TriMesh;
+use crate::io::stl::{self, MeshError};
+
+/// The file beside the CAD models that says which unit they are in.
+pub const UNIT_FILE: &str = "unit.txt";
+
+/// What the numbers of a CAD file mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum ToolScale {
+    /// Metres; a model that is too large or too small for that is an error.
+    #[default]
+    Metres,
+    /// The unit that makes the model as large as a hand-held tool.
+    Auto,
+    /// To be multiplied by this to get metres.
+    Factor(f64),
+}
+
+impl FromStr for ToolScale {
+    type Err = String;
+
+    /// `m`, `cm`, `mm`, `um`, `in`, `auto`, or the factor to metres.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(match text.trim() {
+            "m" => Self::Metres,
+            "auto" => Self::Auto,
+            "cm" => Self::Factor(1e-2),
+            "mm" => Self::Factor(1e-3),
+            "um" => Self::Factor(1e-6),
+            "in" => Self::Factor(0.0254),
+            other => match other.parse::<f64>() {
+                Ok(factor) if factor.is_finite() && factor > 0.0 => Self::Factor(factor),
+                _ => return Err(format!("{other:?} is no unit: use m, cm, mm, um, in, auto or a factor to metres")),
+            },
+        })
+    }
+}
+
+impl ToolScale {
+    /// What [`UNIT_FILE`] beside `model` says; `None` without one.
+    fn beside(model: &Path) -> Result<Option<Self>, MeshError> {
+        let file: PathBuf = model.with_file_name(UNIT_FILE);
+        match std::fs::read_to_string(&file) {
+            Ok(text) => text.parse().map(Some).map_err(|reason| MeshError::UnitFile { file, reason }),
+            Err(err) if err.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(source) => Err(MeshError::Io { file, source }),
+        }
+    }
+}
+
+/// Reads a CAD model and brings it to metres: by `scale`, else as [`UNIT_FILE`] beside it says, else as it is.
+///
+/// # Errors
+/// [`MeshError`]; [`MeshError::Unit`], with the factor that would fit, if the model cannot be in metres.
+pub(super) fn read_in_metres(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, MeshError> {
+    let scale = match scale {
+        Some(scale) => scale,
+        None => ToolScale::beside(path)?.unwrap_or_default(),
+    };
+    let stl::StlFile { mut mesh, suggested_scale, .. } = stl::read(path)?;
+    let factor = match (scale, suggested_scale) {
+        (ToolScale::Factor(factor), _) => factor,
+        (ToolScale::Auto, offered) => offered.unwrap_or(1.0),
+        (ToolScale::Metres, None) => 1.0,
+        (ToolScale::Metres, Some(offered)) => {
+            let size = mesh.bounds().map_or(0.0, |[lo, hi]| (hi - lo).max_element());
+            return Err(MeshError::Unit { file: path.to_owned(), size, offered });
+        }
+    };
+    if factor != 1.0 {
+        for vertex in &mut mesh.vertices {
+            *vertex *= factor;
+        }
+    }
+    Ok(mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    /// A 40 x 20 x 10 box, in units of `unit` metres.
+    fn write(path: &Path, unit: f64) {
+        let size = DVec3::new(0.01, 0.02, 0.04) / unit;
+        let vertices = (0..8).map(|i| DVec3::new((i & 1).into(), (i >> 1 & 1).into(), (i >> 2 & 1).into()) * size);
+        let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        stl::write(path, &TriMesh { vertices: vertices.collect(), triangles }).unwrap();
+    }
+
+    fn length(mesh: &TriMesh) -> f64 {
+        mesh.bounds().map(|[lo, hi]| (hi - lo).max_element()).unwrap()
+    }
+
+    #[test]
+    fn every_unit_is_offered_and_the_offer_can_be_accepted() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.stl");
+        for (unit, name) in [(1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "um"), (0.0254, "in")] {
+            write(&path, unit);
+            let scale: ToolScale = name.parse().unwrap();
+            assert!((length(&read_in_metres(&path, Some(scale)).unwrap()) - 0.04).abs() < 1e-8, "{name}");
+        }
+        for unit in [1e-3, 1e-6] {
+            write(&path, unit);
+            let error = read_in_metres(&path, None).unwrap_err();
+            assert!(matches!(error, MeshError::Unit { offered, .. } if (offered - unit).abs() < 1e-12), "{error}");
+            assert!(error.to_string().contains("t.stl") && error.hint().contains("--tool-scale auto"));
+            assert!((length(&read_in_metres(&path, Some(ToolScale::Auto)).unwrap()) - 0.04).abs() < 1e-8);
+        }
+        // Beside the models it holds for the studio as well; the caller's word counts more.
+        std::fs::write(dir.path().join(UNIT_FILE), "auto\n").unwrap();
+        assert!((length(&read_in_metres(&path, None).unwrap()) - 0.04).abs() < 1e-8);
+        assert!(read_in_metres(&path, Some(ToolScale::Metres)).is_err());
+        std::fs::write(dir.path().join(UNIT_FILE), "furlong").unwrap();
+        let error = read_in_metres(&path, None).unwrap_err();
+        assert!(error.to_string().contains("furlong") && error.file().ends_with(UNIT_FILE), "{error}");
+    }
+
+    #[test]
+    fn only_units_are_units() {
+        for bad in ["", "0", "-1", "nan", "inf", "mm mm"] {
+            assert!(bad.parse::<ToolScale>().is_err(), "{bad}");
+        }
+        assert_eq!(" 0.001\n".parse(), Ok(ToolScale::Factor(1e-3)));
+    }
+}
