@@ -124,6 +124,82 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
 }
 
 #[test]
+fn every_engine_is_measured_on_fresh_cases_and_drawn() {
+    let dir = tempfile::tempdir().unwrap();
+    let (folder, out) = (dir.path().join("cases"), dir.path().join("bench.json"));
+    let folder_text = folder.to_str().unwrap();
+    let made = run(&["bench", "cases", "--out", folder_text, "--count", "10", "--seed", "3", "--json"], dir.path());
+    assert!(made.status.success(), "{}", error_text(&made));
+    assert_eq!(json(&made)["cases"], 10);
+    let again = run(&["bench", "cases", "--out", folder_text, "--count", "2"], dir.path());
+    assert!(error_text(&again).contains("already holds cases"), "{}", error_text(&again));
+
+    // Without Python the peers are left out, and that is said.
+    let args = ["bench", "registration", "--cases", folder_text, "--json", out.to_str().unwrap(), "--limit", "3"];
+    let done = run(&[&args[..], &["--python", "/no/such/python"]].concat(), dir.path());
+    assert!(done.status.success(), "{}", error_text(&done));
+    let table = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(table.contains("<- default") && table.contains("were not run"), "{table}");
+    let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
+    let engines = report["engines"].as_array().unwrap();
+    assert!(engines.iter().any(|e| e["name"] == report["default"]), "{report}");
+    assert_eq!(engines.len(), <touch2touch::domain::pose::Engine as strum::IntoEnumIterator>::iter().count());
+    for engine in engines {
+        for key in ["mean_deg", "median_deg", "success_5", "success_10", "gross_20", "median_ms", "p95_ms"] {
+            assert!(engine[key].is_number(), "{key} of {engine}");
+            assert!(engine["strata"]["nominal"][key].is_number(), "{key} of {engine}");
+        }
+        assert_eq!(engine["error_deg"].as_array().unwrap().len(), 3);
+    }
+    assert!(!report["front"].as_array().unwrap().is_empty());
+    let svg = std::fs::read_to_string(out.with_extension("svg")).unwrap();
+    assert!(engines.iter().all(|e| svg.contains(e["name"].as_str().unwrap())), "all names are in the picture");
+    let png = touch2touch::io::images::read_rgb(&out.with_extension("png")).unwrap();
+    assert_eq!(png.size(), [1500, 930]);
+
+    let whole =
+        run(&["bench", "dataset", "--pairs", "40", "--grasps", "1", "--json", out.to_str().unwrap()], dir.path());
+    assert!(whole.status.success(), "{}", error_text(&whole));
+    let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
+    assert_eq!(report["points_to_pose"]["count"], 40);
+    assert!(report["depth_to_pose"]["seconds"].as_f64().unwrap() > 0.0);
+    // Spoilt masks on sound data: an ordinary pair is well within five degrees.
+    assert!(report["depth_to_pose"]["success_5"].as_f64().unwrap() > 90.0, "{report}");
+}
+
+#[test]
+fn a_cad_model_in_millimetres_is_refused_with_an_offer_that_can_be_accepted() {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    let set_text = set.to_str().unwrap();
+    let tool = "pattern_36";
+    assert!(run(&["simulate", "--out", set_text, "--tools", tool, "--grasps", "1"], dir.path()).status.success());
+    let metres = json(&run(&["pose", set_text, "--json"], dir.path()));
+    let file = set.join("tools_stls").join(format!("{tool}.stl"));
+    let mut mesh = touch2touch::io::stl::read(&file).unwrap().mesh;
+    mesh.vertices.iter_mut().for_each(|v| *v *= 1e3);
+    touch2touch::io::stl::write(&file, &mesh).unwrap();
+
+    let refused = run(&["pose", set_text, "--json"], dir.path());
+    assert_eq!(refused.status.code(), Some(1));
+    let said = error_text(&refused);
+    assert!(said.contains("scale it by 0.001") && said.contains("--tool-scale auto"), "{said}");
+    let accept = |args: &[&str]| {
+        let done = run(&[&["pose", set_text, "--json"], args].concat(), dir.path());
+        assert!(done.status.success(), "{}", error_text(&done));
+        let (a, b) = (&json(&done)["cases"][0]["angle_deg"], &metres["cases"][0]["angle_deg"]);
+        assert!((a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-3, "{a} {b}");
+    };
+    accept(&["--tool-scale", "auto"]);
+    accept(&["--tool-scale", "mm"]);
+    accept(&["--tool-scale", "0.001"]);
+    std::fs::write(set.join("tools_stls/unit.txt"), "mm\n").unwrap();
+    accept(&[]);
+    let unknown = run(&["pose", set_text, "--tool-scale", "furlong"], dir.path());
+    assert!(error_text(&unknown).contains("is no unit"), "{}", error_text(&unknown));
+}
+
+#[test]
 fn the_same_seed_writes_the_same_bytes() {
     let dir = tempfile::tempdir().unwrap();
     let files: Vec<Vec<u8>> = ["a", "b"]

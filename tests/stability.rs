@@ -17,7 +17,7 @@ use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::pose::{Engine, FingerInput, PoseError, PoseReport, estimate, register};
-use touch2touch::domain::tool::ToolModel;
+use touch2touch::domain::tool::{ToolError, ToolModel};
 use touch2touch::domain::units::{angle_error, scale_to_metres};
 use touch2touch::io::cases::{self, Case};
 
@@ -241,18 +241,15 @@ fn e05_the_scale_does_not_change_the_angle_or_is_an_error() {
         }
 
         // The robust kernels are in millimetres: another unit is refused, with the factor that repairs it.
-        let model = ToolModel::new(scaled_mesh(&mesh, scale));
-        if scale == 1.0 {
-            assert!(model.is_ok());
-        } else {
-            match model.unwrap_err() {
-                touch2touch::domain::tool::ToolError::Field(FieldError::Units { size, scale: Some(offered) }) => {
-                    assert_eq!(scale_to_metres(size), Some(offered));
-                    assert!((0.004..=0.4).contains(&(size * offered)), "scale {scale}: offered {offered}");
-                }
-                touch2touch::domain::tool::ToolError::Field(FieldError::Units { scale: None, .. }) => {}
-                other => panic!("scale {scale}: {other}"),
+        match ToolModel::new(scaled_mesh(&mesh, scale)).map(|_| ()) {
+            // A tool of 4 mm or 40 cm is unusual, not impossible.
+            Ok(()) => assert!((0.1..=10.0).contains(&scale), "scale {scale}"),
+            Err(ToolError::Field(FieldError::Units { size, scale: Some(offered) })) => {
+                assert_eq!(scale_to_metres(size), Some(offered));
+                assert!((0.004..=0.4).contains(&(size * offered)), "scale {scale}: offered {offered}");
             }
+            Err(ToolError::Field(FieldError::Units { scale: None, .. })) => {}
+            Err(other) => panic!("scale {scale}: {other}"),
         }
     }
 }
@@ -270,9 +267,9 @@ fn e06_a_tool_in_another_unit_is_refused_and_after_the_offer_the_same() {
         Engine::iter().map(|e| register(&scene, &tool(metres.clone()), e, false).unwrap()).collect();
     for unit in [1e-2, 1e-3] {
         let stored = scaled_mesh(&metres, 1.0 / unit);
-        let model = match ToolModel::new(stored.clone()) {
+        let model = match ToolModel::new(stored.clone()).map(|_| ()) {
             // 4 cm read as metres.
-            Err(touch2touch::domain::tool::ToolError::Field(FieldError::Units { scale: Some(offered), .. })) => {
+            Err(ToolError::Field(FieldError::Units { scale: Some(offered), .. })) => {
                 // More than one unit may make a tool of a plausible size; the right one always does.
                 assert!(scale_to_metres(4.0) == Some(offered) || unit == 1e-3, "{offered}");
                 tool(scaled_mesh(&stored, unit))
@@ -308,21 +305,30 @@ fn e07_what_is_not_observable_is_flagged_and_stays_where_it_was() {
                 truth.transform_yz(p) + noise
             })
             .collect();
-        let report = align(&scene, &model.field, &AlignConfig::default()).unwrap();
-        let found = report.grasp_from_object;
-        assert!(found.is_finite());
-        let error = angle_error(found.theta_rad, truth.theta_rad).to_degrees();
-        assert!(error < 1.0, "seed {seed}: {error} deg");
-        let o = report.observability.unwrap();
-        assert!(o.degenerate && report.is_degenerate(), "seed {seed}: {o:?}");
         let along = DVec2::from_angle(truth.theta_rad).rotate(DVec2::Y);
-        let weak = DVec2::new(o.weakest[1], o.weakest[2]);
-        let off = weak.normalize().perp_dot(along).abs().asin().to_degrees();
-        assert!(weak.length() > 0.9 && off < 5.0, "seed {seed}: {weak} is {off} deg off the rod");
-        // Along the rod nothing is known, so nothing may change: the rod's middle stays where the start had it.
-        let slide = DVec2::new(found.y_m, found.z_m).dot(along);
-        let prior = DVec2::ZERO.dot(along);
-        assert!((slide - prior).abs() < 1e-4, "seed {seed}: slid by {} mm", 1e3 * (slide - prior));
+        let centre = scene.iter().sum::<DVec2>() / scene.len() as f64;
+        let aimed = AlignConfig { starts: vec![pose(degrees, 0.0, 0.0)], ..AlignConfig::default() };
+        for (config, straight_on) in [(AlignConfig::default(), false), (aimed, true)] {
+            let report = align(&scene, &model.field, &config).unwrap();
+            let found = report.grasp_from_object;
+            assert!(found.is_finite());
+            let error = angle_error(found.theta_rad, truth.theta_rad).to_degrees();
+            assert!(error < 1.0, "seed {seed}: {error} deg");
+            let o = report.observability.unwrap();
+            assert!(o.degenerate && report.is_degenerate(), "seed {seed}: {o:?}");
+            let weak = DVec2::new(o.weakest[1], o.weakest[2]);
+            let off = weak.normalize().perp_dot(along).abs().asin().to_degrees();
+            assert!(weak.length() > 0.9 && off < 5.0, "seed {seed}: {weak} is {off} deg off the rod");
+            // Along the rod nothing is known, so nothing may change: the spot of the rod that lies under the middle of
+            // the contacts is the one that lay there at the start. (The turn about that middle moves the rod's origin.)
+            let spot = |p: PlanarPose| p.inverse().transform_yz(centre).y;
+            let slide = spot(found) - spot(report.start);
+            assert!(slide.abs() < 1e-4, "seed {seed}: slid by {} mm", 1e3 * slide);
+            if straight_on {
+                let slide = DVec2::new(found.y_m, found.z_m).dot(along);
+                assert!(slide.abs() < 1e-4, "seed {seed}: moved by {} mm along the rod", 1e3 * slide);
+            }
+        }
     }
     let disc = disc_mesh(0.015, 96);
     let model = tool(disc.clone());
@@ -353,8 +359,16 @@ fn e08_disjoint_clouds_do_not_match() {
     for away in [0.1, 1.0, 1000.0] {
         let scene = contacts(&model.mesh, 400, pose(0.0, 1e3 * away, 1e3 * away), 1e-4, 1);
         for engine in Engine::iter() {
-            let result = register(&scene, &model, engine, false);
-            assert!(matches!(result, Err(AlignError::NoOverlap { .. })), "{engine} at {away} m: {result:?}");
+            match register(&scene, &model, engine, false) {
+                Err(AlignError::NoOverlap { share }) => assert!(share < 0.05, "{engine} at {away} m: {share}"),
+                // The paper's loop has no limit of distance: it carries the tool over to the points, which is a match,
+                // but not one that a gripper can hold, and it says so. It must not be an empty match with error 0.
+                Ok(report) if engine == Engine::LabIcp => {
+                    assert!(!report.within_prior, "{engine} at {away} m");
+                    assert!(report.inlier_share > 0.05 && report.inlier_rms_m > 0.0, "{engine} at {away} m");
+                }
+                other => panic!("{engine} at {away} m: {:?}", other.map(|r| r.grasp_from_object)),
+            }
         }
     }
 }
@@ -442,7 +456,7 @@ fn e11_axis_aligned_and_equal_model_points_do_not_panic() {
     let same_y: Vec<DVec2> = (0..5000).map(|i| DVec2::new(0.004, 1e-5 * f64::from(i))).collect();
     assert!(lab_icp(&yz(&scene), &same_y, &config).unwrap().grasp_from_object.is_finite());
     assert_eq!(lab_icp(&yz(&scene), &[], &config), Err(AlignError::EmptyModel { got: 0 }));
-    assert!(matches!(ToolModel::new(TriMesh::default()), Err(touch2touch::domain::tool::ToolError::Field(_))));
+    assert!(matches!(ToolModel::new(TriMesh::default()), Err(ToolError::Field(_))));
 }
 
 #[test]
@@ -456,11 +470,11 @@ fn e12_infinite_input_ends_within_a_second() {
         for (name, points, solvable) in [("all", &all_bad, false), ("some", &mixed, true)] {
             let (send, answer) = std::sync::mpsc::channel();
             let (points, model) = (points.clone(), model.clone());
-            let worker = std::thread::spawn(move || send.send(register(&points, &model, engine, false)));
+            let worker = std::thread::spawn(move || send.send(register(&points, &model, engine, false)).is_ok());
             let result = answer
                 .recv_timeout(Duration::from_secs(if solvable { 20 } else { 1 }))
                 .unwrap_or_else(|_| panic!("{engine} with {name} points infinite does not end"));
-            worker.join().unwrap().unwrap();
+            assert!(worker.join().unwrap());
             match result {
                 Ok(report) => assert!(solvable && report.grasp_from_object.is_finite() && report.not_finite == 600),
                 Err(error) => assert!(!solvable, "{engine}: {error}"),
