@@ -300,8 +300,8 @@ fn e07_what_is_not_observable_is_flagged_and_stays_where_it_was() {
         // The middle of the rod only: neither end is seen.
         let scene: Vec<DVec2> = (0..600)
             .map(|_| {
-                let p = DVec2::new(rng.random_range(-0.0025..0.0025), rng.random_range(-0.018..0.018));
-                let noise = DVec2::new(rng.random_range(-3e-4..3e-4), rng.random_range(-3e-4..3e-4));
+                let p = DVec2::new(rng.random_range(-0.0025..0.0025), rng.random_range(-0.02..0.02));
+                let noise = DVec2::new(rng.random_range(-4.5e-4..4.5e-4), rng.random_range(-4.5e-4..4.5e-4));
                 truth.transform_yz(p) + noise
             })
             .collect();

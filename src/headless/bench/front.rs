@@ -10,7 +10,9 @@ use super::registration::EngineRow;
 pub(super) struct FrontPoint {
     pub(super) name: String,
     pub(super) peer: bool,
-    pub(super) median_ms: f64,
+    /// What the picture shows: the mean processor time of a pose where it is known of all engines, else the median of
+    /// the clock. On a busy machine the clock charges long runs for other programs' work.
+    pub(super) ms: f64,
     pub(super) mean_deg: f64,
     pub(super) median_deg: f64,
     /// Whether no other engine is at least as fast and as accurate in the mean, and better in one of the two.
@@ -19,12 +21,13 @@ pub(super) struct FrontPoint {
 
 /// The engines that have times and errors, fastest first.
 pub(super) fn front(rows: &[EngineRow]) -> Vec<FrontPoint> {
+    let by_processor = uses_processor_time(rows);
     let points = rows.iter().filter_map(|row| {
         let f = &row.summary.all;
         Some(FrontPoint {
             name: row.name.clone(),
             peer: row.peer,
-            median_ms: f.median_ms?,
+            ms: if by_processor { row.cpu_mean_ms? } else { f.median_ms? },
             mean_deg: f.angles.mean_deg?,
             median_deg: f.angles.median_deg?,
             on_front: false,
@@ -33,8 +36,13 @@ pub(super) fn front(rows: &[EngineRow]) -> Vec<FrontPoint> {
     pareto(points.collect())
 }
 
+/// Whether the system told the processor time of every engine.
+pub(super) fn uses_processor_time(rows: &[EngineRow]) -> bool {
+    rows.iter().all(|row| row.cpu_mean_ms.is_some_and(|ms| ms > 0.0))
+}
+
 fn pareto(mut points: Vec<FrontPoint>) -> Vec<FrontPoint> {
-    points.sort_by(|a, b| a.median_ms.total_cmp(&b.median_ms).then(a.mean_deg.total_cmp(&b.mean_deg)));
+    points.sort_by(|a, b| a.ms.total_cmp(&b.ms).then(a.mean_deg.total_cmp(&b.mean_deg)));
     let mut best = f64::INFINITY;
     for point in &mut points {
         point.on_front = point.mean_deg < best;
@@ -67,7 +75,7 @@ struct Axes {
 
 impl Axes {
     fn new(points: &[FrontPoint]) -> Self {
-        let fold = |f: fn(f64, f64) -> f64, start: f64| points.iter().map(|p| p.median_ms.max(1e-6)).fold(start, f);
+        let fold = |f: fn(f64, f64) -> f64, start: f64| points.iter().map(|p| p.ms.max(1e-6)).fold(start, f);
         let (low, high) = (fold(f64::min, f64::INFINITY).log10().floor(), fold(f64::max, 1e-6).log10().ceil());
         let most = points.iter().map(|p| p.mean_deg.max(p.median_deg)).fold(0.0, f64::max);
         let low = if low.is_finite() { low } else { -2.0 };
@@ -85,15 +93,15 @@ impl Axes {
     }
 }
 
-/// The picture: mean error (disc) and median error (ring) over the median time on a logarithmic axis.
-pub(super) fn draw(title: &str, points: &[FrontPoint], default: &str) -> Canvas {
+/// The picture: mean error (disc) and median error (ring) over the time on a logarithmic axis named `axis`.
+pub(super) fn draw(title: &str, axis: &str, points: &[FrontPoint], default: &str) -> Canvas {
     let mut c = Canvas::new(WIDTH, HEIGHT);
     let axes = Axes::new(points);
-    grid(&mut c, title, &axes);
+    grid(&mut c, title, axis, &axes);
 
     // The front is a staircase: what is reached when one may spend this much time.
     let steps: Vec<[f32; 2]> =
-        points.iter().filter(|p| p.on_front).map(|p| [axes.x(p.median_ms), axes.y(p.mean_deg)]).collect();
+        points.iter().filter(|p| p.on_front).map(|p| [axes.x(p.ms), axes.y(p.mean_deg)]).collect();
     for pair in steps.windows(2) {
         c.line(pair[0], [pair[1][0], pair[0][1]], 2.0, FRONT);
         c.line([pair[1][0], pair[0][1]], pair[1], 2.0, FRONT);
@@ -105,7 +113,7 @@ pub(super) fn draw(title: &str, points: &[FrontPoint], default: &str) -> Canvas 
 
     let mut taken: Vec<[f32; 4]> = Vec::new();
     for p in points {
-        let (x, mean, median) = (axes.x(p.median_ms), axes.y(p.mean_deg), axes.y(p.median_deg));
+        let (x, mean, median) = (axes.x(p.ms), axes.y(p.mean_deg), axes.y(p.median_deg));
         taken.push([x - 7.0, mean - 7.0, x + 7.0, mean + 7.0]);
         taken.push([x - 5.0, median - 5.0, x + 5.0, median + 5.0]);
         taken.push([x - 1.0, mean.min(median), x + 1.0, mean.max(median)]);
@@ -121,7 +129,7 @@ pub(super) fn draw(title: &str, points: &[FrontPoint], default: &str) -> Canvas 
     }
     for p in points {
         let colour = if p.peer { PEER } else { OURS };
-        let (x, mean, median) = (axes.x(p.median_ms), axes.y(p.mean_deg), axes.y(p.median_deg));
+        let (x, mean, median) = (axes.x(p.ms), axes.y(p.mean_deg), axes.y(p.median_deg));
         c.line([x, mean], [x, median], 1.0, colour);
         c.disc([x, median], 4.5, colour);
         c.disc([x, median], 3.0, [255; 3]);
@@ -138,6 +146,9 @@ pub(super) fn draw(title: &str, points: &[FrontPoint], default: &str) -> Canvas 
             let end = if right { at[0] - 2.0 } else { at[0] + text_width(&label, LETTER) };
             c.line([x, mean], [end, middle], 0.7, MUTED);
         }
+        // White behind the letters, where lines of other engines pass.
+        let width = text_width(&label, LETTER);
+        c.line([at[0], middle], [at[0] + width - 3.0, middle], LETTER + 5.0, [255; 3]);
         c.text(at, LETTER, Anchor::Start, colour, label);
     }
     c
@@ -165,7 +176,7 @@ fn place(label: &str, point: [f32; 2], taken: &mut Vec<[f32; 4]>) -> [f32; 2] {
     at
 }
 
-fn grid(c: &mut Canvas, title: &str, axes: &Axes) {
+fn grid(c: &mut Canvas, title: &str, axis: &str, axes: &Axes) {
     c.text([LEFT, 30.0], 11.0, Anchor::Start, INK, title);
     let mut x = LEFT;
     for (colour, text) in [(OURS, "this program"), (PEER, "peers (Python)")] {
@@ -198,7 +209,7 @@ fn grid(c: &mut Canvas, title: &str, axes: &Axes) {
     c.line([LEFT, TOP], [LEFT, BOTTOM], 1.5, INK);
     c.line([LEFT, BOTTOM], [RIGHT, BOTTOM], 1.5, INK);
     let middle = 0.5 * (LEFT + RIGHT);
-    c.text([middle, BOTTOM + 50.0], 10.5, Anchor::Middle, INK, "points to pose, median over the cases, ms");
+    c.text([middle, BOTTOM + 50.0], 10.5, Anchor::Middle, INK, axis);
     c.text([12.0, TOP - 8.0], LETTER, Anchor::Start, INK, "error");
 }
 
@@ -206,8 +217,8 @@ fn grid(c: &mut Canvas, title: &str, axes: &Axes) {
 mod tests {
     use super::*;
 
-    fn point(name: &str, median_ms: f64, mean_deg: f64) -> FrontPoint {
-        FrontPoint { name: name.into(), peer: false, median_ms, mean_deg, median_deg: 0.5 * mean_deg, on_front: false }
+    fn point(name: &str, ms: f64, mean_deg: f64) -> FrontPoint {
+        FrontPoint { name: name.into(), peer: false, ms, mean_deg, median_deg: 0.5 * mean_deg, on_front: false }
     }
 
     #[test]
@@ -230,9 +241,9 @@ mod tests {
         for (i, a) in spots.iter().enumerate() {
             assert!(spots[..i].iter().all(|b| a != b), "{spots:?}");
         }
-        let svg = draw("t", &pareto(vec![point("one", 0.1, 0.7), point("two", 200.0, 5.0)]), "one").svg();
+        let svg = draw("t", "ms", &pareto(vec![point("one", 0.1, 0.7), point("two", 200.0, 5.0)]), "one").svg();
         assert!(svg.contains("one (default)") && svg.contains(">two<"));
         // No engine at all is a picture, too.
-        assert!(draw("t", &[], "one").svg().contains("</svg>"));
+        assert!(draw("t", "ms", &[], "one").svg().contains("</svg>"));
     }
 }

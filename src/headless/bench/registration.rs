@@ -132,7 +132,7 @@ struct Report {
     /// Depth and mask to the pose with the default engine.
     depth_to_pose: Quantiles,
     engines: Vec<EngineRow>,
-    /// Median time and mean error of each engine; `on_front` where no other is both faster and better.
+    /// Time and mean error of each engine; `on_front` where no other is both faster and better.
     front: Vec<FrontPoint>,
     /// What could not be measured, and why.
     notes: Vec<String>,
@@ -370,7 +370,12 @@ fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
         report.cases.len(),
         report.machine.cpu.as_deref().unwrap_or("unknown processor")
     );
-    let picture = front::draw(&title, &report.front, &report.default);
+    let axis = if front::uses_processor_time(&report.engines) {
+        "points to pose: processor time, mean over the cases, ms"
+    } else {
+        "points to pose: time, median over the cases, ms"
+    };
+    let picture = front::draw(&title, axis, &report.front, &report.default);
     let svg = file.with_extension("svg");
     atomic::write_bytes(&svg, picture.svg().as_bytes()).map_err(failed(&svg))?;
     crate::io::images::write_rgb8(&file.with_extension("png"), &picture.pixels(1.5))?;
