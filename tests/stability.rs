@@ -11,7 +11,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use strum::IntoEnumIterator as _;
 use touch2touch::domain::align::{
-    AlignConfig, AlignError, AlignReport, DistanceField, FieldError, LabIcpConfig, align, closed_form, lab_icp,
+    AlignConfig, AlignError, AlignReport, DistanceField, FieldError, LabIcpConfig, LabModel, align, closed_form,
+    lab_icp,
 };
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
@@ -177,20 +178,21 @@ fn e04_a_large_offset_does_not_cost_the_angle() {
     let scene = contacts(&model.mesh, 800, truth, 1e-4, 3);
     let near = |start: PlanarPose| AlignConfig { starts: vec![start], ..AlignConfig::default() };
     let reference = align(&yz(&scene), &model.field, &near(pose(5.0, 0.0, 0.0))).unwrap().grasp_from_object;
-    let lab = |offset: DVec2, scene: &[DVec2]| {
+    let lab = |offset: DVec2, scene: &[DVec3]| {
         let start = PlanarPose { y_m: offset.x, z_m: offset.y, ..pose(0.0, 0.0, 0.0) };
-        lab_icp(scene, &model.model_points, &LabIcpConfig { start, ..LabIcpConfig::default() })
+        lab_icp(scene, model.lab_model(), &LabIcpConfig { starts: vec![start], ..LabIcpConfig::default() })
             .unwrap()
             .grasp_from_object
     };
-    let lab_reference = lab(DVec2::ZERO, &yz(&scene));
+    let lab_reference = lab(DVec2::ZERO, &scene);
     for offset in OFFSETS {
-        let moved: Vec<DVec2> = yz(&scene).iter().map(|p| *p + offset).collect();
+        let moved_in_space: Vec<DVec3> = scene.iter().map(|p| *p + DVec3::new(0.0, offset.x, offset.y)).collect();
+        let moved = yz(&moved_in_space);
         let start = PlanarPose { y_m: offset.x, z_m: offset.y, ..pose(5.0, 0.0, 0.0) };
         let found = align(&moved, &model.field, &near(start)).unwrap().grasp_from_object;
         let error = angle_error(found.theta_rad, reference.theta_rad).to_degrees();
         assert!(error <= 1e-4, "distance field at {offset}: {error} deg");
-        let error = angle_error(lab(offset, &moved).theta_rad, lab_reference.theta_rad).to_degrees();
+        let error = angle_error(lab(offset, &moved_in_space).theta_rad, lab_reference.theta_rad).to_degrees();
         assert!(error <= 1e-4, "lab ICP at {offset}: {error} deg");
         let pairs: Vec<(DVec2, DVec2)> =
             yz(&model.mesh.vertices).iter().map(|p| (*p, truth.transform_yz(*p) + offset)).collect();
@@ -215,9 +217,10 @@ fn turn_between(a: DAffine3, b: DAffine3) -> f64 {
 fn e05_the_scale_does_not_change_the_angle_or_is_an_error() {
     let truth = pose(-7.0, 1.0, 0.5);
     let mesh = angle_mesh();
-    let scene = yz(&contacts(&mesh, 600, truth, 1e-4, 4));
-    let points = yz(&mesh.sample_surface(3000, 9));
-    let reference = lab_icp(&scene, &points, &LabIcpConfig::default()).unwrap();
+    let scene = contacts(&mesh, 600, truth, 1e-4, 4);
+    let surface = mesh.sample_surface(3000, 9);
+    let points = yz(&surface);
+    let reference = lab_icp(&scene, &LabModel::new(&surface), &LabIcpConfig::default()).unwrap();
     for power in -6..=6 {
         let scale = 10f64.powi(power);
         // Closed forms have no unit.
@@ -229,8 +232,8 @@ fn e05_the_scale_does_not_change_the_angle_or_is_an_error() {
         assert!(turn_between(closed_form::in_space(&pairs).unwrap(), truth.to_affine()) < 1e-3, "scale {scale}");
 
         // The lab's loop has none either, except that contacts within a millimetre are one spot.
-        let scaled = |v: &[DVec2]| v.iter().map(|p| *p * scale).collect::<Vec<_>>();
-        match lab_icp(&scaled(&scene), &scaled(&points), &LabIcpConfig::default()) {
+        let scaled = |v: &[DVec3]| v.iter().map(|p| *p * scale).collect::<Vec<_>>();
+        match lab_icp(&scaled(&scene), &LabModel::new(&scaled(&surface)), &LabIcpConfig::default()) {
             Ok(report) => {
                 let error = angle_error(report.grasp_from_object.theta_rad, reference.grasp_from_object.theta_rad);
                 assert!(error.to_degrees() < 1e-3, "scale {scale}: {} deg", error.to_degrees());
@@ -363,7 +366,7 @@ fn e08_disjoint_clouds_do_not_match() {
                 Err(AlignError::NoOverlap { share }) => assert!(share < 0.05, "{engine} at {away} m: {share}"),
                 // The paper's loop has no limit of distance: it carries the tool over to the points, which is a match,
                 // but not one that a gripper can hold, and it says so. It must not be an empty match with error 0.
-                Ok(report) if engine == Engine::LabIcp => {
+                Ok(report) if matches!(engine, Engine::LabIcp) => {
                     assert!(!report.within_prior, "{engine} at {away} m");
                     assert!(report.inlier_share > 0.05 && report.inlier_rms_m > 0.0, "{engine} at {away} m");
                 }
@@ -451,11 +454,11 @@ fn e11_axis_aligned_and_equal_model_points_do_not_panic() {
         assert!(report.grasp_from_object.is_finite(), "{engine}");
     }
     let config = LabIcpConfig::default();
-    let equal = vec![DVec2::new(0.001, 0.002); 5000];
-    assert!(lab_icp(&yz(&scene), &equal, &config).unwrap().grasp_from_object.is_finite());
-    let same_y: Vec<DVec2> = (0..5000).map(|i| DVec2::new(0.004, 1e-5 * f64::from(i))).collect();
-    assert!(lab_icp(&yz(&scene), &same_y, &config).unwrap().grasp_from_object.is_finite());
-    assert_eq!(lab_icp(&yz(&scene), &[], &config), Err(AlignError::EmptyModel { got: 0 }));
+    let equal = vec![DVec3::new(0.0, 0.001, 0.002); 5000];
+    assert!(lab_icp(&scene, &LabModel::new(&equal), &config).unwrap().grasp_from_object.is_finite());
+    let same_y: Vec<DVec3> = (0..5000).map(|i| DVec3::new(0.0, 0.004, 1e-5 * f64::from(i))).collect();
+    assert!(lab_icp(&scene, &LabModel::new(&same_y), &config).unwrap().grasp_from_object.is_finite());
+    assert_eq!(lab_icp(&scene, &LabModel::new(&[]), &config), Err(AlignError::EmptyModel { got: 0 }));
     assert!(matches!(ToolModel::new(TriMesh::default()), Err(ToolError::Field(_))));
 }
 
