@@ -116,7 +116,6 @@ pub(super) fn draw(title: &str, axis: &str, points: &[FrontPoint], default: &str
         let (x, mean, median) = (axes.x(p.ms), axes.y(p.mean_deg), axes.y(p.median_deg));
         taken.push([x - 7.0, mean - 7.0, x + 7.0, mean + 7.0]);
         taken.push([x - 5.0, median - 5.0, x + 5.0, median + 5.0]);
-        taken.push([x - 1.0, mean.min(median), x + 1.0, mean.max(median)]);
     }
     // The staircase is in the way of labels, too.
     for pair in steps.windows(2) {
@@ -138,6 +137,10 @@ pub(super) fn draw(title: &str, axis: &str, points: &[FrontPoint], default: &str
             c.disc([x, mean], 8.0, [255; 3]);
         }
         c.disc([x, mean], 6.0, colour);
+    }
+    for p in points {
+        let colour = if p.peer { PEER } else { OURS };
+        let (x, mean) = (axes.x(p.ms), axes.y(p.mean_deg));
         let label = if p.name == default { format!("{} (default)", p.name) } else { p.name.clone() };
         let at = place(&label, [x, mean], &mut taken);
         // A label that had to give way is joined to its point.
