@@ -13,7 +13,7 @@ import onnxruntime
 import torch
 from torch import nn
 
-from . import baselines, data, diffusion, half, models
+from . import baselines, data, diffusion, half, models, weights
 
 OPSET = 17
 
@@ -162,8 +162,19 @@ def generator_bundle(args, out, name, nets, shapes, steps, states):
     }
 
 
+def averaged(nets, args):
+    """Mixes the weights with those of the bundle that the run began from: keeps what it knew beside what is new."""
+    for net, role, prefix in zip(nets, ("condition_encoder", "denoiser", "decoder"), ("", "", "decoder.")):
+        net = getattr(net, "decoder", net)
+        own = {k: v.clone() for k, v in net.state_dict().items()}
+        weights.load(net, Path(args.average_with) / f"{role}.onnx", prefix)
+        net.load_state_dict({k: torch.lerp(v, own[k], args.share) for k, v in net.state_dict().items()})
+
+
 def generator(args, out):
     encoder, denoiser, decoder, ae, state = load_generator(args.run)
+    if args.average_with:
+        averaged((encoder, denoiser, decoder), args)
     shapes = (models.CONDITION, 16, 16), (models.LATENT, 16, 16)
     return generator_bundle(args, out, "Latent diffusion, simulated data", (encoder, denoiser, decoder), shapes, 10,
                             {"autoencoder": ae, "generator": state})
@@ -227,6 +238,8 @@ def main():
     parser.add_argument("--data", default="training/data/train", help="folder of the training shards")
     parser.add_argument("--out", required=True, help="bundle folder to write")
     parser.add_argument("--fp16", action="store_true", help="store large weights in 16 bits (half the size)")
+    parser.add_argument("--average-with", help="generator bundle that the run began from (`--from`); its weights are mixed in")
+    parser.add_argument("--share", type=float, default=0.5, help="the run's own share of that mixture")
     parser.add_argument("--note", default="", help="free text for the provenance")
     parser.add_argument("--seed", type=int, default=7, help="which training touches the shift statistics come from")
     args = parser.parse_args()
