@@ -183,7 +183,7 @@ impl<'a> Problem<'a> {
             Rung::Grid => {
                 let mut search = self.search();
                 let starts = self.knots(&mut search, earlier);
-                self.descend(rung, starts, search, earlier)
+                self.descend_with(rung, starts, search, earlier, self.narrow())
             }
         }
     }
@@ -194,8 +194,8 @@ impl<'a> Problem<'a> {
         let kernel = final_kernel(config);
         let mut answer = self.descend(Rung::Certified, several(&config.prior), self.search(), None)?;
         let mut search = self.search();
-        // The proof begins with the best that is known.
-        let known = earlier.map(|e| e.refined).filter(|e| e.cost < answer.best().cost);
+        // The proof begins with the best that is known, of the prior if anything there is: it is about the prior.
+        let known = earlier.map(|e| e.refined).filter(|e| self.is_better(e, answer.best()));
         let mut best = Progress::new(known.unwrap_or(*answer.best()).state);
         search.descend_quietly(&mut best, &self.middle, kernel);
         let (certificate, best) = certify(&mut search, &self.middle, config, kernel, best);
@@ -204,8 +204,8 @@ impl<'a> Problem<'a> {
         let state = State::from_pose(answer.pose, self.centroid);
         if !best.state.is_near(&state) {
             let start = best.state.to_pose(self.centroid);
-            let better = self.descend(Rung::Certified, vec![start], self.search(), None)?;
-            if better.best().cost < answer.best().cost {
+            let better = self.descend_with(Rung::Certified, vec![start], self.search(), None, self.narrow())?;
+            if self.is_better(better.best(), answer.best()) {
                 answer = Answer { lookups: answer.lookups + better.lookups, ..better };
             }
         }
@@ -259,16 +259,40 @@ impl<'a> Problem<'a> {
         starts
     }
 
+    /// The kernels without the widest. A knot of a grid already lies beside its valley, and the widest kernel would
+    /// follow a large foreign body out of it.
+    fn narrow(&self) -> &'a [f64] {
+        let kernels = &self.config.kernels_m;
+        &kernels[usize::from(kernels.len() > 1)..]
+    }
+
+    /// Whether `a` is to be preferred to `b`: within the prior before outside, then the cheaper one.
+    fn is_better(&self, a: &Progress, b: &Progress) -> bool {
+        let allowed = |run: &Progress| self.config.prior.allows(run.state.to_pose(self.centroid));
+        allowed(a) > allowed(b) || (allowed(a) == allowed(b) && a.cost < b.cost)
+    }
+
+    fn descend(
+        &self,
+        rung: Rung,
+        starts: Vec<PlanarPose>,
+        search: Search<'a>,
+        earlier: Option<&Earlier>,
+    ) -> Result<Answer, AlignError> {
+        self.descend_with(rung, starts, search, earlier, &self.config.kernels_m)
+    }
+
     /// Scouts from all starts, refines the best few, takes the cheapest: one within the prior if there is one, because
     /// a symmetric tool fits as well after a turn that no gripper makes.
     ///
     /// A run whose scouts end exactly where those of `earlier` did is not refined again.
-    fn descend(
+    fn descend_with(
         &self,
         rung: Rung,
         starts: Vec<PlanarPose>,
         mut search: Search<'a>,
         earlier: Option<&Earlier>,
+        kernels_m: &[f64],
     ) -> Result<Answer, AlignError> {
         /// A run is worth refining if its scouts cost at most this many times what the best ones do.
         const WORTH: f64 = 1.5;
@@ -288,7 +312,7 @@ impl<'a> Problem<'a> {
             return Err(AlignError::NoOverlap { share: reach });
         }
         let kernel = final_kernel(config);
-        let mut runs = search.scout(&states, &self.scouts, &config.kernels_m);
+        let mut runs = search.scout(&states, &self.scouts, kernels_m);
         let allowed = |run: &Progress| config.prior.allows(run.state.to_pose(c));
         let mut order: Vec<usize> = (0..runs.len()).filter(|&r| runs[r].merged_into.is_none()).collect();
         order.sort_by(|&a, &b| {
