@@ -1,5 +1,6 @@
 //! Nothing to see is an error, and pictures for people.
 
+use strum::IntoEnumIterator as _;
 use touch2touch::app::command::Command;
 use touch2touch::app::inspect::{BasinColour, InspectCommand};
 use touch2touch::app::library::Place;
@@ -8,6 +9,8 @@ use touch2touch::app::workbench::{Layer, SceneTool, WorkbenchCommand};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::hand::HandAxis;
+use touch2touch::domain::sim::Fault;
+use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 
 use super::rig::Rig;
 
@@ -98,5 +101,34 @@ fn pictures_for_the_docs() {
             rig.send(Command::Generate);
             rig.shoot(&format!("{name}-pairs-inspect"));
         }
+    }
+}
+
+/// The five faults of `touch2touch simulate --faults`, as docs/workbench.md shows them.
+#[test]
+fn pictures_of_the_faults() {
+    if std::env::var_os("TOUCH2TOUCH_SCREENSHOTS").is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let models: Vec<_> = Fault::iter().map(|f| (f.to_string(), f.mesh())).collect();
+    let tools: Vec<_> = models.iter().map(|(name, mesh)| (name.as_str(), false, mesh.clone())).collect();
+    write_tools(folder.path(), &tools).unwrap();
+    for fault in Fault::iter() {
+        write_pair(folder.path(), Layout::Test, &fault.to_string(), 0, &fault.sample()).unwrap();
+    }
+    let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(folder.path().to_owned())) else { return };
+    rig.send(Command::DismissHint);
+    rig.send(Command::SetWorkspace(Workspace::Align));
+    let pairs = rig.harness.state().state().library.open.as_ref().unwrap().index().pairs.clone();
+    for (id, pair) in pairs.iter().enumerate() {
+        rig.send(Command::Select(PairId(id as u32)));
+        let name = pair.tool.clone().unwrap();
+        rig.shoot(&format!("fault-{name}-plain"));
+        for layer in [Layer::Residuals, Layer::Reasons] {
+            rig.send(Command::Workbench(WorkbenchCommand::SetLayer(layer)));
+            rig.shoot(&format!("fault-{name}-{}", layer.name()).to_lowercase());
+        }
+        rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
     }
 }
