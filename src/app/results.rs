@@ -11,7 +11,7 @@ use super::keys::{BasinKey, CloudKey, ImprintSource, MaskKey, PairKey, PoseKey, 
 use super::services::{Generated, NamedTool};
 use crate::domain::align::basin::Basin;
 use crate::domain::align::reason::{Reason, ReasonCounts};
-use crate::domain::align::{AlignReport, BothWays, PointFit, TraceStep};
+use crate::domain::align::{AlignReport, Directions, PointFit, TraceStep};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::sample::{Sample, Scale};
@@ -231,8 +231,8 @@ pub struct LayerResult {
     pub range_m: f64,
     /// Width of the narrowest kernel, metres; `None` for an engine without one.
     pub kernel_m: Option<f64>,
-    /// Distances in both directions.
-    pub both_ways: BothWays,
+    /// Distances in both directions; `None` without points on one side.
+    pub directions: Option<Directions>,
 }
 
 impl LayerResult {

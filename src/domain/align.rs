@@ -13,7 +13,6 @@
 //! Source of the method: Fitzgibbon, Robust registration of 2D and 3D point sets, 2003.
 
 pub mod basin;
-pub mod both_ways;
 mod certify;
 pub mod closed_form;
 pub mod correspond;
@@ -38,7 +37,6 @@ use serde::{Deserialize, Serialize};
 
 use super::frames::PlanarPose;
 
-pub use both_ways::{BothWays, both_ways};
 pub use directions::{Directions, Distances};
 pub use field::{DistanceField, FieldError, FieldSample};
 pub use icp::IcpConfig;

@@ -33,6 +33,15 @@ pub fn scale_to_metres(size: f64) -> Option<f64> {
     [1.0, 1e-3, 1e-2, 0.0254, 1e-6, 1e3].into_iter().find(|scale| PLAUSIBLE_M.contains(&(size * scale)))
 }
 
+/// A number of unknown unit for a message: four significant digits.
+pub fn significant(x: f64) -> f64 {
+    if x == 0.0 || !x.is_finite() {
+        return x;
+    }
+    let scale = 10f64.powi(3 - x.abs().log10().floor() as i32);
+    if scale.is_normal() { (x * scale).round() / scale } else { x }
+}
+
 /// The angle brought into (-π, π].
 pub fn wrap_angle(radians: f64) -> f64 {
     let wrapped = radians.rem_euclid(std::f64::consts::TAU);
@@ -55,5 +64,7 @@ mod tests {
         assert_eq!(text_deg(-0.1), "-5.7°");
         assert_eq!((fixed(-0.0004, 2), fixed(-0.006, 2), fixed(-1.0, 0)), ("0.00".into(), "-0.01".into(), "-1".into()));
         assert_eq!(text_mm(0.00842), "8.42 mm");
+        assert_eq!((significant(64.3519458), significant(-1.23456e-5), significant(0.0)), (64.35, -1.235e-5, 0.0));
+        assert!(significant(f64::NAN).is_nan() && significant(1e-310) == 1e-310);
     }
 }

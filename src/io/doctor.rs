@@ -102,7 +102,7 @@ fn tool_problems(dataset: &Dataset, tool: &str) -> Vec<Problem> {
         Ok(file) => {
             let mut problems = Vec::new();
             if let (Some(scale), Some([lo, hi])) = (file.suggested_scale, file.mesh.bounds()) {
-                let extent = (hi - lo).max_element();
+                let extent = crate::domain::units::significant((hi - lo).max_element());
                 problems.push(problem(
                     format!("the CAD model is {extent} units long: not metres"),
                     format!(

@@ -47,7 +47,11 @@ pub enum MeshError {
         triangle: usize,
     },
     /// The model is too large or too small to be a tool in metres.
-    #[error("the CAD model is {size} long, which cannot be metres: scale it by {offered} ({})", file.display())]
+    #[error(
+        "the CAD model is {} long, which cannot be metres: scale it by {offered} ({})",
+        crate::domain::units::significant(*size),
+        file.display()
+    )]
     Unit {
         /// The file.
         file: PathBuf,

@@ -213,21 +213,19 @@ fn reasons(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
 }
 
 fn directions(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
+    let Some(both) = layers.directions else { return };
     ui.add_space(2.0);
     let heads = ["rms", "overlap"].map(|h| (h.to_owned(), cx.p.weak));
     row(ui, None, ("Both directions", cx.p.weak), &heads, 62.0);
-    let both = layers.both_ways;
     for (name, d, tip) in [
-        ("Touch to model", both.scene_to_model, "Contact points to the tool's silhouette: how well the touch fits"),
+        ("Touch to model", both.scene_to_model, "Contact points to the nearest model point: how well the touch fits"),
         (
             "Model to touch",
             both.model_to_scene,
             "The tool's surface to the nearest contact point: how much was touched",
         ),
     ] {
-        let overlap = if d.overlap.is_finite() { format!("{:.0} %", d.overlap * 100.0) } else { "–".into() };
-        let rms = if d.rms_m.is_finite() { units::text_mm(d.rms_m) } else { "–".into() };
-        let numbers = [(rms, cx.p.strong), (overlap, cx.p.strong)];
+        let numbers = [units::text_mm(d.rms_m), format!("{:.0} %", d.overlap * 100.0)].map(|text| (text, cx.p.strong));
         let response = ui.scope(|ui| row(ui, None, (name, cx.p.text), &numbers, 62.0));
         response.response.on_hover_text(format!("{tip}. Overlap: share within 1 mm, in the plane of the tool"));
     }

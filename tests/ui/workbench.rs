@@ -279,7 +279,7 @@ fn layers_go_round_and_their_numbers_add_up() {
     }
     let contact = rig.model().cloud(MEASURED).ready().unwrap().contact_points().len();
     assert_eq!(layers.histogram.iter().sum::<u32>() as usize + layers.above as usize, contact);
-    assert!(layers.both_ways.scene_to_model.overlap > 0.8, "{:?}", layers.both_ways);
+    assert!(layers.directions.unwrap().scene_to_model.overlap > 0.8, "{:?}", layers.directions);
     // The other side has its own.
     rig.send(Command::Generate);
     let side = rig.harness.get_by_label("Layers of the predicted side").rect().center();

@@ -2,6 +2,7 @@
 
 use super::super::effect::Effect;
 use super::super::error::TaskError;
+use super::super::inspect::InspectCommand;
 use super::super::keys::{ImprintSource, Request, RunKey};
 use super::super::state::State;
 use super::super::workbench::{HandTry, SceneTool, WorkbenchCommand};
@@ -116,7 +117,8 @@ fn start_icp(state: &mut State) {
     let Ok(Some(pose)) = state.pose_key(hand.source) else {
         return state.log.error(&TaskError::new(WHAT, "the contact points are not there yet").with_hint("Try again."));
     };
-    let key = RunKey { pose, start: Some(hand.pose.planar.into()) };
+    let (source, start) = (hand.source, hand.pose.planar);
+    let key = RunKey { pose, start: Some(start.into()) };
     // Asked for by a person: what failed before is tried again.
     state.tasks.failed.remove(&Request::Run(key.clone()));
     hand.icp = Some(key.clone());
@@ -125,6 +127,10 @@ fn start_icp(state: &mut State) {
     if state.results.runs.contains(&key) {
         run_arrived(state, &key);
     }
+    // The time machine shows the same run, at its end: there the tool in hand goes.
+    super::inspect::step(state, InspectCommand::Source(source));
+    super::inspect::step(state, InspectCommand::Start(Some(start)));
+    super::inspect::step(state, InspectCommand::End);
 }
 
 /// A recorded registration is there: the tool in hand goes where the one it waits for ended.

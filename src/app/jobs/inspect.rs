@@ -2,11 +2,9 @@
 
 use super::super::error::TaskError;
 use super::super::results::{Clouds, LayerResult, PoseResult};
+use crate::domain::align::PointFit;
 use crate::domain::align::reason::{self, reasons};
-use crate::domain::align::{PointFit, both_ways};
 use crate::domain::grid::Mask;
-use crate::domain::tool::ToolModel;
-use glam::DVec2;
 
 /// Bars of the histogram of residuals.
 pub const BARS: usize = 40;
@@ -19,12 +17,7 @@ const RANGE_M: f64 = 4e-3;
 ///
 /// # Errors
 /// If the run did not record what became of the points, or they are not those of the clouds.
-pub fn layers(
-    clouds: &Clouds,
-    masks: [Option<&Mask>; 2],
-    tool: &ToolModel,
-    run: &PoseResult,
-) -> Result<LayerResult, TaskError> {
+pub fn layers(clouds: &Clouds, masks: [Option<&Mask>; 2], run: &PoseResult) -> Result<LayerResult, TaskError> {
     const WHAT: &str = "Layers";
     let mut rest = run.report.fits.as_slice();
     let mut grids = [None, None];
@@ -46,7 +39,6 @@ pub fn layers(
     let kernel_m = run.report.trace.iter().map(|step| step.kernel_m).filter(|k| k.is_finite()).reduce(f64::min);
     let range_m = kernel_m.map_or(RANGE_M, |k| k * RANGE_KERNELS);
     let (histogram, above) = histogram(fits.iter().flatten(), range_m);
-    let points: Vec<DVec2> = clouds.contact_points().iter().map(|p| DVec2::new(p.y, p.z)).collect();
     Ok(LayerResult {
         grasp_from_object: run.grasp_from_object,
         counts: grids.each_ref().map(reason::counts),
@@ -56,7 +48,7 @@ pub fn layers(
         above,
         range_m,
         kernel_m,
-        both_ways: both_ways(&points, &tool.model_points, &tool.field, run.grasp_from_object),
+        directions: run.report.directions,
     })
 }
 

@@ -215,7 +215,6 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
         }
         Request::Layers(key) => {
             let clouds = results.clouds.get(&key.cloud)?.clone();
-            let tool = results.tools.get(&key.tool.to_string())?.clone();
             let run = results.runs.get(&RunKey { pose: key.clone(), start: None })?.clone();
             let masks = masks_of(state, &key.cloud);
             job(
@@ -223,7 +222,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 "Layers of the registration".into(),
                 Box::new(move |_| {
                     let masks = [masks[0].as_deref(), masks[1].as_deref()];
-                    Ok(Computed::Layers(Arc::new(inspect::layers(&clouds, masks, &tool.model, &run)?)))
+                    Ok(Computed::Layers(Arc::new(inspect::layers(&clouds, masks, &run)?)))
                 }),
             )
         }

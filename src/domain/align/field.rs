@@ -27,7 +27,11 @@ pub enum FieldError {
         triangle: usize,
     },
     /// The bounding box cannot be a tool in metres.
-    #[error("the mesh is {size} long, which cannot be metres{}", .scale.map_or(String::new(), |s| format!(": scale it by {s}")))]
+    #[error(
+        "the mesh is {} long, which cannot be metres{}",
+        crate::domain::units::significant(*.size),
+        .scale.map_or(String::new(), |s| format!(": scale it by {s}"))
+    )]
     Units {
         /// Longest side of the bounding box, in the file's unit.
         size: f64,

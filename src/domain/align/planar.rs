@@ -269,7 +269,11 @@ impl<'a> Problem<'a> {
     /// Whether `a` is to be preferred to `b`: within the prior before outside, then the cheaper one.
     fn is_better(&self, a: &Progress, b: &Progress) -> bool {
         let allowed = |run: &Progress| self.config.prior.allows(run.state.to_pose(self.centroid));
-        allowed(a) > allowed(b) || (allowed(a) == allowed(b) && a.cost < b.cost)
+        match (allowed(a), allowed(b)) {
+            (true, false) => true,
+            (false, true) => false,
+            _ => a.cost < b.cost,
+        }
     }
 
     fn descend(

@@ -12,6 +12,7 @@ use crate::app::keys::ImprintSource;
 use crate::app::results::PoseResult;
 use crate::app::state::{Absent, Lookup};
 use crate::app::workbench::Layer;
+use crate::domain::align::Rung;
 use crate::domain::align::reason::Reason;
 use crate::domain::hand::PoseDifference;
 use crate::domain::units;
@@ -170,7 +171,16 @@ pub(in crate::ui) fn error_color(p: &Palette, error_rad: f64) -> Color32 {
 pub(in crate::ui) fn pose_details(pose: &PoseResult) -> String {
     // The unit stays with its number where the line wraps.
     let ms = pose.ms;
-    format!("{} points · residual {} · {} · {ms:.1}\u{a0}ms", pose.num_points, units::text_mm(pose.rms_m), pose.stop)
+    let report = &pose.report;
+    let found = if report.rung == Rung::Fixed { String::new() } else { format!(" · {}", report.rung) };
+    let beyond = if report.within_prior { "" } else { " · beyond what the gripper can hold (±22.5°, ±5 mm)" };
+    let open = if report.is_degenerate() { " · not fully determined" } else { "" };
+    format!(
+        "{} points · residual {} · {}{found}{open}{beyond} · {ms:.1}\u{a0}ms",
+        pose.num_points,
+        units::text_mm(pose.rms_m),
+        pose.stop
+    )
 }
 
 fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output: &SceneOutput, rect: Rect) {

@@ -136,7 +136,8 @@ pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, rect: Rec
     let painter = ui.painter_at(rect);
     let font = FontId::proportional(11.0);
     let (width, left) = (110.0, rect.left() + 122.0);
-    if rect.width() < width + 260.0 {
+    let beside = if cx.state.workbench.layer == Layer::Residuals { 390.0 } else { 260.0 };
+    if rect.width() < width + beside {
         return;
     }
     let bar = Rect::from_min_size(pos2(left, rect.bottom() - 38.0), vec2(width, 6.0));
