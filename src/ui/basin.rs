@@ -204,7 +204,8 @@ impl Scale {
         if colour == BasinColour::Cost {
             let values = basin.cells.iter().filter_map(|c| scale.value(c.arrival.as_ref()?));
             let [lo, hi] = values.fold([f64::INFINITY, 0.0], |[lo, hi]: [f64; 2], v| [lo.min(v), hi.max(v)]);
-            scale.range = if lo < hi { [lo, hi] } else { [0.0, hi.max(1e-6)] };
+            // Ends that differ by less than a twentieth are the same place: rounding must not look like a landscape.
+            scale.range = if lo < hi { [lo, hi.max(1.05 * lo)] } else { [0.0, hi.max(1e-6)] };
         }
         scale
     }

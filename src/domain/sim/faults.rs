@@ -39,7 +39,7 @@ impl Fault {
     }
 
     /// The tool in the hand, without what is wrong.
-    fn tool(self) -> &'static ToolSpec {
+    fn tool(self) -> ToolSpec {
         let number = match self {
             Self::WrongCad => 1,
             Self::BlobInMask => 7,
@@ -47,7 +47,12 @@ impl Fault {
             Self::StraightRod => 5,
             Self::StlInMillimetres => 0,
         };
-        &tools()[number]
+        let mut tool = tools()[number].clone();
+        if self == Self::StraightRod {
+            // So long that neither end is felt.
+            tool.bars[0].core.iter_mut().for_each(|end| *end *= 2.5);
+        }
+        tool
     }
 
     /// How it is held.
@@ -57,7 +62,7 @@ impl Fault {
 
     /// The touch.
     pub fn sample(self) -> Sample {
-        let mut felt = self.tool().clone();
+        let mut felt = self.tool();
         if self == Self::BlobInMask {
             // As thick as the tool, between two of its arms.
             felt.bars

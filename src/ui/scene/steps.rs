@@ -136,7 +136,7 @@ pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, rect: Rec
     let painter = ui.painter_at(rect);
     let font = FontId::proportional(11.0);
     let (width, left) = (110.0, rect.left() + 122.0);
-    let beside = if cx.state.workbench.layer == Layer::Residuals { 390.0 } else { 260.0 };
+    let beside = if cx.state.workbench.layer != Layer::None { 390.0 } else { 260.0 };
     if rect.width() < width + beside {
         return;
     }
