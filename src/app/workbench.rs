@@ -1,6 +1,6 @@
 //! The workbench: what the 3D panes show besides cloud and model, and what a hand does in them.
 //!
-//! Everything here is of the session. What a person decides with it (an accepted pose) is the document's.
+//! Everything here lasts as long as the window. What a person decides with it (an accepted pose) is the document's.
 
 use glam::DVec3;
 use strum::EnumIter;

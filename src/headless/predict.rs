@@ -3,9 +3,11 @@
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
+use strum::IntoEnumIterator as _;
 
-use crate::domain::diffusion::GenerateConfig;
+use crate::domain::diffusion::{GenerateConfig, Sampler};
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::sample::Sample;
@@ -30,15 +32,23 @@ pub(super) struct ModelArgs {
     /// Seed of the noise (default: the bundle's).
     #[arg(long)]
     seed: Option<u64>,
-    /// Share of fresh noise per step, 0 to 1 (default: the bundle's).
+    /// Share of fresh noise per step, 0 to 1, for DDIM (default: the bundle's).
     #[arg(long)]
     eta: Option<f64>,
+    /// The way from noise to an image (default: the bundle's).
+    #[arg(long, value_parser = PossibleValuesParser::new(Sampler::iter().map(Sampler::key)).map(sampler))]
+    sampler: Option<Sampler>,
     /// How the decoder's output becomes metres.
     #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]
     shift: ShiftArg,
     /// The engine that runs the models.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
+}
+
+/// Of a key that the parser has already compared with the list.
+fn sampler(key: String) -> Sampler {
+    key.parse().unwrap_or_default()
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -119,6 +129,7 @@ impl Predictor {
             steps: args.steps.unwrap_or(defaults.steps),
             seed: args.seed.unwrap_or(defaults.seed),
             eta: args.eta.unwrap_or(defaults.eta),
+            sampler: args.sampler.unwrap_or(defaults.sampler),
             ..defaults
         })
     }

@@ -158,6 +158,8 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn sampler_name(sampler: Sampler) -> &'static str {
     match sampler {
         Sampler::Ddim => "DDIM",
+        Sampler::Ddpm => "DDPM",
+        Sampler::DpmSolver2m => "DPM++ 2M",
     }
 }
 

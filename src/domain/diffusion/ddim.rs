@@ -1,4 +1,4 @@
-//! The sampler: [`sample`] runs DDIM over any [`Denoiser`].
+//! The samplers: [`sample`] runs DDIM, DDPM or DPM-Solver++(2M) over any [`Denoiser`].
 
 use std::ops::ControlFlow;
 
@@ -23,13 +23,39 @@ pub enum Prediction {
 
 /// How the noise is taken away.
 #[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, strum::EnumIter,
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    strum::EnumIter,
+    strum::EnumString,
+    strum::IntoStaticStr,
 )]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Sampler {
     /// Denoising diffusion implicit models; `eta` 0 is deterministic, 1 is ancestral sampling.
     #[default]
     Ddim,
+    /// Ancestral sampling: DDIM with `eta` 1, whatever the configuration says.
+    Ddpm,
+    /// DPM-Solver++(2M): second order, deterministic, on the data prediction (Lu et al. 2022, algorithm 2). The first
+    /// and the last step are of first order, which is DDIM without noise. `eta` is not used.
+    DpmSolver2m,
+}
+
+impl Sampler {
+    /// Name in settings, files and on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
 }
 
 /// The choices of one generation. Together with the input and the bundle it determines the result.
@@ -37,7 +63,7 @@ pub enum Sampler {
 pub struct GenerateConfig {
     /// Sampling steps, 1 to the schedule's training steps.
     pub steps: u32,
-    /// Share of fresh noise per step, 0 to 1.
+    /// Share of fresh noise per step, 0 to 1; for [`Sampler::Ddim`].
     pub eta: f64,
     /// Seed of the starting noise and of the fresh noise.
     pub seed: u64,
@@ -187,6 +213,11 @@ pub fn sample_seeds(
     // The trajectory is kept in f64; the model sees it rounded to f32.
     let mut x: Vec<f64> = noises.iter_mut().flat_map(|n| (0..len).map(|_| n.draw()).collect::<Vec<_>>()).collect();
     let mut input = Tensor::filled(shape.clone(), 0.0);
+    // The clean latent as it was estimated one step earlier, for the second order.
+    let mut earlier = Vec::new();
+    if config.sampler == Sampler::DpmSolver2m {
+        earlier = vec![0.0; x.len()];
+    }
 
     for (done, step) in steps.iter().enumerate() {
         tell(done as u32)?;
@@ -200,7 +231,15 @@ pub fn sample_seeds(
         if count > 0 {
             return Err(ModelError::NonFinite { graph: "denoiser".into(), count }.into());
         }
-        let update = Update::new(step, prediction, config.eta);
+        if config.sampler == Sampler::DpmSolver2m {
+            let update = SecondOrder::new(step, done.checked_sub(1).map(|before| &steps[before]), prediction);
+            for ((x, earlier), &output) in x.iter_mut().zip(&mut earlier).zip(output.data()) {
+                *x = update.apply(*x, f64::from(output), earlier);
+            }
+            continue;
+        }
+        let eta = if config.sampler == Sampler::Ddpm { 1.0 } else { config.eta };
+        let update = Update::new(step, prediction, eta);
         for ((x, output), noise) in x.chunks_mut(len.max(1)).zip(output.data().chunks(len.max(1))).zip(&mut noises) {
             for (x, &output) in x.iter_mut().zip(output) {
                 *x = update.apply(*x, f64::from(output), noise);
@@ -210,6 +249,43 @@ pub fn sample_seeds(
     tell(of)?;
     input.data_mut().iter_mut().zip(&x).for_each(|(to, &from)| *to = from as f32);
     Ok(input)
+}
+
+/// One step of DPM-Solver++(2M). With λ the logarithm of signal over noise, the clean latent is extrapolated along λ
+/// from the last two estimates.
+struct SecondOrder {
+    first: Update,
+    /// Weight of the way from the earlier estimate to the present one; 0 for a step of first order.
+    ahead: f64,
+}
+
+impl SecondOrder {
+    fn new(step: &Step, before: Option<&Step>, prediction: Prediction) -> Self {
+        let lambda = |alpha_bar: f64| 0.5 * (alpha_bar.ln() - (-alpha_bar).ln_1p());
+        // Where λ is infinite (pure noise, no noise) the extrapolation has no length to go by.
+        let ahead = before.map_or(0.0, |before| {
+            let (h, h_before) = (
+                lambda(step.alpha_bar_next) - lambda(step.alpha_bar),
+                lambda(step.alpha_bar) - lambda(before.alpha_bar),
+            );
+            let ahead = 0.5 * h / h_before;
+            if h.is_finite() && h_before.is_finite() && ahead.is_finite() { ahead } else { 0.0 }
+        });
+        Self { first: Update::new(step, prediction, 0.0), ahead }
+    }
+
+    fn apply(&self, x: f64, output: f64, earlier: &mut f64) -> f64 {
+        let update = &self.first;
+        let (clean, epsilon) = update.split(x, output);
+        let target = clean + self.ahead * (clean - *earlier);
+        *earlier = clean;
+        if update.noise == 0.0 {
+            return update.signal_next * target + update.direction_next * epsilon;
+        }
+        // With the same clean latent in both terms this is the step of DDIM.
+        let kept = update.direction_next / update.noise;
+        kept * x + (update.signal_next - update.signal * kept) * target
+    }
 }
 
 /// The coefficients of one DDIM step, equation 12 of the paper.
@@ -242,14 +318,19 @@ impl Update {
         }
     }
 
-    fn apply(&self, x: f64, output: f64, noise: &mut GaussianNoise) -> f64 {
-        let (clean, epsilon) = match self.prediction {
+    /// The clean latent and the noise that `x` is made of, by the model's output.
+    fn split(&self, x: f64, output: f64) -> (f64, f64) {
+        match self.prediction {
             // signal > 0: Schedule::steps refuses pure noise for this prediction.
             Prediction::Epsilon => ((x - self.noise * output) / self.signal, output),
             Prediction::V => (self.signal * x - self.noise * output, self.signal * output + self.noise * x),
             Prediction::Sample if self.noise == 0.0 => (output, 0.0),
             Prediction::Sample => (output, (x - self.signal * output) / self.noise),
-        };
+        }
+    }
+
+    fn apply(&self, x: f64, output: f64, noise: &mut GaussianNoise) -> f64 {
+        let (clean, epsilon) = self.split(x, output);
         let mean = self.signal_next * clean + self.direction_next * epsilon;
         if self.sigma > 0.0 { mean + self.sigma * noise.draw() } else { mean }
     }

@@ -241,3 +241,56 @@ fn wrong_parameters_and_models_are_errors() {
     let result = sample_seeds(&mut model, &lab(), &config, &[1, 2], &condition(1), &mut |_| ControlFlow::Continue(()));
     assert_eq!(result, Err(DiffusionError::Batch { seeds: 2, conditions: 1 }));
 }
+
+#[test]
+fn the_second_order_follows_the_exact_flow_more_closely() {
+    let (mean, std) = (0.8, 0.3);
+    // The lab's spacing ends at hardly any noise, so that the last step, of first order in both, does not matter.
+    let spacing = Spacing::Lab;
+    let error = |sampler: Sampler, steps: u32| {
+        let mut model = Gaussian { schedule: lab(), mean: vec![mean], std, prediction: Prediction::V };
+        let found = run(&mut model, &lab(), GenerateConfig { steps, sampler, spacing, ..Default::default() }).unwrap();
+        let a = lab().steps(steps, spacing, Prediction::V).unwrap()[0].alpha_bar;
+        let mut noise = GaussianNoise::new(42);
+        let worst = found.data().iter().map(|&x| {
+            let z = (noise.draw() - a.sqrt() * mean) / (a * std * std + 1.0 - a).sqrt();
+            (f64::from(x) - (mean + std * z)).abs()
+        });
+        worst.fold(0.0, f64::max)
+    };
+    let errors = [10, 20, 50, 100].map(|steps| [Sampler::Ddim, Sampler::DpmSolver2m].map(|s| error(s, steps)));
+    assert!(errors.iter().all(|[first, second]| second < &(0.6 * first)), "{errors:?}");
+}
+
+#[test]
+fn every_sampler_returns_a_perfect_prediction_and_stays_finite() {
+    let clean = vec![-1.5, -0.2, 0.0, 0.7, 1.0, 3.0];
+    for sampler in [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m] {
+        assert_eq!(sampler.key().parse(), Ok(sampler));
+        for prediction in KINDS {
+            for steps in [1, 2, 3, 10, 333, 1000] {
+                for spacing in [Spacing::Lab, Spacing::Trailing] {
+                    let mut model = Perfect { schedule: lab(), clean: clean.clone(), prediction, calls: 0 };
+                    let config = GenerateConfig { steps, sampler, spacing, ..Default::default() };
+                    let found = run(&mut model, &lab(), config).unwrap();
+                    let worst = found.data().iter().zip(&clean).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                    assert!(worst < 1e-5, "{sampler:?} {prediction:?} {steps} {spacing:?}: {worst}");
+                }
+            }
+        }
+    }
+    let ancestral = |sampler, eta| {
+        let mut model = Gaussian { schedule: lab(), mean: vec![0.0], std: 1.0, prediction: Prediction::V };
+        run(&mut model, &lab(), GenerateConfig { steps: 20, sampler, eta, ..Default::default() }).unwrap()
+    };
+    assert_eq!(ancestral(Sampler::Ddpm, 0.0), ancestral(Sampler::Ddim, 1.0));
+    // A schedule that ends in pure noise has an infinite first step.
+    let mut bars: Vec<f64> = (0..100).map(|i| 1.0 - f64::from(i) / 99.0).collect();
+    bars[0] = 1.0;
+    let pure = Schedule::from_alpha_bar(bars).unwrap();
+    for steps in [1, 2, 5, 100] {
+        let mut model = Gaussian { schedule: pure.clone(), mean: vec![0.4], std: 0.2, prediction: Prediction::V };
+        let config = GenerateConfig { steps, sampler: Sampler::DpmSolver2m, ..Default::default() };
+        assert_eq!(run(&mut model, &pure, config).unwrap().non_finite(), 0, "{steps} steps");
+    }
+}
