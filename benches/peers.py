@@ -91,18 +91,18 @@ class Open3D:
 class SmallGicp:
     LABELS = {"ICP": "small_gicp ICP", "PLANE_ICP": "small_gicp plane ICP", "GICP": "small_gicp GICP"}
 
-    def __init__(self, library, kind):
-        self.library = library
+    def __init__(self, module, kind):
+        self.module = module
         self.kind = kind
         self.name = "small-gicp-" + {"ICP": "icp", "PLANE_ICP": "plane-icp", "GICP": "gicp"}[kind]
         self.label = self.LABELS[kind]
         self.tools = {}
 
     def cloud(self, points):
-        cloud = self.library.PointCloud(np.ascontiguousarray(points * 1e3))
-        tree = self.library.KdTree(cloud)
+        cloud = self.module.PointCloud(np.ascontiguousarray(points * 1e3))
+        tree = self.module.KdTree(cloud)
         if self.kind != "ICP":
-            self.library.estimate_normals_covariances(cloud, tree, 20)
+            self.module.estimate_normals_covariances(cloud, tree, 20)
         return cloud, tree
 
     def prepare(self, number, points):
@@ -112,11 +112,11 @@ class SmallGicp:
         target, tree = self.tools[number]
         begin = time.perf_counter()
         # Of the moving cloud, only GICP needs more than the points.
-        source = self.cloud(points)[0] if self.kind == "GICP" else self.library.PointCloud(points * 1e3)
+        source = self.cloud(points)[0] if self.kind == "GICP" else self.module.PointCloud(points * 1e3)
         prepared = (time.perf_counter() - begin) * 1e3
 
         def run(start):
-            result = self.library.align(
+            result = self.module.align(
                 target,
                 source,
                 tree,

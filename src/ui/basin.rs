@@ -10,6 +10,7 @@ use super::cx::Cx;
 use super::images;
 use super::theme::{Palette, SMALL, caption, mix, pane_frame};
 use super::timemachine::pose_text;
+use super::widget::colorbar::gradient;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::Command;
@@ -249,21 +250,10 @@ impl Scale {
             }
             return;
         }
-        let mut mesh = Mesh::default();
-        const STEPS: u32 = 32;
-        for i in 0..=STEPS {
-            let t = i as f32 / STEPS as f32;
+        gradient(painter, bar, 32, |t| {
             let [r, g, b] = ColorMap::Viridis.rgb8(t);
-            let x = bar.left() + t * bar.width();
-            mesh.colored_vertex(pos2(x, bar.top()), Color32::from_rgb(r, g, b));
-            mesh.colored_vertex(pos2(x, bar.bottom()), Color32::from_rgb(r, g, b));
-            if i > 0 {
-                let k = 2 * i;
-                mesh.add_triangle(k - 2, k - 1, k);
-                mesh.add_triangle(k - 1, k, k + 1);
-            }
-        }
-        painter.add(Shape::mesh(mesh));
+            Color32::from_rgb(r, g, b)
+        });
         let (decimals, what, more) = match self.colour {
             BasinColour::Error => (0, "angle error at the end, °", "+"),
             _ => (2, "√cost at the end, mm", ""),

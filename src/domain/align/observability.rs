@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::field::batch::{Cloud, State};
+use super::linear::eigen_symmetric;
 use super::{ANGLE_SCALE_M, DistanceField};
 use crate::domain::frames::PlanarPose;
 
@@ -127,15 +128,16 @@ pub(super) fn of_cloud(cloud: &Cloud, centroid: DVec2, field: &DistanceField, st
     let turn = DVec2::from_angle(-state.phi);
     let arm = if count > 0 { moments.arms / count as f64 } else { DVec2::ZERO };
     let centre = centroid + turn.rotate(arm);
+    let unknown = Observability {
+        eigenvalues: [0.0; 3],
+        weakest: [0.0, 1.0, 0.0],
+        motions: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
+        centre,
+        telling: count,
+        degenerate: true,
+    };
     if count < MIN_TELLING {
-        return Observability {
-            eigenvalues: [0.0; 3],
-            weakest: [0.0, 1.0, 0.0],
-            motions: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
-            centre,
-            telling: count,
-            degenerate: true,
-        };
+        return unknown;
     }
     // Slopes by the angle were taken about the centroid; about the telling points' own centre they are
     // j0 - slope . perp(arm).
@@ -150,7 +152,7 @@ pub(super) fn of_cloud(cloud: &Cloud, centroid: DVec2, field: &DistanceField, st
     let h12 = c * s * (m11 - m22) + (c * c - s * s) * m12;
     let h22 = s * s * m11 + 2.0 * c * s * m12 + c * c * m22;
     let h = [[h00 / (ANGLE_SCALE_M * ANGLE_SCALE_M), cross.x, cross.y], [cross.x, h11, h12], [cross.y, h12, h22]];
-    let (eigenvalues, vectors) = eigen_symmetric(h);
+    let Some((eigenvalues, vectors)) = eigen_symmetric(h) else { return unknown };
     // A mean of squares: below zero is rounding.
     let eigenvalues = eigenvalues.map(|e| e.max(0.0));
     Observability {
@@ -161,37 +163,6 @@ pub(super) fn of_cloud(cloud: &Cloud, centroid: DVec2, field: &DistanceField, st
         telling: count,
         degenerate: eigenvalues[0] < DEGENERATE_BELOW,
     }
-}
-
-/// Eigenvalues (ascending) and unit eigenvectors of a symmetric 3 x 3 matrix, by Jacobi rotations: slower than a
-/// closed form, but accurate for repeated and tiny eigenvalues, which are the interesting ones here.
-fn eigen_symmetric(mut a: [[f64; 3]; 3]) -> ([f64; 3], [[f64; 3]; 3]) {
-    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    for _ in 0..30 {
-        let off = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
-        if off <= 1e-15 * (a[0][0].abs() + a[1][1].abs() + a[2][2].abs()) {
-            break;
-        }
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let tau = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = 1f64.copysign(tau) / (tau.abs() + (1.0 + tau * tau).sqrt());
-            let c = 1.0 / (1.0 + t * t).sqrt();
-            let s = t * c;
-            let turn = |x: f64, y: f64| (c * x - s * y, s * x + c * y);
-            for row in a.iter_mut().chain(&mut v) {
-                (row[p], row[q]) = turn(row[p], row[q]);
-            }
-            for (k, (x, y)) in a[p].into_iter().zip(a[q]).enumerate() {
-                (a[p][k], a[q][k]) = turn(x, y);
-            }
-        }
-    }
-    let mut order = [0, 1, 2];
-    order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
-    (order.map(|i| a[i][i]), order.map(|i| [v[0][i], v[1][i], v[2][i]]))
 }
 
 #[cfg(test)]
@@ -256,7 +227,7 @@ mod tests {
         #[test]
         fn eigenvectors_rebuild_the_matrix(m in proptest::array::uniform6(-1.0..1.0f64)) {
             let a = [[m[0], m[1], m[2]], [m[1], m[3], m[4]], [m[2], m[4], m[5]]];
-            let (values, vectors) = eigen_symmetric(a);
+            let (values, vectors) = eigen_symmetric(a).unwrap();
             prop_assert!(values[0] <= values[1] && values[1] <= values[2]);
             for i in 0..3 {
                 for j in 0..3 {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Color32, FontId, Mesh, Rect, Shape, Ui, pos2, vec2};
+use eframe::egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 use glam::{DAffine3, DVec3};
 
 use super::build::rgb;
@@ -17,6 +17,7 @@ use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::scene::SceneData;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{DARK, Palette};
+use crate::ui::widget::colorbar::gradient;
 
 /// Correspondences drawn at most: more hide each other.
 const MOST_LINES: usize = 300;
@@ -141,20 +142,7 @@ pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, rect: Rec
         return;
     }
     let bar = Rect::from_min_size(pos2(left, rect.bottom() - 38.0), vec2(width, 6.0));
-    let mut mesh = Mesh::default();
-    const STEPS: u32 = 16;
-    for i in 0..=STEPS {
-        let share = i as f32 / STEPS as f32;
-        let (x, color) = (bar.left() + share * width, color_at(cx.p, share));
-        mesh.colored_vertex(pos2(x, bar.top()), color);
-        mesh.colored_vertex(pos2(x, bar.bottom()), color);
-        if i > 0 {
-            let k = 2 * i;
-            mesh.add_triangle(k - 2, k - 1, k);
-            mesh.add_triangle(k - 1, k, k + 1);
-        }
-    }
-    painter.add(Shape::mesh(mesh));
+    gradient(&painter, bar, 16, |share| color_at(cx.p, share));
     let y = bar.bottom() + 2.0;
     painter.text(pos2(bar.left(), y), Align2::LEFT_TOP, "0", font.clone(), cx.p.weak);
     let end = format!("{RESIDUAL_MM:.0} mm residual");

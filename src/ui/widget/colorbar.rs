@@ -1,7 +1,8 @@
 //! The bar that says which colour is which value: numbers, unit, histogram, and a range that can be changed.
 
 use eframe::egui::{
-    self, Align2, Color32, FontId, Mesh, PointerButton, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2,
+    self, Align2, Color32, FontId, Mesh, Painter, PointerButton, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo,
+    pos2, vec2,
 };
 
 use crate::domain::colormap::{ColorMap, Range};
@@ -140,21 +141,10 @@ impl Colorbar<'_> {
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &info));
         let bar = Rect::from_min_max(pos2(rect.left(), rect.top() + 10.0), pos2(rect.right(), rect.top() + 19.0));
         let painter = ui.painter_at(rect.expand2(vec2(12.0, 0.0)));
-        let mut mesh = Mesh::default();
-        const STEPS: u32 = 48;
-        for i in 0..=STEPS {
-            let t = i as f32 / STEPS as f32;
+        gradient(&painter, bar, 48, |t| {
             let [r, g, b] = self.map.rgb8(t);
-            let x = bar.left() + t * bar.width();
-            mesh.colored_vertex(pos2(x, bar.top()), Color32::from_rgb(r, g, b));
-            mesh.colored_vertex(pos2(x, bar.bottom()), Color32::from_rgb(r, g, b));
-            if i > 0 {
-                let k = 2 * i;
-                mesh.add_triangle(k - 2, k - 1, k);
-                mesh.add_triangle(k - 1, k, k + 1);
-            }
-        }
-        painter.add(Shape::mesh(mesh));
+            Color32::from_rgb(r, g, b)
+        });
         if let Some(histogram) = self.histogram {
             paint_histogram(
                 &painter,
@@ -235,6 +225,23 @@ fn end_inner(ui: &mut Ui, value: &mut f32, label: &str) -> bool {
     let response = ui.add_sized([END, 18.0], drag);
     let response = response.accessible_name(label);
     response.on_hover_text(format!("{label}, mm: drag, or click and type")).changed()
+}
+
+/// Fills `bar` from left to right with the colours of 0 to 1, exact at `steps` + 1 places.
+pub(in crate::ui) fn gradient(painter: &Painter, bar: Rect, steps: u32, color: impl Fn(f32) -> Color32) {
+    let mut mesh = Mesh::default();
+    for i in 0..=steps {
+        let t = i as f32 / steps as f32;
+        let (x, color) = (bar.left() + t * bar.width(), color(t));
+        mesh.colored_vertex(pos2(x, bar.top()), color);
+        mesh.colored_vertex(pos2(x, bar.bottom()), color);
+        if i > 0 {
+            let k = 2 * i;
+            mesh.add_triangle(k - 2, k - 1, k);
+            mesh.add_triangle(k - 1, k, k + 1);
+        }
+    }
+    painter.add(Shape::mesh(mesh));
 }
 
 #[cfg(test)]
