@@ -24,3 +24,4 @@ pub mod sensor;
 pub mod sim;
 pub mod tool;
 pub mod units;
+pub mod upright;

@@ -48,7 +48,7 @@ fn touch(seed: f32) -> Sample {
         })
     });
     let pose = PlanarPose::object_from_grasp_of_lab(0.1 + f64::from(seed) * 0.01, 0.002, -0.003).inverse();
-    Sample { fingers, grasp_from_object: Some(pose), scale: Scale::Measured }
+    Sample { fingers, grasp_from_object: Some(pose), ..Sample::default() }
 }
 
 /// An empty file, with the folders above it.

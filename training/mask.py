@@ -1,11 +1,17 @@
 """Training of the mask UNet."""
 
+from pathlib import Path
+
 import numpy as np
 import torch
 import torch.nn.functional as F
 
-from . import data, models
+from . import data, evaluate, models, weights
 from .run import Run, indices
+
+# Share of predicted imprints where a generator was named; of the others: measured, nearly clean, redrawn.
+PREDICTED = 0.4
+SHARES = (0.6, 0.2, 0.2)
 
 
 def dice_loss(probability, truth):
@@ -13,21 +19,57 @@ def dice_loss(probability, truth):
     return 1 - ((2 * overlap + 1) / (probability.sum(dim=(1, 2)) + truth.sum(dim=(1, 2)) + 1)).mean()
 
 
+class Predicted:
+    """Imprints in micrometres that a generator bundle predicts for some of the touches, drawn once and kept in a file.
+
+    A mask for a prediction is what the generator's errors make of the shape, so it is learnt from predictions.
+    """
+
+    def __init__(self, args, shards):
+        self.path = Path(args.out) / "predicted.npz"
+        if not self.path.exists():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            bundle, rng = evaluate.Bundle(args.predicted_by), np.random.default_rng(args.seed)
+            chosen = np.sort(rng.choice(len(shards), min(args.predicted, len(shards)), replace=False))
+            parts = [bundle.predict(shards.gelslim(chosen[i:i + 16]), seed=i) for i in range(0, len(chosen), 16)]
+            metres = data.from_model(torch.cat(parts)).numpy()
+            np.savez(self.path, chosen=chosen, imprint=np.round(metres[:, 0] * 1e6).astype(np.int16))
+        kept = np.load(self.path)
+        self.chosen, self.imprint = kept["chosen"], kept["imprint"]
+
+    def draw(self, rng, count):
+        """Sample numbers (count,) and their predictions (count,1,140,175) in metres."""
+        at = np.sort(rng.choice(len(self.chosen), count, replace=False))
+        return self.chosen[at], torch.from_numpy(self.imprint[at]).float()[:, None] * 1e-6
+
+
 def mask(args):
     shards, rng = data.Shards(args.data), np.random.default_rng(args.seed)
-    net = models.MaskUNet().to(memory_format=torch.channels_last)
-    run = Run(args, "mask", {"mask": net}, 3e-3)
+    net = models.MaskUNet()
     net.train()
+    if args.start:
+        # An exported graph has its batch norms folded in: from there on they stay fixed scales and shifts.
+        weights.load_folded(net, Path(args.start) / "mask_unet.onnx")
+        net.eval()
+    net = net.to(memory_format=torch.channels_last)
+    run = Run(args, "mask", {"mask": net}, 6e-4 if args.start else 3e-3)
+    predicted = Predicted(args, shards) if args.predicted_by else None
+    run.extra = {"predicted_by": data.sha256(Path(args.predicted_by) / "denoiser.onnx") if predicted else None}
     for batch in indices(shards, rng, 8):
         if run.over():
             break
+        generated = rng.random(len(batch)) < (PREDICTED if predicted else 0)
+        drawn = torch.zeros(0, 1, 140, 175)
+        if generated.any():
+            batch[generated], drawn = predicted.draw(rng, int(generated.sum()))
         noisy, clean = shards.metres("imprint", batch), shards.metres("clean", batch)
         # From measured to generated: the grain fades, and the shape passes through the generator's raster.
-        kind = torch.from_numpy(rng.choice(3, len(batch), p=(0.6, 0.2, 0.2)))[:, None, None, None]
+        kind = torch.from_numpy(rng.choice(3, len(batch), p=SHARES))[:, None, None, None]
         smooth = data.from_model(data.to_model(clean))
         if rng.random() < 0.5:
             smooth = F.avg_pool2d(F.pad(smooth, (1, 1, 1, 1), mode="replicate"), 3, stride=1)
         x = torch.where(kind == 0, noisy, torch.where(kind == 1, torch.lerp(clean, noisy, 0.4), smooth))
+        x[torch.from_numpy(generated)] = drawn
         x = x * torch.from_numpy(rng.uniform(0.9, 1.1, (len(batch), 1, 1, 1)).astype(np.float32))
         x = x + torch.from_numpy(rng.normal(0, 4e-4, (len(batch), 1, 1, 1)).astype(np.float32))
         truth = shards.contact(batch)

@@ -41,6 +41,8 @@ def main():
                         help="ablation: the GelSlim image padded to the bubble's view, or the imprint cropped to the GelSlim's")
     parser.add_argument("--condition-noise", type=float, default=0.0,
                         help="white noise on the GelSlim image, in its standard deviations")
+    parser.add_argument("--predicted-by", help="mask: generator bundle on whose predictions to learn as well")
+    parser.add_argument("--predicted", type=int, default=2000, help="mask: number of touches to predict")
     args = parser.parse_args()
     torch.set_num_threads(args.threads)
     torch.manual_seed(args.seed)

@@ -48,3 +48,24 @@ def load(net, path, prefix=""):
         raise SystemExit(f"{Path(path)}: not this architecture's weights; missing or of another shape: {', '.join(wrong[:5])}")
     net.load_state_dict(state)
     return found
+
+
+def load_folded(net, path):
+    """Fills the mask UNet from its exported graph, where each batch norm is folded into the convolution before it.
+
+    The norms come out as plain scales and shifts (running mean 0, variance 1), right in `eval` mode.
+    """
+    graph = onnx.load(str(path)).graph
+    values = {i.name: torch.from_numpy(numpy_helper.to_array(i).copy()) for i in graph.initializer}
+    state = net.state_dict()
+    for node in (n for n in graph.node if n.op_type == "Conv"):
+        weight, bias = (values[name] for name in node.input[1:3])
+        block, number = _layer(node.name).rpartition(".")[::2]
+        norm = f"{block}.{int(number) + 1}" if number.isdigit() else ""
+        if f"{norm}.running_var" in state:
+            state[f"{block}.{number}.weight"], state[f"{norm}.bias"] = weight, bias
+            state[f"{norm}.weight"], state[f"{norm}.running_mean"] = torch.ones_like(bias), torch.zeros_like(bias)
+            state[f"{norm}.running_var"] = torch.full_like(bias, 1 - 1e-5)
+        else:
+            state[f"{_layer(node.name)}.weight"], state[f"{_layer(node.name)}.bias"] = weight, bias
+    net.load_state_dict(state)

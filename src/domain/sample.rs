@@ -5,6 +5,7 @@ use glam::DAffine3;
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Mask, RgbGrid};
 use super::sensor::{Finger, Intrinsics};
+use super::upright::Turn;
 
 /// One grasp, both fingers where the source has them.
 #[derive(Clone, Debug, Default)]
@@ -15,6 +16,8 @@ pub struct Sample {
     pub grasp_from_object: Option<PlanarPose>,
     /// Whether lengths are measured, or assumed because the source lost its scale.
     pub scale: Scale,
+    /// How the source's images lay before they were laid upright; upright for whatever comes from a sensor.
+    pub laid: Turn,
 }
 
 /// Where the metres of a sample come from.

@@ -36,7 +36,7 @@ pub use rig::{INTRINSICS, RANGE_M, gelslim_pixel, gelslim_yz, grasp_from_camera,
 pub use spoil::{Spoil, spoil_mask};
 pub use tools::{Bar, ToolSpec, random_tool, tools};
 
-use super::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, Sample, Scale};
+use super::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, Sample};
 use super::sensor::Finger;
 use noise::{Noise, Stream};
 
@@ -56,7 +56,7 @@ pub fn simulate(tool: &ToolSpec, grasp: Grasp, seed: u64, config: &SimConfig) ->
             bubble: Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed)),
         })
     });
-    Sample { fingers, grasp_from_object: Some(object_from_grasp.inverse()), scale: Scale::Measured }
+    Sample { fingers, grasp_from_object: Some(object_from_grasp.inverse()), ..Sample::default() }
 }
 
 fn bubble_touch(

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use super::dataset::{Dataset, Loaded};
 use super::stl;
 use crate::domain::dataset::{PairId, Problem};
+use crate::domain::upright::Turn;
 
 /// What the doctor found.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -41,14 +42,16 @@ pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> Cont
         report.problems.extend(tool_problems(dataset, &tool));
     }
     let mut few = FewInvalid::default();
+    let mut turned = Turned::default();
     let ids: Vec<PairId> = (0..total as u32).map(PairId).collect();
     if progress(0, total).is_break() {
         return report;
     }
     for batch in ids.chunks(BATCH) {
         let found: Vec<_> = batch.par_iter().map(|&id| pair_problems(dataset, id)).collect();
-        for (id, (problems, invalid)) in batch.iter().zip(found) {
+        for (id, (problems, invalid, laid)) in batch.iter().zip(found) {
             report.problems.extend(problems);
+            turned.add(dataset, *id, laid);
             if let Some((count, pixels)) = invalid {
                 few.add(dataset, *id, count, pixels);
             }
@@ -59,6 +62,7 @@ pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> Cont
         }
     }
     report.problems.extend(few.problem(report.examined));
+    report.problems.extend(turned.problem(report.examined));
     report
 }
 
@@ -93,6 +97,34 @@ impl FewInvalid {
     }
 }
 
+/// Pairs whose pictures were not upright, summed over pairs.
+#[derive(Default)]
+struct Turned {
+    pairs: usize,
+    first: Option<(Turn, PathBuf)>,
+}
+
+impl Turned {
+    fn add(&mut self, dataset: &Dataset, id: PairId, laid: Turn) {
+        if laid != Turn::default() {
+            self.pairs += 1;
+            self.first.get_or_insert_with(|| (laid, dataset.pair_files(id).first().cloned().unwrap_or_default()));
+        }
+    }
+
+    fn problem(self, examined: usize) -> Option<Problem> {
+        let (laid, file) = self.first?;
+        Some(Problem {
+            file,
+            what: format!(
+                "{} of {examined} pairs do not lie upright, as this one ({laid}); the light's colours tell",
+                self.pairs
+            ),
+            hint: "usual for pictures made for training; both pictures of such a pair are read upright".into(),
+        })
+    }
+}
+
 fn tool_problems(dataset: &Dataset, tool: &str) -> Vec<Problem> {
     // A missing file is found when the dataset is opened.
     let Some(path) = dataset.tool_mesh_file(tool) else { return Vec::new() };
@@ -123,11 +155,12 @@ fn tool_problems(dataset: &Dataset, tool: &str) -> Vec<Problem> {
     }
 }
 
-/// The problems of one pair, and how many pixels of how many are invalid if that is worth no problem of its own.
-fn pair_problems(dataset: &Dataset, id: PairId) -> (Vec<Problem>, Option<(usize, usize)>) {
+/// The problems of one pair, how many pixels of how many are invalid if that is worth no problem of its own, and how
+/// its pictures lay.
+fn pair_problems(dataset: &Dataset, id: PairId) -> (Vec<Problem>, Option<(usize, usize)>, Turn) {
     let Loaded { sample, notes, invalid } = match dataset.load_with_notes(id) {
         Ok(loaded) => loaded,
-        Err(err) => return (vec![err.to_problem()], None),
+        Err(err) => return (vec![err.to_problem()], None, Turn::default()),
     };
     let mut problems = notes;
     // The bubble's file is the last one.
@@ -155,5 +188,5 @@ fn pair_problems(dataset: &Dataset, id: PairId) -> (Vec<Problem>, Option<(usize,
         });
     }
     checks::sample(&sample, &file, &mut problems);
-    (problems, (few > 0).then_some((few, pixels)))
+    (problems, (few > 0).then_some((few, pixels)), sample.laid)
 }

@@ -18,6 +18,7 @@ use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::sample::Scale;
 use crate::domain::sensor::{Finger, gelslim_footprint_in_bubble};
 use crate::domain::units;
+use crate::domain::upright::Turn;
 
 /// The colours of the mask and of contact points, everywhere: apart from every colour of the maps.
 pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
@@ -41,6 +42,17 @@ pub(super) fn scale_note(state: &State) -> &'static str {
         Some(Scale::Assumed) => "assumed scale",
         _ => "",
     }
+}
+
+/// [`scale_note`], and how the files' pictures lie if they had to be laid upright.
+fn source_note(state: &State) -> String {
+    let laid = state.sample().ready().map(|s| s.laid).filter(|laid| *laid != Turn::default());
+    let laid = laid.map(|laid| format!("laid upright, the file is {laid}"));
+    [scale_note(state).to_owned(), laid.unwrap_or_default()]
+        .into_iter()
+        .filter(|s| !s.is_empty())
+        .collect::<Vec<_>>()
+        .join(" · ")
 }
 
 /// Where a bubble pixel appears in the GelSlim image of `size` pixels: the GelSlim sees the dashed rectangle,
@@ -401,7 +413,7 @@ fn depth_pane(
 
 fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
     let text = finger_text(cx.state, finger);
-    output.caption(Align2::LEFT_BOTTOM, scale_note(cx.state), super::theme::DARK.caution);
+    output.caption(Align2::LEFT_BOTTOM, &source_note(cx.state), super::theme::DARK.caution);
     output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
     let state = cx.state;
     let right = match pane {

@@ -131,7 +131,7 @@ impl DataSource for Source {
                 bubble: Some(BubbleTouch { imprint, camera: None, truth: None }),
             })
         };
-        Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, scale: Scale::Measured })
+        Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, ..Sample::default() })
     }
 
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {

@@ -7,6 +7,8 @@
 //! * **GelSlim**: the picture shows a standardised difference image, so "no difference" is its most frequent
 //!   grey, and one grey level is worth [`CLEAN_GAIN`]. Pictures whose most frequent value is the darkest or
 //!   brightest one lost half of their range; they get the gain that brings their spread to [`DIFFERENCE_STD`].
+//! * **Turns**: both pictures of a pair may have been turned or mirrored for training. The colours tell
+//!   ([`crate::domain::upright`]), and both are laid upright again.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,6 +18,7 @@ use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::resample;
 use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample, Scale};
 use crate::domain::sensor::bubble;
+use crate::domain::upright::{self, Turn};
 use crate::io::images;
 
 use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem};
@@ -122,24 +125,41 @@ impl Pictures {
         self.pairs.get(id.0 as usize).into_iter().flat_map(|files| files[..VQVAE].iter().flatten().cloned()).collect()
     }
 
-    /// A grey picture as it is in the file.
+    /// A grey picture, laid upright as its pair's GelSlim picture tells.
     pub(super) fn tile(&self, id: PairId, kind: usize) -> Result<Option<Grid<f32>>, LoadError> {
-        Ok(self.file(id, kind)?.map(images::read_grey).transpose()?)
+        let turn = self.difference(id)?.map_or_else(Turn::default, |(_, turn)| turn);
+        self.upright_tile(id, kind, turn)
+    }
+
+    fn upright_tile(&self, id: PairId, kind: usize, turn: Turn) -> Result<Option<Grid<f32>>, LoadError> {
+        let Some(path) = self.file(id, kind)? else { return Ok(None) };
+        let tile = images::read_grey(path)?;
+        // Pairs are turned as squares; in another shape a quarter turn would not fit back.
+        Ok(Some(if tile.width() == tile.height() || turn.quarters % 2 == 0 { turn.undo(&tile) } else { tile }))
+    }
+
+    /// The upright difference image, and how it lay.
+    fn difference(&self, id: PairId) -> Result<Option<(RgbGrid, Turn)>, LoadError> {
+        let Some(path) = self.file(id, 0)? else { return Ok(None) };
+        let difference = difference_from_tile(&images::read_rgb(path)?);
+        let turn = upright::seen(&difference).unwrap_or_default();
+        Ok(Some((turn.undo(&difference), turn)))
     }
 
     /// The pair as the right finger's touch: which finger it was is not known.
     pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
         let mut notes = Vec::new();
         let mut touch = FingerTouch::default();
-        if let Some(path) = self.file(id, 0)? {
-            let tile = images::read_rgb(path)?;
-            let difference = difference_from_tile(&tile);
+        let mut laid = Turn::default();
+        if let Some((difference, turn)) = self.difference(id)? {
+            laid = turn;
+            let path = self.file(id, 0)?.unwrap_or(Path::new(""));
             if difference.as_slice().iter().all(|p| *p == [0.0; 3]) {
                 notes.push(problem(path, "the picture is a single colour", "check that the right picture was saved"));
             }
             touch.gelslim = Some(GelSlimTouch { images: None, difference });
         }
-        if let Some(tile) = self.tile(id, BUBBLE)? {
+        if let Some(tile) = self.upright_tile(id, BUBBLE, laid)? {
             let [w, h] = tile.size();
             let path = self.file(id, BUBBLE)?.unwrap_or(Path::new(""));
             if w < 16 || h < 16 {
@@ -154,7 +174,7 @@ impl Pictures {
             }
             touch.bubble = Some(BubbleTouch { imprint: imprint_from_tile(&tile), camera: None, truth: None });
         }
-        let sample = Sample { fingers: [Some(touch), None], grasp_from_object: None, scale: Scale::Assumed };
+        let sample = Sample { fingers: [Some(touch), None], grasp_from_object: None, scale: Scale::Assumed, laid };
         Ok(Loaded { sample, notes, invalid: Default::default() })
     }
 }

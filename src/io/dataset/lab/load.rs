@@ -7,7 +7,7 @@ use glam::DAffine3;
 use crate::domain::dataset::Problem;
 use crate::domain::frames::{PlanarPose, affine_from_xyz_quat};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
-use crate::domain::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, GelSlimTouch, Sample, Scale};
+use crate::domain::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, GelSlimTouch, Sample};
 use crate::domain::sensor::{Finger, Intrinsics, bubble, gelslim};
 use crate::io::dataset::{InvalidPixels, LoadError, Loaded, problem};
 use crate::io::pt::{PtDict, PtError, read_dict};
@@ -55,7 +55,7 @@ pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> R
     }
     let grasp_from_object =
         poses.first().map(|(_, [theta, x, y])| PlanarPose::object_from_grasp_of_lab(*theta, *x, *y).inverse());
-    let sample = Sample { fingers: fingers.map(Some), grasp_from_object, scale: Scale::Measured };
+    let sample = Sample { fingers: fingers.map(Some), grasp_from_object, ..Sample::default() };
     Ok(Loaded { sample, notes, invalid })
 }
 
