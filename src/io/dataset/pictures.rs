@@ -135,7 +135,7 @@ impl Pictures {
         let Some(path) = self.file(id, kind)? else { return Ok(None) };
         let tile = images::read_grey(path)?;
         // Pairs are turned as squares; in another shape a quarter turn would not fit back.
-        Ok(Some(if tile.width() == tile.height() || turn.quarters % 2 == 0 { turn.undo(&tile) } else { tile }))
+        Ok(Some(if tile.width() == tile.height() || turn.quarters.is_multiple_of(2) { turn.undo(&tile) } else { tile }))
     }
 
     /// The upright difference image, and how it lay.
