@@ -12,7 +12,7 @@ use std::path::Path;
 use glam::{DAffine3, DQuat, DVec3};
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::Grid;
-use touch2touch::domain::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, GelSlimTouch, Sample, Scale};
+use touch2touch::domain::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, GelSlimTouch, Sample};
 use touch2touch::domain::sensor::{Finger, Intrinsics, bubble, gelslim};
 
 /// A touch with the sizes of the lab's and values that differ in every pixel, finger and image.

@@ -21,7 +21,7 @@ use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift};
 use touch2touch::domain::resample::Resampling;
-use touch2touch::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample, Scale};
+use touch2touch::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
 use touch2touch::domain::sim;
 
 /// `[width, height]` of the imprints of [`Source`].
