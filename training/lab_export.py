@@ -42,7 +42,7 @@ UNUSED = ("alphas_cumprod", "sqrt_", "log_one_minus_alphas_cumprod", "posterior_
 # Largest difference allowed between torch and ONNX Runtime, in standard deviations of the output.
 TOLERANCE, TOLERANCE_F16 = 1e-3, 0.05
 # Largest share of cells for which another, about as near, code may be chosen.
-TOLERANCE_CODES, TOLERANCE_CODES_F16 = 0.01, 0.05
+TOLERANCE_CODES = 0.01
 
 
 @dataclass
@@ -267,6 +267,8 @@ def write(graph, path, f16):
         warnings.simplefilter("ignore")
         torch.onnx.export(graph.net, graph.examples, str(path), input_names=list(graph.inputs), output_names=[graph.output],
                           dynamic_axes=axes, opset_version=OPSET, dynamo=False)
+    # Rounding would choose other codes, each a different picture, in about a hundredth of the cells.
+    f16 = f16 and not graph.codes
     if f16:
         half.store(path)
     onnx.checker.check_model(str(path))
@@ -282,8 +284,9 @@ def write(graph, path, f16):
     if not found["max_abs"] <= allowed:
         raise LabError(f"{path}: ONNX Runtime differs from torch by {found['max_abs']:.2g} (allowed {allowed:.2g}); "
                        + ("export without --fp16" if f16 else "report it with the versions of torch and onnxruntime"))
-    if graph.codes and found["other_codes"] > (TOLERANCE_CODES_F16 if f16 else TOLERANCE_CODES):
-        raise LabError(f"{path}: another code is chosen in {100 * found['other_codes']:.1f} % of the cells; export without --fp16")
+    if graph.codes and found["other_codes"] > TOLERANCE_CODES:
+        raise LabError(f"{path}: ONNX Runtime chooses another code than torch in {100 * found['other_codes']:.1f} % of the cells; "
+                       "report it with the versions of torch and onnxruntime")
     return found
 
 
@@ -296,7 +299,7 @@ def export(graphs, manifest, out, f16):
         path = out / f"{role}.onnx"
         provenance["onnx_minus_torch"][role] = write(graph, path, f16)
         manifest["files"][role] = {"path": path.name, "sha256": sha256(path)}
-    provenance["stored_as"] = "float16, computed in float32" if f16 else "float32"
+    provenance["stored_as"] = "large weights float16 (not those that choose codes), computed in float32" if f16 else "float32"
     provenance["tools"] = {"torch": torch.__version__, "onnx_opset": OPSET}
     provenance["licence"] = "that of the checkpoint; ask its authors before passing the bundle on"
     (out / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
