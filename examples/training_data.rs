@@ -14,14 +14,13 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use glam::DVec2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use touch2touch::domain::grid::DepthMap;
 use touch2touch::domain::resample;
 use touch2touch::domain::sensor::{Finger, bubble};
-use touch2touch::domain::sim::{self, Bar, Grasp, SimConfig, ToolSpec};
+use touch2touch::domain::sim::{self, Condition, Grasp, MISALIGNMENT_M, SimConfig, ToolSpec};
 
 /// Side of the resized GelSlim image, pixels.
 const SIDE: usize = 128;
@@ -39,20 +38,6 @@ enum Mix {
     Seen,
     Unseen,
 }
-
-/// What is wrong with the pairs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Condition {
-    Plain,
-    Ambiguous,
-    Misaligned,
-}
-
-/// Largest distance along y and z between the grasps of a misaligned pair, metres.
-const MISALIGNMENT_M: f64 = 0.008;
-/// How far beyond the grasp an ambiguous pair's pattern begins, metres: out of the GelSlim's 18 mm, within the bubble's
-/// 74 mm.
-const SHAFT_M: f64 = 0.018;
 
 /// One finger's part of a grasp, as it is stored.
 struct Record {
@@ -107,16 +92,6 @@ fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
     tool
 }
 
-/// The tool pushed towards the tip, on a bare shaft that reaches far back to the wrist.
-fn on_a_shaft(mut tool: ToolSpec) -> ToolSpec {
-    let half_width_m = tool.bars.iter().map(|bar| bar.half_width_m).fold(0.0, f64::max);
-    for p in tool.bars.iter_mut().flat_map(|bar| &mut bar.core) {
-        p.y = if p.y < 0.0 { 0.2 * p.y } else { p.y } + SHAFT_M;
-    }
-    tool.bars.push(Bar { core: vec![DVec2::new(0.0, -0.07), DVec2::new(0.0, SHAFT_M)], half_width_m });
-    tool
-}
-
 /// Simulates grasp `index` of the shard; both fingers.
 fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Record>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(index));
@@ -142,25 +117,24 @@ fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Re
     };
     let config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
     let grasp = sim::random_grasp(rng.random());
-    let on_shaft = if condition == Condition::Ambiguous { Some(on_a_shaft(tool.clone())) } else { None };
+    let on_shaft = if condition == Condition::Ambiguous { Some(sim::on_a_shaft(tool.clone())) } else { None };
     let tool = on_shaft.as_ref().unwrap_or(tool);
     let noise = rng.random();
-    let sample = sim::simulate(tool, grasp, noise, &config);
     // the bubbles' own grasp, if it is another one
+    let gelslims = grasp;
     let grasp = if condition == Condition::Misaligned {
         let mut off = || rng.random_range(-MISALIGNMENT_M..=MISALIGNMENT_M);
         Grasp { x_m: grasp.x_m + off(), y_m: grasp.y_m + off(), ..grasp }
     } else {
         grasp
     };
-    let elsewhere = (condition == Condition::Misaligned).then(|| sim::simulate(tool, grasp, noise, &config));
+    let sample = sim::simulate_apart(tool, gelslims, grasp, noise, &config);
     Finger::BOTH
         .iter()
         .map(|&finger| {
             let touch = sample.finger(finger).context("the simulator left a finger out")?;
             let gelslim = touch.gelslim.as_ref().context("no GelSlim image")?;
-            let pressed = elsewhere.as_ref().unwrap_or(&sample).finger(finger).context("no such finger")?;
-            let imprint = pressed.bubble.as_ref().context("no bubble image")?;
+            let imprint = touch.bubble.as_ref().context("no bubble image")?;
             let truth = imprint.truth.as_ref().context("no truth")?;
             ensure!(imprint.imprint.size() == [bubble::WIDTH, bubble::HEIGHT], "unexpected bubble size");
             let small = resample::bilinear_rgb(&gelslim.difference, SIDE, SIDE);

@@ -14,6 +14,7 @@ pub mod command;
 pub mod document;
 pub mod effect;
 pub mod error;
+pub mod evaluation;
 pub mod history;
 pub mod inspect;
 pub mod jobs;

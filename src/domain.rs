@@ -9,6 +9,7 @@ pub mod colormap;
 pub mod contact;
 pub mod dataset;
 pub mod diffusion;
+pub mod evaluation;
 pub mod frames;
 pub mod grid;
 pub mod hand;

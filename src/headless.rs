@@ -7,6 +7,7 @@ mod basin;
 mod bench;
 mod contact_mask;
 mod doctor;
+mod evaluate;
 mod generate;
 mod masks;
 mod models;
@@ -47,6 +48,8 @@ enum Verb {
     Generate(generate::GenerateArgs),
     /// Estimate in-hand poses from measured or predicted imprints.
     Pose(pose::PoseArgs),
+    /// The paper's results table of a dataset: generators side by side, with the measured imprints as the upper bound.
+    Evaluate(Box<evaluate::EvaluateArgs>),
     /// Where starts of the registration lead, for one pair: the numbers behind the basin map.
     Basin(Box<basin::BasinArgs>),
     /// Contact masks.
@@ -93,6 +96,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Simulate(args)) => simulate::run(&args),
         Some(Verb::Generate(args)) => generate::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
+        Some(Verb::Evaluate(args)) => evaluate::run(&args),
         Some(Verb::Basin(args)) => basin::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
@@ -121,11 +125,8 @@ fn studio(_path: Option<PathBuf>, _reset_ui: bool) -> VerbResult {
     anyhow::bail!("this build has no window (cargo feature `gui`); see `touch2touch --help` for the verbs")
 }
 
-/// The dataset named on the command line; `demo` is the built-in one.
+/// The dataset named on the command line: a folder, or the name of one that is built in (`demo`, `test-set`).
 fn open(path: &std::path::Path) -> anyhow::Result<crate::io::dataset::Dataset> {
-    if path == std::path::Path::new("demo") {
-        return Ok(crate::io::dataset::Dataset::demo());
-    }
     Ok(crate::io::dataset::Dataset::open(path)?)
 }
 

@@ -3,14 +3,15 @@
 //! * [`bundle`]: a folder with a manifest and ONNX graphs, checked completely when it is opened.
 //! * [`engine`]: one small trait over two engines, rten (built in) and ONNX Runtime (used where its library is found).
 //! * [`runtime`]: where that library is looked for, and how it is fetched.
-//! * [`generator`], [`mask`]: what a bundle does, from a GelSlim difference to a decoder's picture and from a depth map
-//!   to a contact mask.
+//! * [`generator`], [`mask`], [`classifier`]: what a bundle does, from a GelSlim difference to a decoder's picture, and
+//!   from a depth map to a contact mask or to the tool that made it.
 //! * [`recipe`]: everything a generated result depends on.
 //!
 //! Without the feature `onnx` everything here compiles, bundles can be opened and checked, and running one is an
 //! error that says so.
 
 pub mod bundle;
+pub mod classifier;
 pub mod engine;
 pub mod generator;
 pub mod mask;

@@ -24,6 +24,7 @@ mod metrics;
 mod palette;
 mod pane;
 mod poses;
+mod results;
 mod saved;
 mod scene;
 mod scene_view;

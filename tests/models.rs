@@ -43,6 +43,42 @@ fn whole_bundles_open() {
 }
 
 #[test]
+fn a_tool_classifier_opens_and_a_wrong_one_is_refused() {
+    let bundle = Bundle::open(&fixture("classifier")).unwrap();
+    let spec = bundle.tool_classifier().unwrap();
+    assert_eq!((spec.output.classes.len(), spec.output.features), (3, Some(4)));
+    assert!(bundle.generator().is_none() && bundle.mask_unet().is_none());
+
+    let dir = copy("classifier");
+    edit(dir.path(), |m| {
+        m["output"]["classes"] = serde_json::json!(["pattern_36", "pattern_36", ""]);
+        m["output"]["features"] = serde_json::json!(5);
+        m["input"]["rotation_deg"] = serde_json::json!(90);
+    });
+    let text = refusal(dir.path());
+    for expected in [
+        "output.classes: not usable",
+        "input.rotation_deg: not supported",
+        "tool_classifier.onnx: output `features`: shape [N, 4], but the manifest says [N, 5]",
+    ] {
+        assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
+    }
+    edit(dir.path(), |m| m["output"]["classes"] = serde_json::json!(["a", "b"]));
+    let text = refusal(dir.path());
+    assert!(text.contains("output `logits`: shape [N, 3], but the manifest says [N, 2]"), "{text}");
+}
+
+/// The names that `training/export.py` writes are those of the simulator's tools, in its order.
+#[test]
+fn the_trainer_names_the_simulators_tools() {
+    let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("training/baselines.py")).unwrap();
+    let list = text.split_once("NAMES = (").unwrap().1.split_once(')').unwrap().0;
+    let names: Vec<&str> = list.split('"').skip(1).step_by(2).collect();
+    let tools: Vec<&str> = touch2touch::domain::sim::tools().iter().map(|t| t.name.as_str()).collect();
+    assert_eq!(names, tools);
+}
+
+#[test]
 fn a_refusal_lists_everything_that_is_wrong() {
     let dir = copy("generator");
     let decoder = dir.path().join("decoder.onnx");
@@ -150,7 +186,10 @@ fn bundles_are_found_once_and_broken_ones_reported() {
     let roots = [fixture(""), fixture("generator"), broken.path().to_path_buf(), PathBuf::from("/nowhere")];
     let found = find(&roots);
     let names: Vec<&str> = found.bundles.iter().map(Bundle::name).collect();
-    assert_eq!(names, ["Tiny generator of the tests", "Tiny mask UNet of the tests"]);
+    assert_eq!(
+        names,
+        ["Tiny tool classifier of the tests", "Tiny generator of the tests", "Tiny mask UNet of the tests"]
+    );
     assert!(found.problems.iter().any(|p| p.what.contains("output.classes")));
 }
 
@@ -162,6 +201,7 @@ mod running {
     use touch2touch::domain::grid::{Grid, RgbGrid};
     use touch2touch::domain::postprocess::{RawPrediction, ShiftMode};
     use touch2touch::infer::bundle::Role;
+    use touch2touch::infer::classifier::{ClassifyError, ToolClassifier, Verdict};
     use touch2touch::infer::engine::{EngineChoice, EngineKind, Graph, Input, resolve};
     use touch2touch::infer::generator::{GenerateError, Generator};
     use touch2touch::infer::mask::{MaskError, MaskModel};
@@ -375,6 +415,36 @@ mod running {
         }
     }
 
+    #[test]
+    fn the_classifier_names_what_is_deepest_one_by_one_or_in_a_batch() {
+        let bundle = Bundle::open(&fixture("classifier")).unwrap();
+        // The classes are the quarters of the turned imprint: top left, top right, bottom left.
+        let deep = |right: bool, low: bool| {
+            Grid::from_fn(18, 14, |x, y| if (x >= 9) == right && (y >= 7) == low { 0.009 } else { 0.002 })
+        };
+        let imprints = [deep(true, true), deep(false, true), deep(true, false)];
+        for choice in engines() {
+            let mut model = ToolClassifier::open(&bundle, choice).unwrap();
+            assert_eq!(model.class_of("pattern_36"), Some(2));
+            assert_eq!(model.class_of("hammer"), None);
+            let together = model.classify(&imprints.iter().collect::<Vec<_>>()).unwrap();
+            assert_eq!(together.iter().map(|v| v.class).collect::<Vec<_>>(), [0, 1, 2]);
+            for (imprint, verdict) in imprints.iter().zip(&together) {
+                let alone: Vec<Verdict> = model.classify(&[imprint]).unwrap();
+                assert_eq!(alone[0].class, verdict.class);
+                // 9 mm of a range of 0 to 10 is 0.8 of -1 to 1, and 2 mm is -0.6.
+                let mut features = verdict.features.clone();
+                features.sort_by(f32::total_cmp);
+                assert!(features.iter().zip([-0.6, -0.6, -0.6, 0.8]).all(|(a, b)| (a - b).abs() < 1e-5));
+            }
+            let nothing = Grid::filled(18, 14, f32::NAN);
+            assert!(matches!(model.classify(&[&nothing]), Err(ClassifyError::Nothing { .. })));
+            assert!(model.classify(&[]).unwrap().is_empty());
+            let mask = Bundle::open(&fixture("mask")).unwrap();
+            assert!(matches!(ToolClassifier::open(&mask, choice), Err(ClassifyError::NotAClassifier(_))));
+        }
+    }
+
     /// Every shipped bundle is whole, and does the same on every engine.
     #[test]
     fn shipped_bundles_run_on_every_engine() {
@@ -390,11 +460,14 @@ mod running {
         for bundle in &found.bundles {
             let mut pictures = Vec::new();
             let mut masks = Vec::new();
+            let mut verdicts: Vec<Verdict> = Vec::new();
             for choice in engines() {
                 if bundle.generator().is_some() {
                     let mut generator = Generator::open(bundle, choice).unwrap();
                     let config = GenerateConfig { steps: 3, ..generator.spec().defaults };
                     pictures.push(generator.generate(&image(), &config, &mut go_on).unwrap());
+                } else if bundle.tool_classifier().is_some() {
+                    verdicts.append(&mut ToolClassifier::open(bundle, choice).unwrap().classify(&[&touch]).unwrap());
                 } else {
                     masks.push(MaskModel::open(bundle, choice).unwrap().probability(&touch).unwrap());
                 }
@@ -404,6 +477,11 @@ mod running {
                 // range is 0.03 mm.
                 let difference = largest_difference(&pictures[0], other);
                 assert!(difference < 1e-3, "{}: the engines differ by {difference}", bundle.name());
+            }
+            for other in verdicts.iter().skip(1) {
+                let pairs = verdicts[0].logits.iter().zip(&other.logits);
+                let difference = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                assert!(difference < 1e-2, "{}: the engines differ by {difference}", bundle.name());
             }
             for other in masks.iter().skip(1) {
                 let pairs = masks[0].as_slice().iter().zip(other.as_slice());

@@ -15,7 +15,12 @@ from . import data
 from .models import ResBlock, Transformer, norm
 from .run import Run, condition, edges, indices, symmetries, target
 
-TOOLS = 12
+# In the order of the simulator's list, which is what a shard's `meta` counts by.
+NAMES = (
+    "pattern_01_2_lines_angle_1", "pattern_02_2_lines_angle_2", "pattern_03_2_lines_angle_3",
+    "pattern_04_3_lines_angle_1", "pattern_06_5_lines_angle_1", "pattern_31_rod", "pattern_32", "pattern_33",
+    "pattern_37", "pattern_05_3_lines_angle_2", "pattern_35", "pattern_36")
+TOOLS = len(NAMES)
 
 
 def normalised(gelslim):

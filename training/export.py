@@ -65,6 +65,20 @@ class Picture(nn.Module):
         return latent * 1.0
 
 
+class Named(nn.Module):
+    """The classifier with what its last layer sees, averaged over the cells: sets of imprints are compared by it."""
+
+    FEATURES = 96
+
+    def __init__(self, net):
+        super().__init__()
+        self.net = net
+
+    def forward(self, imprint):
+        maps = self.net.body[:-2](imprint)
+        return self.net.body[-2:](maps), maps.mean(dim=(2, 3))
+
+
 def load_generator(run):
     """(condition encoder, denoiser, decoder) with averaged weights, and the states they came from."""
     ae = torch.load(Path(run) / "autoencoder.pt", weights_only=True)
@@ -88,10 +102,11 @@ def predict(nets, gelslim, steps=10, seed=42, shape=(4, 16, 16)):
 TOLERANCE, TOLERANCE_F16 = 1e-3, 0.05
 
 
-def write(net, path, inputs, output, examples, f16=False):
+def write(net, path, inputs, outputs, examples, f16=False):
     """Exports one graph with a dynamic batch; returns its manifest entry and the largest difference to torch."""
-    axes = {name: {0: "batch"} for name in (*inputs, output)}
-    torch.onnx.export(net, examples, str(path), input_names=list(inputs), output_names=[output], dynamic_axes=axes,
+    outputs = [outputs] if isinstance(outputs, str) else list(outputs)
+    axes = {name: {0: "batch"} for name in (*inputs, *outputs)}
+    torch.onnx.export(net, examples, str(path), input_names=list(inputs), output_names=outputs, dynamic_axes=axes,
                       opset_version=OPSET, dynamo=False)
     if f16:
         half.store(path)
@@ -104,9 +119,10 @@ def write(net, path, inputs, output, examples, f16=False):
         tried = [e[:1].repeat(batch, *[1] * (e.dim() - 1)) if e.dtype == torch.int64 else torch.randn(batch, *e.shape[1:])
                  for e in examples]
         with torch.no_grad():
-            expected = net(*tried).numpy()
-        got = engine.run([output], {n: t.numpy() for n, t in zip(inputs, tried)})[0]
-        worst = max(worst, float(np.abs(got - expected).max()))
+            expected = net(*tried)
+        got = engine.run(outputs, {n: t.numpy() for n, t in zip(inputs, tried)})
+        expected = expected if isinstance(expected, tuple) else (expected,)
+        worst = max(worst, *(float(np.abs(a - b.numpy()).max()) for a, b in zip(got, expected, strict=True)))
     if worst > (TOLERANCE_F16 if f16 else TOLERANCE):
         raise SystemExit(f"{path}: ONNX Runtime differs from torch by {worst}")
     return {"path": path.name, "sha256": data.sha256(path)}, worst
@@ -199,16 +215,16 @@ def one_shot(args, out):
 
 
 def classifier(args, out):
-    """Bundles have no kind for a classifier yet: `touch2touch bundle check` refuses this one, and says so."""
     state = torch.load(Path(args.run) / "classifier.pt", weights_only=True)
     net = baselines.Classifier()
     net.load_state_dict(state["nets"]["classifier"])
-    entry, difference = write(net.eval(), out / "tool_classifier.onnx", ("imprint",), "logits", (torch.rand(2, 1, 128, 128),), args.fp16)
+    entry, difference = write(Named(net.eval()), out / "tool_classifier.onnx", ("imprint",), ("logits", "features"),
+                              (torch.rand(2, 1, 128, 128),), args.fp16)
     return {
         "format": "touch2touch-bundle", "format_version": 1, "kind": "tool_classifier",
         "name": "Tool classifier, simulated data", "files": {"tool_classifier": entry},
         "input": {"sensor": "bubble", "size": [128, 128], "range_m": list(data.RANGE_M), "rotation_deg": 180},
-        "output": {"classes": baselines.TOOLS},
+        "output": {"classes": list(baselines.NAMES), "features": Named.FEATURES},
         "provenance": provenance(args.note, data.Shards(args.data), {"classifier": state}, {"tool_classifier": difference}),
     }
 

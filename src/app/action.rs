@@ -3,6 +3,7 @@
 use strum::{EnumIter, IntoEnumIterator};
 
 use super::command::{CameraPreset, Command, Pane, UiRequest};
+use super::evaluation::EvaluateCommand;
 use super::document::Review;
 use super::inspect::{InspectCommand, Inspected};
 use super::keys::{ImprintSource, PoseEngine, Request, ShiftMode};
@@ -245,6 +246,8 @@ actions! {
     Generate, Generate, "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", [ctrl(K::G)];
     GenerateNewSeed, Generate, "Generate with a new seed", "Draws another seed, then generates", [ctrl_shift(K::G)];
     LockSeed, Generate, "Lock the seed", "Keeps the seed when generating again, or draws a new one each time", [ctrl(K::L)];
+    EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [];
+    ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
     NextShift, Generate, "Next range mapping", "Goes through raw, paper shift and exact inverse", [shift(K::P)];
 
@@ -397,6 +400,11 @@ impl Action {
 
             Self::Generate => when(state.can_generate().is_ok(), Command::Generate),
             Self::GenerateNewSeed => when(state.can_generate().is_ok(), Command::GenerateNewSeed),
+            Self::EvaluateDataset => {
+                let ready = state.evaluation_setup().is_some() && state.evaluating().is_none();
+                when(ready, Command::Evaluate(EvaluateCommand::Start))
+            }
+            Self::ExportTable => when(state.table.result.is_some(), Command::Ui(UiRequest::PickTableFolder)),
             Self::LockSeed => {
                 let mut generate = settings.generate.clone();
                 generate.seed_locked = !generate.seed_locked;

@@ -1,6 +1,7 @@
 //! [`apply`]: the only writer of the state. Pure: no files, no threads, no clock.
 
 mod answers;
+mod evaluate;
 mod generate;
 mod inspect;
 mod masks;
@@ -122,6 +123,7 @@ fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
             effects.push(Effect::ExportMasks { ticket, source, labels: state.document.labels.clone(), folder });
         }
 
+        Command::Evaluate(command) => evaluate::step(state, command, effects),
         Command::Workbench(command) => workbench::step(state, command, effects),
 
         Command::LogSeen(number) => state.log.seen = state.log.seen.max(number),

@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use super::document::{PairLabels, Review};
 use super::error::TaskError;
+use super::evaluation::EvaluateCommand;
 use super::inspect::{InspectCommand, Inspection};
 use super::keys::{DatasetSeq, ImprintSource, PoseEngine, Recipe, Request, ShiftMode};
 use super::library::{BundleInfo, Place, Sort};
@@ -66,6 +67,8 @@ pub enum Pane {
     Metrics,
     /// The figures of all pairs so far.
     Table,
+    /// The paper's results table of the whole data set.
+    Results,
     /// What happened.
     Log,
     /// Preferences.
@@ -101,6 +104,8 @@ pub enum UiRequest {
     PickFolder,
     /// Show the native dialog for a file, or a path box; answer with [`Command::Open`].
     PickFile,
+    /// Ask for the folder to write the results table to; answer with [`EvaluateCommand::Export`].
+    PickTableFolder,
     /// Ask for the folder to export masks to; answer with [`Command::ExportMasks`].
     PickExportFolder,
     /// Turn the 3D cameras.
@@ -227,6 +232,8 @@ pub enum Command {
     /// Writes the masks to a folder for UNet training.
     ExportMasks(PathBuf),
 
+    /// Something of the results table.
+    Evaluate(EvaluateCommand),
     /// Something of the workbench: layers, poses by hand, measuring.
     Workbench(WorkbenchCommand),
 

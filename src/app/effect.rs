@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use super::command::{LabelsToSave, UiRequest};
 use super::document::PairLabels;
+use super::jobs::evaluate::{Evaluation, Setup};
 use super::keys::{DatasetSeq, Recipe};
 use super::library::{BundleInfo, Place};
 use super::services::DataSource;
@@ -57,6 +58,26 @@ pub enum Effect {
         /// Where to.
         folder: PathBuf,
     },
+    /// Score the open data set.
+    Evaluate {
+        /// The job.
+        ticket: Ticket,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// By what, and how.
+        setup: Box<Setup>,
+    },
+    /// Write a results table into a folder.
+    ExportTable {
+        /// The job.
+        ticket: Ticket,
+        /// The table.
+        evaluation: Arc<Evaluation>,
+        /// Whether with the published rows.
+        published: bool,
+        /// Where to.
+        folder: PathBuf,
+    },
     /// Something only the window can do.
     Ui(UiRequest),
 }
@@ -71,6 +92,8 @@ impl std::fmt::Debug for Effect {
             Self::SaveLabels(_, save) => write!(f, "SaveLabels({})", save.name),
             Self::SaveSettings(_) => write!(f, "SaveSettings"),
             Self::ExportMasks { folder, .. } => write!(f, "ExportMasks({})", folder.display()),
+            Self::Evaluate { ticket, .. } => write!(f, "Evaluate({ticket:?})"),
+            Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),
             Self::Ui(request) => write!(f, "Ui({request:?})"),
         }
     }

@@ -1,6 +1,7 @@
 //! What a job may do besides computing: see whether it should stop, and say how far it is.
 
 pub mod compute;
+pub mod evaluate;
 pub mod inspect;
 pub mod prepare;
 
@@ -19,6 +20,8 @@ pub enum Lane {
     Compute,
     /// Running models: one thread, which keeps them loaded.
     Models,
+    /// What takes minutes and must not hold up anything else: one thread.
+    Batch,
 }
 
 impl Lane {
@@ -28,6 +31,7 @@ impl Lane {
             Self::Files => "files",
             Self::Compute => "compute",
             Self::Models => "models",
+            Self::Batch => "batch",
         }
     }
 }

@@ -113,6 +113,8 @@ pub enum BundleKind {
     Generator,
     /// Imprint to contact mask.
     Mask,
+    /// Imprint to tool.
+    Classifier,
 }
 
 /// The open data set and its list.

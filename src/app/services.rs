@@ -21,6 +21,7 @@ use crate::domain::mesh::TriMesh;
 use crate::domain::pose::ToolModel;
 use crate::domain::postprocess::{DepthChain, RawPrediction};
 use crate::domain::sample::Sample;
+use crate::io::dataset::Dataset;
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
@@ -28,6 +29,10 @@ pub trait DataSource: Send + Sync {
     fn title(&self) -> &str;
     /// Its folder; `None` for the demo.
     fn root(&self) -> Option<&Path>;
+    /// The same as the command line sees it, for work on all of its pairs; `None` where there is no such thing.
+    fn as_dataset(&self) -> Option<&Dataset> {
+        None
+    }
     /// All pairs.
     fn index(&self) -> &Index;
     /// What is wrong with it, apart from what opened.

@@ -8,6 +8,7 @@ use super::action::Action;
 use super::command::{Hover, Pane};
 use super::document::Document;
 use super::error::TaskError;
+use super::evaluation::TableState;
 use super::history::History;
 use super::inspect::Inspect;
 use super::keys::{PairKey, TouchKey};
@@ -34,6 +35,8 @@ pub struct State {
     pub history: History,
     /// What was computed.
     pub results: Results,
+    /// The results table of the data set.
+    pub table: TableState,
     /// What the 3D panes do and show besides.
     pub workbench: Workbench,
     /// What a person prefers.
@@ -198,6 +201,8 @@ pub enum Absent {
     NoMaskModel,
     /// No generator was found.
     NoGenerator,
+    /// No tool classifier was found.
+    NoClassifier,
     /// The mask has too few contact points.
     NoContact,
 }
@@ -219,6 +224,7 @@ impl Absent {
             Self::NotSimulated => "Only simulated data knows the true contact.",
             Self::NoMaskModel => "No mask model was found.",
             Self::NoGenerator => "No generator was found.",
+            Self::NoClassifier => "No tool classifier was found.",
             Self::NoContact => "The mask has too few contact points for a pose.",
         }
     }

@@ -119,6 +119,7 @@ impl State {
         let (name, absent) = match kind {
             BundleKind::Generator => (self.settings.generate.bundle.as_deref(), Absent::NoGenerator),
             BundleKind::Mask => (self.settings.mask.bundle.as_deref(), Absent::NoMaskModel),
+            BundleKind::Classifier => (None, Absent::NoClassifier),
         };
         self.library.bundle_named(kind, name).ok_or(absent)
     }

@@ -3,11 +3,13 @@
 //! Sums run in f64. Pixels that are not finite in either image are left out of the error metrics.
 
 mod angle;
+mod frechet;
 mod image;
 mod mask;
 mod ssim;
 
 pub use angle::AngleSummary;
+pub use frechet::frechet_distance;
 pub use image::{MetricError, Psnr, PsnrMean, mse, psnr, psnr_of_mse, unit_range};
 pub use mask::MaskScore;
-pub use ssim::{Ssim, SsimRange, ssim};
+pub use ssim::{Ssim, SsimRange, ssim, ssim_ranges};

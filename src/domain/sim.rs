@@ -12,6 +12,7 @@
 //! One pair (both fingers, both sensors) costs about 55 ms of one core in release, a fifth of it for the membrane.
 //! `examples/contact_sheet.rs` draws the tiles of `docs/simulated_tiles.png`.
 
+mod condition;
 mod config;
 mod depth_camera;
 mod faults;
@@ -27,6 +28,7 @@ mod tools;
 
 use glam::{DAffine3, DQuat, DVec3};
 
+pub use condition::{Condition, MISALIGNMENT_M, TEST_GRASPS, on_a_shaft, pattern_of, test_grasp};
 pub use config::{BubbleConfig, GelSlimConfig, SimConfig};
 pub use depth_camera::CONTACT_DISTANCE_M;
 pub use faults::Fault;
@@ -47,16 +49,21 @@ const MEMBRANE_STEP_M: f64 = 0.000_5;
 ///
 /// `seed` draws the noise of this one touch; the sensors' fixed traits are in `config`.
 pub fn simulate(tool: &ToolSpec, grasp: Grasp, seed: u64, config: &SimConfig) -> Sample {
-    let object_from_grasp = grasp.object_from_grasp();
+    simulate_apart(tool, grasp, grasp, seed, config)
+}
+
+/// As [`simulate`], with the GelSlims at `gelslims` and the bubbles, whose pose is the truth, at `bubbles`.
+pub fn simulate_apart(tool: &ToolSpec, gelslims: Grasp, bubbles: Grasp, seed: u64, config: &SimConfig) -> Sample {
+    let (gelslims, bubbles) = (gelslims.object_from_grasp(), bubbles.object_from_grasp());
     // the tool and the rig mirror each other, so one membrane serves both fingers
-    let membrane = Membrane::press(&config.bubble, tool, object_from_grasp);
+    let membrane = Membrane::press(&config.bubble, tool, bubbles);
     let fingers = Finger::BOTH.map(|finger| {
         Some(FingerTouch {
-            gelslim: Some(gelslim::touch(&config.gelslim, tool, object_from_grasp, finger, seed)),
+            gelslim: Some(gelslim::touch(&config.gelslim, tool, gelslims, finger, seed)),
             bubble: Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed)),
         })
     });
-    Sample { fingers, grasp_from_object: Some(object_from_grasp.inverse()), ..Sample::default() }
+    Sample { fingers, grasp_from_object: Some(bubbles.inverse()), ..Sample::default() }
 }
 
 fn bubble_touch(

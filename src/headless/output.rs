@@ -35,6 +35,11 @@ impl Output {
         self.bar.set_position(done as u64);
     }
 
+    /// What is being done now.
+    pub fn message(&self, text: &str) {
+        self.bar.set_message(text.to_owned());
+    }
+
     /// A line on standard error, above the bar.
     pub fn note(&self, text: &str) {
         self.bar.suspend(|| note(text));

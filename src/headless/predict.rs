@@ -47,12 +47,12 @@ pub(super) struct ModelArgs {
 }
 
 /// Of a key that the parser has already compared with the list.
-fn sampler(key: String) -> Sampler {
+pub(super) fn sampler(key: String) -> Sampler {
     key.parse().unwrap_or_default()
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum ShiftArg {
+pub(super) enum ShiftArg {
     /// What the lab's released script saves: its range is mapped twice.
     Raw,
     /// The paper's mean-and-deviation shift of that.
@@ -61,14 +61,36 @@ enum ShiftArg {
     Exact,
 }
 
+impl ShiftArg {
+    /// The reading of the decoder's output.
+    pub(super) fn mode(self) -> ShiftMode {
+        match self {
+            ShiftArg::Raw => ShiftMode::Raw,
+            ShiftArg::Paper => ShiftMode::PaperShift,
+            ShiftArg::Exact => ShiftMode::ExactInverse,
+        }
+    }
+}
+
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum RuntimeArg {
+pub(super) enum RuntimeArg {
     /// ONNX Runtime where its library is found, else the built-in engine.
     Auto,
     /// The built-in engine.
     Rten,
     /// ONNX Runtime.
     Ort,
+}
+
+impl RuntimeArg {
+    /// The choice for the engines.
+    pub(super) fn choice(self) -> EngineChoice {
+        match self {
+            RuntimeArg::Auto => EngineChoice::Auto,
+            RuntimeArg::Rten => EngineChoice::Rten,
+            RuntimeArg::Ort => EngineChoice::Ort,
+        }
+    }
 }
 
 /// The models of one run of the program.
@@ -86,11 +108,7 @@ impl Predictor {
     }
 
     fn choice(&self) -> EngineChoice {
-        match self.args.runtime {
-            RuntimeArg::Auto => EngineChoice::Auto,
-            RuntimeArg::Rten => EngineChoice::Rten,
-            RuntimeArg::Ort => EngineChoice::Ort,
-        }
+        self.args.runtime.choice()
     }
 
     /// The bundle in the named folder, else the first one found that fits.
@@ -136,11 +154,7 @@ impl Predictor {
 
     /// The reading of the decoder's output.
     pub(super) fn shift(&self) -> ShiftMode {
-        match self.args.shift {
-            ShiftArg::Raw => ShiftMode::Raw,
-            ShiftArg::Paper => ShiftMode::PaperShift,
-            ShiftArg::Exact => ShiftMode::ExactInverse,
-        }
+        self.args.shift.mode()
     }
 
     /// Predicted imprints (metres, raw orientation) of the fingers that have a GelSlim image.

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use strum::IntoEnumIterator;
 
 use super::{Common, Output, VerbResult};
-use crate::domain::sim::{self, Fault, SimConfig};
+use crate::domain::sim::{self, Condition, Fault, SimConfig, ToolSpec};
 use crate::io::simulated::{self, Layout};
 
 /// Arguments of `simulate`.
@@ -26,6 +27,14 @@ pub(super) struct SimulateArgs {
     /// Seed of grasps and noise: the same seed writes the same files.
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Writes the test set in the paper's form instead: 46 grasps of each tool within the paper's grid, none of them
+    /// trained on. The same as the built-in data set `test-set`, which needs no files.
+    #[arg(long, conflicts_with_all = ["grasps", "seed", "faults", "part"])]
+    test_set: bool,
+    /// What is wrong with the pairs, as in the paper's Table I. ambiguous: the GelSlims close on the tool's bare shaft;
+    /// mixed: every other pair does; misaligned: the bubbles grasp up to 8 mm away; noise: on the GelSlim image.
+    #[arg(long, default_value = "plain", conflicts_with = "faults", value_parser = condition())]
+    condition: Condition,
     /// Writes five touches with one known fault each (wrong CAD, foreign body, blank finger, straight rod, STL in
     /// millimetres) instead: to learn what each looks like in the studio.
     #[arg(long, conflicts_with_all = ["tools", "grasps", "seed"])]
@@ -54,12 +63,20 @@ impl Part {
     }
 }
 
+/// Reads the key of a condition.
+fn condition() -> impl TypedValueParser<Value = Condition> {
+    PossibleValuesParser::new(Condition::iter().map(|c| PossibleValue::new(c.key()).help(c.description())))
+        .map(|key| key.parse().unwrap_or_default())
+}
+
 #[derive(Serialize)]
 struct Written {
     out: PathBuf,
     pairs: usize,
     tools: Vec<String>,
-    seed: u64,
+    condition: Condition,
+    /// `None` for the test set, whose seeds are its own.
+    seed: Option<u64>,
     seconds: f64,
 }
 
@@ -67,27 +84,42 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
     if args.faults {
         return write_faults(args);
     }
-    let tools = chosen_tools(&args.tools)?;
+    let chosen = chosen_tools(&args.tools)?;
     let start = std::time::Instant::now();
-    let output = Output::new(args.common, "simulating", tools.len() * args.grasps as usize);
+    let grasps = if args.test_set { sim::TEST_GRASPS } else { args.grasps.into() };
+    let output = Output::new(args.common, "simulating", chosen.len() * grasps as usize);
     let layout = args.part.layout();
-    let models: Vec<_> = tools.iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
-    simulated::write_tools(&args.out, &models)?;
     let config = SimConfig::default();
-    for (t, tool) in tools.iter().enumerate() {
-        for g in 0..args.grasps {
-            // One seed per pair, so that a pair does not depend on how many others were asked for.
-            let seed = args.seed.wrapping_mul(1_000_003) ^ ((t as u64) << 32) ^ u64::from(g);
-            let sample = sim::simulate(tool, sim::random_grasp(seed), seed, &config);
-            simulated::write_pair(&args.out, layout, &tool.name, u64::from(g), &sample)?;
-            output.step(&tool.name);
+    // A condition gives at most two forms of a tool, one to even pairs and one to odd ones.
+    let models: BTreeMap<String, ToolSpec> = chosen
+        .iter()
+        .flat_map(|tool| (0..grasps.min(2)).map(|g| args.condition.tool(tool, g)))
+        .map(|tool| (tool.name.clone(), tool))
+        .collect();
+    let tools: Vec<_> = models.values().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
+    simulated::write_tools(&args.out, &tools)?;
+    for (t, tool) in chosen.iter().enumerate() {
+        for g in 0..grasps {
+            let touched = args.condition.tool(tool, g);
+            let (grasp, seed) = if args.test_set {
+                // By the place in the whole list, so that a choice of tools does not change their grasps.
+                sim::test_grasp(sim::tools().iter().position(|t| t.name == tool.name).unwrap_or(t), g)
+            } else {
+                // One seed per pair, so that a pair does not depend on how many others were asked for.
+                let seed = args.seed.wrapping_mul(1_000_003) ^ ((t as u64) << 32) ^ g;
+                (sim::random_grasp(seed), seed)
+            };
+            let sample = args.condition.simulate(&touched, grasp, seed, &config);
+            simulated::write_pair(&args.out, layout, &touched.name, g, &sample)?;
+            output.step(&touched.name);
         }
     }
     let written = Written {
         out: args.out.clone(),
-        pairs: tools.len() * args.grasps as usize,
-        tools: tools.iter().map(|t| t.name.clone()).collect(),
-        seed: args.seed,
+        pairs: chosen.len() * grasps as usize,
+        tools: models.keys().cloned().collect(),
+        condition: args.condition,
+        seed: (!args.test_set).then_some(args.seed),
         seconds: start.elapsed().as_secs_f64(),
     };
     output.finish(&written, || {
@@ -123,7 +155,7 @@ fn write_faults(args: &SimulateArgs) -> VerbResult {
 }
 
 /// The tools that a list names.
-fn chosen_tools(list: &str) -> anyhow::Result<Vec<&'static sim::ToolSpec>> {
+fn chosen_tools(list: &str) -> anyhow::Result<Vec<&'static ToolSpec>> {
     let all = sim::tools();
     Ok(match list {
         "all" => all.iter().collect(),

@@ -53,8 +53,22 @@
 //! }
 //! ```
 //!
+//! ```json
+//! {
+//!   "format": "touch2touch-bundle",
+//!   "format_version": 1,
+//!   "kind": "tool_classifier",
+//!   "name": "Demo tool classifier",
+//!   "files": { "tool_classifier": { "path": "tool_classifier.onnx", "sha256": "…" } },
+//!   "input": { "sensor": "bubble", "size": [128, 128], "range_m": [-0.0188, 0.0264], "rotation_deg": 180 },
+//!   "output": { "classes": ["pattern_31_rod", "pattern_36"], "features": 96 },
+//!   "provenance": {}
+//! }
+//! ```
+//!
 //! `shift` may be left out (the paper's shift is then not offered), and so may `reduction`, `resampling`,
-//! `rotation_deg`, `cast` and `threshold` (mean, bilinear, 0, saturate, 0.5). The fields of the structs below say what
+//! `rotation_deg`, `cast` and `threshold` (mean, bilinear, 0, saturate, 0.5); `features`
+//! where the classifier hands none out. The fields of the structs below say what
 //! each key means.
 //!
 //! # Graphs
@@ -67,6 +81,7 @@
 //! | `denoiser` | `latent` \[N, …latent shape\], `timestep` int64 or float32 \[N\], `condition` | `prediction` \[N, …latent shape\] |
 //! | `decoder` | `latent` \[N, …latent shape\] | `image` \[N, channels, output height, width\], about -1 to 1 |
 //! | `mask_unet` | `imprint` \[N, 1, input height, width\], 0 to 1 | `logits` \[N, classes, input height, width\] |
+//! | `tool_classifier` | `imprint` \[N, 1, input height, width\], -1 to 1 | `logits` \[N, classes\], `features` \[N, features\] |
 
 mod contract;
 mod find;
@@ -83,8 +98,9 @@ use crate::domain::dataset::Problem;
 
 pub use find::{Found, default_roots, find};
 pub use manifest::{
-    BubbleSensor, BundleSpec, Cast, FileEntry, GelslimSensor, GeneratorInput, GeneratorSpec, InputScale, LatentSpec,
-    MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind, ScheduleSpec, TensorSpec, TimestepType,
+    BubbleSensor, BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, FileEntry, GelslimSensor,
+    GeneratorInput, GeneratorSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind,
+    ScheduleSpec, TensorSpec, TimestepType,
 };
 
 /// The manifest's file name.
@@ -102,6 +118,8 @@ pub enum Role {
     Decoder,
     /// Finds the contact in an imprint.
     MaskUnet,
+    /// Names the tool that made an imprint.
+    ToolClassifier,
 }
 
 impl Role {
@@ -112,6 +130,7 @@ impl Role {
             Role::Denoiser => "denoiser",
             Role::Decoder => "decoder",
             Role::MaskUnet => "mask_unet",
+            Role::ToolClassifier => "tool_classifier",
         }
     }
 }
@@ -241,7 +260,7 @@ impl Bundle {
     pub fn generator(&self) -> Option<&GeneratorSpec> {
         match &self.spec {
             BundleSpec::Generator(spec) => Some(spec),
-            BundleSpec::MaskUnet(_) => None,
+            BundleSpec::MaskUnet(_) | BundleSpec::ToolClassifier(_) => None,
         }
     }
 
@@ -249,7 +268,15 @@ impl Bundle {
     pub fn mask_unet(&self) -> Option<&MaskSpec> {
         match &self.spec {
             BundleSpec::MaskUnet(spec) => Some(spec),
-            BundleSpec::Generator(_) => None,
+            BundleSpec::Generator(_) | BundleSpec::ToolClassifier(_) => None,
+        }
+    }
+
+    /// The tool classifier's description, if the bundle is one.
+    pub fn tool_classifier(&self) -> Option<&ClassifierSpec> {
+        match &self.spec {
+            BundleSpec::ToolClassifier(spec) => Some(spec),
+            BundleSpec::Generator(_) | BundleSpec::MaskUnet(_) => None,
         }
     }
 

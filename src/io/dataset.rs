@@ -2,11 +2,11 @@
 //!
 //! * the lab's folders of `.pt` files (the submodule `lab`),
 //! * a folder of pictures `NAME_gelslim.png` + `NAME_bubble.png` (the submodule `pictures`),
-//! * the built-in demo, rendered by the simulator.
+//! * the built-in data sets (the demo and the test sets), rendered by the simulator.
 //!
 //! A [`Dataset`] never changes after opening and can be shared with worker threads.
 
-mod demo;
+mod built_in;
 mod lab;
 mod pictures;
 mod tool_scale;
@@ -22,6 +22,7 @@ use super::images::PictureError;
 use super::pt::PtError;
 use super::stl::MeshError;
 
+pub use built_in::BuiltIn;
 pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE};
 pub use tool_scale::{ToolScale, UNIT_FILE};
 
@@ -32,7 +33,7 @@ pub enum SourceKind {
     Lab,
     /// A folder of pictures: no pose, no camera, assumed scale.
     Pictures,
-    /// The built-in simulator.
+    /// The built-in simulator: the demo or a test set.
     Demo,
 }
 
@@ -154,7 +155,7 @@ impl InvalidPixels {
 pub struct Dataset {
     /// What to call it.
     pub title: String,
-    /// Its root folder; `None` for the demo. The same for every sub-folder it was opened from.
+    /// Its root folder; `None` for what is built in. The same for every sub-folder it was opened from.
     pub root: Option<PathBuf>,
     /// The kind of source.
     pub kind: SourceKind,
@@ -171,7 +172,7 @@ pub struct Dataset {
 enum Source {
     Lab(lab::Lab),
     Pictures(pictures::Pictures),
-    Demo,
+    BuiltIn(BuiltIn),
 }
 
 /// What a scan finds, before it becomes a [`Dataset`].
@@ -186,12 +187,17 @@ struct Scan {
 impl Dataset {
     /// Opens the lab's folders or a folder of pictures, whichever `path` holds. Reads names only.
     ///
+    /// Where nothing has that path, the name of a built-in data set ([`BuiltIn`]) opens that one.
+    ///
     /// `path` may be the dataset's root, the folder above its `data` folder, any folder inside it, or a file in it.
     ///
     /// # Errors
     /// [`OpenError`] if nothing can be opened at all; everything smaller is listed in [`Dataset::problems`].
     pub fn open(path: &Path) -> Result<Self, OpenError> {
         let io = |source| OpenError::Io { path: path.to_owned(), source };
+        if let Some(built_in) = path.to_str().and_then(BuiltIn::named).filter(|_| !path.exists()) {
+            return Ok(Self::built_in(built_in));
+        }
         // Absolute, so that masks are found again from every working directory.
         let absolute = path.canonicalize().map_err(io)?;
         let folder = if absolute.is_dir() { absolute } else { absolute.parent().unwrap_or(&absolute).to_owned() };
@@ -213,14 +219,19 @@ impl Dataset {
 
     /// The built-in demo: simulated grasps of the simulator's tools, rendered one by one when they are asked for.
     pub fn demo() -> Self {
+        Self::built_in(BuiltIn::Demo)
+    }
+
+    /// A built-in data set. Nothing is rendered yet.
+    pub fn built_in(set: BuiltIn) -> Self {
         Self {
-            title: "Demo".into(),
+            title: set.title(),
             root: None,
             kind: SourceKind::Demo,
-            index: Index { pairs: demo::pairs() },
+            index: Index { pairs: set.pairs() },
             problems: Vec::new(),
             tool_scale: None,
-            source: Source::Demo,
+            source: Source::BuiltIn(set),
         }
     }
 
@@ -245,8 +256,8 @@ impl Dataset {
         match &self.source {
             Source::Lab(lab) => lab.load(id),
             Source::Pictures(pictures) => pictures.load(id),
-            Source::Demo => {
-                let sample = demo::load(id).ok_or(LoadError::NoSuchPair { id })?;
+            Source::BuiltIn(set) => {
+                let sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
                 Ok(Loaded { sample, notes: Vec::new(), invalid: Default::default() })
             }
         }
@@ -257,8 +268,8 @@ impl Dataset {
     /// # Errors
     /// [`MeshError`] if there is a file that cannot be used, or whose size cannot be metres.
     pub fn tool_mesh(&self, tool: &str) -> Result<Option<TriMesh>, MeshError> {
-        if let Source::Demo = self.source {
-            return Ok(demo::mesh(tool));
+        if let Source::BuiltIn(set) = self.source {
+            return Ok(set.mesh(tool));
         }
         match self.tool_mesh_file(tool) {
             Some(path) => tool_scale::read_in_metres(path, self.tool_scale).map(Some),
@@ -270,7 +281,7 @@ impl Dataset {
     pub fn tool_mesh_file(&self, tool: &str) -> Option<&Path> {
         match &self.source {
             Source::Lab(lab) => lab.mesh_file(tool),
-            Source::Pictures(_) | Source::Demo => None,
+            Source::Pictures(_) | Source::BuiltIn(_) => None,
         }
     }
 
@@ -279,7 +290,7 @@ impl Dataset {
         match &self.source {
             Source::Lab(lab) => lab.files(id),
             Source::Pictures(pictures) => pictures.files(id),
-            Source::Demo => Vec::new(),
+            Source::BuiltIn(_) => Vec::new(),
         }
     }
 
@@ -290,7 +301,7 @@ impl Dataset {
     pub fn bubble_tile(&self, id: PairId) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
             Source::Pictures(pictures) => pictures.tile(id, pictures::BUBBLE),
-            Source::Lab(_) | Source::Demo => Ok(None),
+            Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
 
@@ -302,7 +313,18 @@ impl Dataset {
     pub fn vqvae_tile(&self, id: PairId) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
             Source::Pictures(pictures) => pictures.tile(id, pictures::VQVAE),
-            Source::Lab(_) | Source::Demo => Ok(None),
+            Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
+        }
+    }
+
+    /// Whether the GelSlim picture of a pair was cut off at black or white; `None` for other sources.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn gelslim_is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
+        match &self.source {
+            Source::Pictures(pictures) => pictures.is_clipped(id),
+            Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
 

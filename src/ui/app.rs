@@ -19,6 +19,7 @@ use super::widget::image_canvas::ViewTransform;
 use super::{bars, layout, log as log_pane, palette, pane, scene, shortcuts, theme};
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane, UiRequest};
+use crate::app::evaluation::EvaluateCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
 use crate::app::runtime::Runtime;
@@ -256,6 +257,7 @@ impl StudioApp {
         match request {
             UiRequest::PickFolder => self.local.dialogs.open(Purpose::Folder, ctx),
             UiRequest::PickFile => self.local.dialogs.open(Purpose::File, ctx),
+            UiRequest::PickTableFolder => self.local.dialogs.open(Purpose::Table, ctx),
             UiRequest::PickExportFolder => self.local.dialogs.open(Purpose::Export, ctx),
             UiRequest::Camera(preset) => {
                 // The view under the pointer turns; linked cameras turn together.
@@ -421,6 +423,7 @@ impl eframe::App for StudioApp {
                 cx.push(match purpose {
                     Purpose::Folder | Purpose::File => Command::Open(Place::Path(path)),
                     Purpose::Export => Command::ExportMasks(path),
+                    Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });
             }
         }

@@ -48,6 +48,10 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.button("Demo").on_hover_text(Action::OpenDemo.tooltip()).clicked() {
             cx.push(Command::Open(Place::Demo));
         }
+        let tip = "46 simulated grasps of each of 9 seen and 3 unseen tools, none of them trained on";
+        if ui.button("Test set").on_hover_text(tip).clicked() {
+            cx.push(Command::Open(Place::Path("test-set".into())));
+        }
         let button = ui.add(egui::Button::new("Folder…").shortcut_text("Ctrl+O"));
         if button.on_hover_text(Action::OpenFolder.tooltip()).clicked() {
             cx.act(Action::OpenFolder);

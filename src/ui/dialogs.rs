@@ -20,6 +20,8 @@ pub(super) enum Purpose {
     File,
     /// The folder that masks are exported to.
     Export,
+    /// The folder that the results table is written to.
+    Table,
 }
 
 impl Purpose {
@@ -28,6 +30,7 @@ impl Purpose {
             Self::Folder => "Open a folder of pairs",
             Self::File => "Open a file of a data set",
             Self::Export => "Export masks to a folder",
+            Self::Table => "Write the results table to a folder",
         }
     }
 }
@@ -71,7 +74,7 @@ impl Dialogs {
         let work = move || {
             let dialog = rfd::FileDialog::new().set_title(purpose.title());
             let path = match purpose {
-                Purpose::Folder | Purpose::Export => dialog.pick_folder(),
+                Purpose::Folder | Purpose::Export | Purpose::Table => dialog.pick_folder(),
                 Purpose::File => dialog.pick_file(),
             };
             // The window may be gone by now: then nobody waits for the answer.

@@ -50,7 +50,9 @@ pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
         Workspace::Label => {
             &[Browser, Masks, Measured, Predicted, SceneMeasured, ScenePredicted, GelDifference, Metrics, Log]
         }
-        Workspace::Evaluate => &[Browser, Table, Measured, Predicted, Error, SceneMeasured, Metrics, Generate, Log],
+        Workspace::Evaluate => {
+            &[Browser, Results, Table, Measured, Predicted, Error, SceneMeasured, Metrics, Generate, Log]
+        },
     }
 }
 
@@ -123,7 +125,7 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
         }
         Workspace::Evaluate => {
             let left = b.tabs(&[Browser]);
-            let table = b.tabs(&[Table]);
+            let table = b.tabs(&[Results, Table]);
             let (measured, predicted, error) = (b.tabs(&[Measured]), b.tabs(&[Predicted]), b.tabs(&[Error]));
             let right = b.tabs(&[Metrics, Generate, SceneMeasured, Log]);
             let images = b.row(&[(measured, 1.0), (predicted, 1.0), (error, 1.0)]);

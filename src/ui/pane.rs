@@ -7,7 +7,7 @@ use super::cx::Cx;
 use super::theme::{SMALL, medium};
 use super::timemachine;
 use super::widget::help;
-use super::{basin, browser, generate, images, layers, log, masks, metrics, poses, scene, settings_pane, table};
+use super::{basin, browser, generate, images, layers, log, masks, metrics, poses, results, scene, settings_pane, table};
 use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
 
@@ -31,6 +31,7 @@ pub(super) fn title(pane: Pane) -> &'static str {
         Pane::Poses => "Poses",
         Pane::Metrics => "Figures",
         Pane::Table => "All figures",
+        Pane::Results => "Results",
         Pane::Log => "Log",
         Pane::Settings => "Settings",
     }
@@ -56,6 +57,7 @@ fn tooltip(pane: Pane) -> &'static str {
         Pane::Poses => "Truth, measurement and prediction against each other, per finger and joint",
         Pane::Metrics => "The figures of this pair",
         Pane::Table => "The figures of all pairs so far",
+        Pane::Results => "The paper's results table of the open data set",
         Pane::Log => "What happened",
         Pane::Settings => "Preferences",
     }
@@ -90,6 +92,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         Pane::Poses => poses::show(cx, ui),
         Pane::Metrics => metrics::show(cx, ui),
         Pane::Table => table::show(cx, ui),
+        Pane::Results => results::show(cx, ui),
         Pane::Log => log::show(cx, ui),
         Pane::Settings => settings_pane::show(cx, ui),
     }

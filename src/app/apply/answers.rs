@@ -90,6 +90,8 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     let before = state.entry().map(|entry| entry.name.clone());
     let same_place = state.library.open.as_ref().is_some_and(|open| open.place == place);
     state.results.clear();
+    state.table.result = None;
+    state.table.running = None;
     state.history.clear();
     state.tasks.failed.clear();
     state.document =
@@ -266,6 +268,7 @@ fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
         state.library.opening = None;
         state.library.failure = Some(err.clone());
     }
+    state.table.running.take_if(|running| *running == ticket);
     state.log.error(err);
 }
 

@@ -76,7 +76,7 @@ pub(super) struct Lanes {
 /// Threads of each lane. Files go one after the other; models keep one loaded; computing uses what is left.
 fn threads_of(lane: Lane) -> usize {
     match lane {
-        Lane::Files | Lane::Models => 1,
+        Lane::Files | Lane::Models | Lane::Batch => 1,
         Lane::Compute => std::thread::available_parallelism().map_or(1, |n| n.get().saturating_sub(1).clamp(1, 4)),
     }
 }

@@ -6,6 +6,8 @@ use std::time::Instant;
 use super::super::command::{Command, UiRequest};
 use super::super::effect::Effect;
 use super::super::error::TaskError;
+use super::super::evaluation::EvaluateCommand;
+use super::super::jobs::evaluate;
 use super::super::jobs::prepare::Body;
 use super::super::jobs::{Cancel, JobCx, Lane};
 use super::super::results::Prediction;
@@ -88,6 +90,24 @@ impl Runtime {
                         Ok(Command::SettingsSaved)
                     }),
                 );
+            }
+            Effect::Evaluate { ticket, source, setup } => {
+                let body = Box::new(move |cx: &JobCx| {
+                    let dataset = source.as_dataset().ok_or_else(|| {
+                        TaskError::new("Evaluate", "this kind of source cannot be read outside the studio")
+                    })?;
+                    let evaluation = Arc::new(evaluate::evaluate(dataset, &setup, cx)?);
+                    Ok(Command::Evaluate(EvaluateCommand::Done(ticket, evaluation)))
+                });
+                self.task(Lane::Batch, ticket, "Evaluate".into(), body);
+            }
+            Effect::ExportTable { ticket, evaluation, published, folder } => {
+                let body = Box::new(move |_: &JobCx| {
+                    let folder = evaluate::export(&evaluation, published, &folder)?;
+                    let line = format!("Wrote evaluation.csv, .md and .json to {}", folder.display());
+                    Ok(Command::Finished(ticket, Some(line)))
+                });
+                self.task(Lane::Files, ticket, "Export the table".into(), body);
             }
             Effect::ExportMasks { ticket, source, labels, folder } => {
                 let body = Box::new(move |cx: &JobCx| {

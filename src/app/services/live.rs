@@ -22,7 +22,7 @@ use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
-use crate::infer::bundle::{self, Bundle};
+use crate::infer::bundle::{self, Bundle, BundleSpec};
 use crate::infer::engine::EngineChoice;
 use crate::infer::generator::{GenerateError, Generator};
 use crate::infer::mask::MaskModel;
@@ -146,6 +146,10 @@ impl DataSource for LiveSource {
 
     fn root(&self) -> Option<&Path> {
         self.dataset.root.as_deref()
+    }
+
+    fn as_dataset(&self) -> Option<&Dataset> {
+        Some(&self.dataset)
     }
 
     fn index(&self) -> &Index {
@@ -427,7 +431,11 @@ pub fn info(bundle: &Bundle) -> BundleInfo {
     BundleInfo {
         id: bundle.hash().into(),
         name: bundle.name().to_owned(),
-        kind: if bundle.generator().is_some() { BundleKind::Generator } else { BundleKind::Mask },
+        kind: match bundle.spec() {
+            BundleSpec::Generator(_) => BundleKind::Generator,
+            BundleSpec::MaskUnet(_) => BundleKind::Mask,
+            BundleSpec::ToolClassifier(_) => BundleKind::Classifier,
+        },
         folder: bundle.dir().to_owned(),
         steps: bundle.generator().map(|spec| spec.defaults.steps),
     }

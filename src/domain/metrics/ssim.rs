@@ -44,6 +44,15 @@ pub struct Ssim {
 /// Wang et al. 2004; window, padding and borders as in the lab's `ssim.py` lines 9-210. Checked against an independent
 /// implementation by `tests/data/ssim.json`.
 pub fn ssim(prediction: &Grid<f32>, truth: &Grid<f32>, range: SsimRange) -> Result<Ssim, MetricError> {
+    let mut one = ssim_ranges(prediction, truth, &[range])?;
+    Ok(one.remove(0))
+}
+
+/// [`ssim`] for several ranges at hardly more than the cost of one.
+///
+/// # Errors
+/// As [`ssim`], if any of the ranges cannot be used.
+pub fn ssim_ranges(prediction: &Grid<f32>, truth: &Grid<f32>, ranges: &[SsimRange]) -> Result<Vec<Ssim>, MetricError> {
     check_size(prediction, truth)?;
     let valid = |p: f32, t: f32| p.is_finite() && t.is_finite();
     let pairs = || prediction.as_slice().iter().zip(truth.as_slice()).map(|(&p, &t)| (p, t));
@@ -52,14 +61,17 @@ pub fn ssim(prediction: &Grid<f32>, truth: &Grid<f32>, range: SsimRange) -> Resu
         return Err(MetricError::Nothing);
     }
     let offset = pairs().filter(|&(p, t)| valid(p, t)).map(|(_, t)| f64::from(t)).sum::<f64>() / used as f64;
-    let range = match range {
-        SsimRange::Explicit(range) => range,
-        SsimRange::OfPrediction => {
-            let values = || pairs().filter(|&(p, t)| valid(p, t)).map(|(p, _)| f64::from(p));
-            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
-        }
-    };
-    if !(range > 0.0 && range.is_finite()) {
+    let ranges: Vec<f64> = ranges
+        .iter()
+        .map(|range| match *range {
+            SsimRange::Explicit(range) => range,
+            SsimRange::OfPrediction => {
+                let values = || pairs().filter(|&(p, t)| valid(p, t)).map(|(p, _)| f64::from(p));
+                values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+            }
+        })
+        .collect();
+    if let Some(&range) = ranges.iter().find(|&&range| !(range > 0.0 && range.is_finite())) {
         return Err(MetricError::Range(range));
     }
 
@@ -77,18 +89,21 @@ pub fn ssim(prediction: &Grid<f32>, truth: &Grid<f32>, range: SsimRange) -> Resu
     let (pp, tt, pt) =
         (blur(&product(&p, &p), squared), blur(&product(&t, &t), squared), blur(&product(&p, &t), squared));
 
-    let (c1, c2) = ((K1 * range).powi(2), (K2 * range).powi(2));
-    let scores: Vec<f64> = (0..p.len())
-        .map(|i| {
-            let (mp, mt) = (mean_p[i], mean_t[i]);
-            let (vp, vt, cov) = ((pp[i] - mp * mp).max(0.0), (tt[i] - mt * mt).max(0.0), pt[i] - mp * mt);
-            let (mp, mt) = (mp + offset, mt + offset);
-            (2.0 * mp * mt + c1) * (2.0 * cov + c2) / ((mp * mp + mt * mt + c1) * (vp + vt + c2))
-        })
-        .collect();
-    let mean = scores.iter().sum::<f64>() / scores.len() as f64;
-    let map = Grid::from_fn(width, height, |x, y| scores[y * width + x] as f32);
-    Ok(Ssim { mean, map, ignored: p.len() - used })
+    let of_range = |&range: &f64| {
+        let (c1, c2) = ((K1 * range).powi(2), (K2 * range).powi(2));
+        let scores: Vec<f64> = (0..p.len())
+            .map(|i| {
+                let (mp, mt) = (mean_p[i], mean_t[i]);
+                let (vp, vt, cov) = ((pp[i] - mp * mp).max(0.0), (tt[i] - mt * mt).max(0.0), pt[i] - mp * mt);
+                let (mp, mt) = (mp + offset, mt + offset);
+                (2.0 * mp * mt + c1) * (2.0 * cov + c2) / ((mp * mp + mt * mt + c1) * (vp + vt + c2))
+            })
+            .collect();
+        let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+        let map = Grid::from_fn(width, height, |x, y| scores[y * width + x] as f32);
+        Ssim { mean, map, ignored: p.len() - used }
+    };
+    Ok(ranges.iter().map(of_range).collect())
 }
 
 /// The normalised Gaussian of the window, one axis.

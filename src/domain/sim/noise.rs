@@ -19,6 +19,7 @@ pub(super) enum Stream {
     GelNoise = 8,
     GelReference = 9,
     Mask = 10,
+    Condition = 11,
 }
 
 /// A source of random numbers for one purpose and one finger.

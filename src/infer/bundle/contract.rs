@@ -1,6 +1,6 @@
 //! Compares a graph's inputs and outputs with what the manifest promises.
 
-use super::manifest::{BundleSpec, GeneratorSpec, MaskSpec, TimestepType};
+use super::manifest::{BundleSpec, ClassifierSpec, GeneratorSpec, MaskSpec, TimestepType};
 use super::{Problems, Role};
 use crate::infer::onnx_header::{self, FLOAT32, INT64, Port};
 
@@ -60,6 +60,13 @@ fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<Promise>, Vec<Promise>
             let [width, height] = input.size;
             Some((vec![float("imprint", [1, height, width])], vec![float("logits", [output.classes, height, width])]))
         }
+        (Role::ToolClassifier, BundleSpec::ToolClassifier(ClassifierSpec { input, output })) => {
+            let [width, height] = input.size;
+            let outputs = std::iter::once(float("logits", [output.classes.len()]))
+                .chain(output.features.map(|n| float("features", [n])))
+                .collect();
+            Some((vec![float("imprint", [1, height, width])], outputs))
+        }
         (_, BundleSpec::Generator(spec)) => {
             let GeneratorSpec { input, condition, latent, output, .. } = &**spec;
             let [width, height] = input.size;
@@ -77,7 +84,7 @@ fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<Promise>, Vec<Promise>
                     let [width, height] = output.size;
                     Some((vec![latent()], vec![float("image", [output.channels, height, width])]))
                 }
-                Role::MaskUnet => None,
+                Role::MaskUnet | Role::ToolClassifier => None,
             }
         }
         _ => None,

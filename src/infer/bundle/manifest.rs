@@ -35,6 +35,8 @@ pub enum BundleSpec {
     Generator(Box<GeneratorSpec>),
     /// Imprint to contact mask.
     MaskUnet(MaskSpec),
+    /// Imprint to the tool that made it.
+    ToolClassifier(ClassifierSpec),
 }
 
 /// A latent-diffusion generator.
@@ -274,6 +276,41 @@ pub struct MaskOutput {
     pub threshold: f64,
 }
 
+/// A tool classifier.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ClassifierSpec {
+    /// How the imprint is prepared.
+    pub input: ClassifierInput,
+    /// What it can name.
+    pub output: ClassifierOutput,
+}
+
+/// `input` of a tool classifier.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClassifierInput {
+    /// Which sensor: always `bubble`.
+    pub sensor: BubbleSensor,
+    /// `[width, height]`, pixels; resized bilinearly.
+    pub size: [usize; 2],
+    /// The imprint's depth that becomes -1 and 1, metres; clamped.
+    pub range_m: DepthRange,
+    /// Rotation of the raw imprint before the graph: 0 or 180 degrees.
+    #[serde(default)]
+    pub rotation_deg: u32,
+}
+
+/// `output` of a tool classifier.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ClassifierOutput {
+    /// The tools' names, in the order of the logits.
+    pub classes: Vec<String>,
+    /// Length of the graph's output `features`, by which sets of imprints are compared; without it there is none.
+    #[serde(default)]
+    pub features: Option<usize>,
+}
+
 fn half() -> f64 {
     0.5
 }
@@ -341,9 +378,11 @@ pub(super) fn parse(text: &[u8], problems: &mut Problems) -> Option<Manifest> {
     let (spec, roles): (_, &[Role]) = match kind.as_deref() {
         Some("generator") => (generator(&mut keys, problems), &[Role::ConditionEncoder, Role::Denoiser, Role::Decoder]),
         Some("mask_unet") => (mask(&mut keys, problems), &[Role::MaskUnet]),
+        Some("tool_classifier") => (classifier(&mut keys, problems), &[Role::ToolClassifier]),
         other => {
             if let Some(other) = other {
-                problems.add(format!("kind: \"{other}\" is unknown"), "it must be \"generator\" or \"mask_unet\"");
+                let hint = "it must be \"generator\", \"mask_unet\" or \"tool_classifier\"";
+                problems.add(format!("kind: \"{other}\" is unknown"), hint);
             }
             return None;
         }
@@ -476,6 +515,34 @@ fn mask(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<Bundle
         }
     }
     Some(BundleSpec::MaskUnet(MaskSpec { input: input?, output: output? }))
+}
+
+fn classifier(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<BundleSpec> {
+    let input: Option<ClassifierInput> = section(keys, "input", problems);
+    let output: Option<ClassifierOutput> = section(keys, "output", problems);
+    if let Some(input) = &input {
+        if !sides(&input.size) {
+            problems.add("input.size: out of range", SIDES);
+        }
+        if !input.range_m.is_valid() {
+            problems.add("input.range_m: empty", "give [smallest, largest] depth in metres");
+        }
+        if !turn(input.rotation_deg) {
+            problems.add("input.rotation_deg: not supported", TURNS);
+        }
+    }
+    if let Some(output) = &output {
+        let mut names: Vec<&String> = output.classes.iter().filter(|name| !name.is_empty()).collect();
+        names.sort();
+        names.dedup();
+        if names.len() != output.classes.len() || !(2..=MAX_SIDE).contains(&names.len()) {
+            problems.add("output.classes: not usable", "name at least two tools, each once");
+        }
+        if output.features.is_some_and(|n| !sides(&[n])) {
+            problems.add("output.features: out of range", "1 to 4096, or leave it out");
+        }
+    }
+    Some(BundleSpec::ToolClassifier(ClassifierSpec { input: input?, output: output? }))
 }
 
 const SIDES: &str = "every side must be 1 to 4096";

@@ -146,6 +146,13 @@ impl Pictures {
         Ok(Some((turn.undo(&difference), turn)))
     }
 
+    /// Whether a channel of the GelSlim picture was cut off at black or white: half of its range is lost.
+    pub(super) fn is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
+        let Some(path) = self.file(id, 0)? else { return Ok(None) };
+        let tile = images::read_rgb(path)?;
+        Ok(Some((0..3).any(|channel| matches!(mode(&tile, channel), 0 | 255))))
+    }
+
     /// The pair as the right finger's touch: which finger it was is not known.
     pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
         let mut notes = Vec::new();
@@ -187,16 +194,20 @@ pub(super) fn imprint_from_tile(tile: &Grid<f32>) -> DepthMap {
     resample::bilinear(&metres, bubble::WIDTH, bubble::HEIGHT)
 }
 
+/// The most frequent level of a channel.
+fn mode(tile: &RgbGrid, channel: usize) -> usize {
+    let mut counts = [0u32; 256];
+    for pixel in tile.as_slice() {
+        counts[pixel[channel].round().clamp(0.0, 255.0) as usize] += 1;
+    }
+    counts.iter().enumerate().max_by_key(|&(level, &n)| (n, std::cmp::Reverse(level))).map_or(0, |m| m.0)
+}
+
 fn difference_from_tile(tile: &RgbGrid) -> RgbGrid {
     let mut zero = [0f32; 3];
     let mut gain = CLEAN_GAIN;
     for channel in 0..3 {
-        let mut counts = [0u32; 256];
-        for pixel in tile.as_slice() {
-            counts[pixel[channel].round().clamp(0.0, 255.0) as usize] += 1;
-        }
-        let mode =
-            counts.iter().enumerate().max_by_key(|&(level, &n)| (n, std::cmp::Reverse(level))).map_or(0, |m| m.0);
+        let mode = mode(tile, channel);
         zero[channel] = mode as f32;
         if mode == 0 || mode == 255 {
             let spread = standard_deviation(tile.as_slice().iter().map(|p| f64::from(p[channel]))) as f32;

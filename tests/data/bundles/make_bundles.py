@@ -1,4 +1,4 @@
-"""Writes the tiny bundles of the tests: generator/ and mask/. Needs onnx and numpy.
+"""Writes the tiny bundles of the tests: generator/, mask/ and classifier/. Needs onnx and numpy.
 
 The weights are fixed random numbers; the graphs use the operators of real ones (convolutions, group norm as instance
 norm, a time embedding, nearest resizing, transposed convolution, pooling, softmax attention over pixels).
@@ -105,6 +105,15 @@ def mask_unet(path):
     return g.save(path, [("imprint", T.FLOAT, [1, 14, 18])], [("logits", T.FLOAT, [2, 14, 18])])
 
 
+def tool_classifier(path):
+    # No trained weights: the features are the means of the four quarters, and the class is the deepest of the first three.
+    g = Graph()
+    x = g.op("AveragePool", "imprint", kernel_shape=[7, 9], strides=[7, 9])
+    g.op("Flatten", x, out="features")
+    g.op("MatMul", "features", g.const(np.eye(4, 3, dtype=np.float32) * 10), out="logits")
+    return g.save(path, [("imprint", T.FLOAT, [1, 14, 18])], [("logits", T.FLOAT, [3]), ("features", T.FLOAT, [4])])
+
+
 def reference():
     """What onnx's own (numpy) evaluator makes of the generator's graphs, batch of two."""
     from onnx.reference import ReferenceEvaluator
@@ -146,4 +155,9 @@ write("mask", {
     "kind": "mask_unet", "name": "Tiny mask UNet of the tests", "files": {"mask_unet": write_mask},
     "input": {"sensor": "bubble", "size": [18, 14], "range_m": [0.0, 0.01], "cast": "none", "rotation_deg": 180},
     "output": {"classes": 2, "threshold": 0.5}})
+write_classifier = tool_classifier(HERE / "classifier" / "tool_classifier.onnx")
+write("classifier", {
+    "kind": "tool_classifier", "name": "Tiny tool classifier of the tests", "files": {"tool_classifier": write_classifier},
+    "input": {"sensor": "bubble", "size": [18, 14], "range_m": [0.0, 0.01], "rotation_deg": 180},
+    "output": {"classes": ["pattern_31_rod", "pattern_35", "pattern_36"], "features": 4}})
 reference()

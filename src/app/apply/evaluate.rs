@@ -1,0 +1,50 @@
+//! The results table.
+
+use super::super::effect::Effect;
+use super::super::evaluation::EvaluateCommand;
+use super::super::state::State;
+
+pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Vec<Effect>) {
+    match command {
+        EvaluateCommand::Choose(bundle, chosen) => {
+            if chosen {
+                state.table.left_out.remove(&bundle);
+            } else {
+                state.table.left_out.insert(bundle);
+            }
+        }
+        EvaluateCommand::Grasps(grasps) => state.table.grasps_per_tool = grasps.map(|n| n.max(1)),
+        EvaluateCommand::Published(shown) => state.table.published = shown,
+        EvaluateCommand::Start => {
+            // One at a time: a second would only take the cores from the first.
+            if state.evaluating().is_some() {
+                return;
+            }
+            let (Some(setup), Some(open)) = (state.evaluation_setup(), &state.library.open) else { return };
+            let source = open.source.clone();
+            let ticket = state.tasks.start(format!("Evaluate {}", source.title()), None);
+            state.table.running = Some(ticket);
+            effects.push(Effect::Evaluate { ticket, source, setup: Box::new(setup) });
+        }
+        EvaluateCommand::Done(ticket, evaluation) => {
+            state.tasks.running.remove(&ticket);
+            // One that another data set's opening stopped has nowhere to be shown.
+            if state.table.running.take_if(|running| *running == ticket).is_some() {
+                if !evaluation.complete {
+                    state.log.info("The evaluation was stopped: the table holds what was scored until then");
+                }
+                if let Some(first) = evaluation.skipped.first() {
+                    let text = format!("{} things could not be scored", evaluation.skipped.len());
+                    let why = format!("the first: {}: {}", first.what, first.why);
+                    state.log.push(super::Level::Warning, text, Some(why), None);
+                }
+                state.table.result = Some(evaluation);
+            }
+        }
+        EvaluateCommand::Export(folder) => {
+            let Some(evaluation) = state.table.result.clone() else { return };
+            let ticket = state.tasks.start("Export the table".into(), None);
+            effects.push(Effect::ExportTable { ticket, evaluation, published: state.table.published, folder });
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! What the Evaluate workspace asks for, and its last answer.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::jobs::evaluate::{Evaluation, Setup};
+use super::library::{BundleInfo, BundleKind};
+use super::state::State;
+use super::tasks::{Task, Ticket};
+use crate::domain::evaluation::{Row, paper_rows};
+
+/// Grasps of each tool that the studio offers; `None` is all of them.
+pub const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];
+
+/// The table and how it is asked for.
+#[derive(Clone, Debug)]
+pub struct TableState {
+    /// Generators that get no row, by bundle.
+    pub left_out: BTreeSet<Arc<str>>,
+    /// At most so many grasps of each tool.
+    pub grasps_per_tool: Option<usize>,
+    /// Whether published figures are shown as well.
+    pub published: bool,
+    /// The evaluation under way.
+    pub running: Option<Ticket>,
+    /// The last table of the open data set.
+    pub result: Option<Arc<Evaluation>>,
+}
+
+impl Default for TableState {
+    fn default() -> Self {
+        Self {
+            left_out: BTreeSet::new(),
+            grasps_per_tool: Some(4),
+            published: false,
+            running: None,
+            result: None,
+        }
+    }
+}
+
+/// What can happen to it.
+#[derive(Clone, Debug)]
+pub enum EvaluateCommand {
+    /// Gives a generator a row, or none.
+    Choose(Arc<str>, bool),
+    /// How many grasps of each tool.
+    Grasps(Option<usize>),
+    /// Shows what was published, or not.
+    Published(bool),
+    /// Scores the open data set.
+    Start,
+    /// The table is there.
+    Done(Ticket, Arc<Evaluation>),
+    /// Writes the table into a folder.
+    Export(PathBuf),
+}
+
+impl State {
+    /// The generators, and whether each gets a row.
+    pub fn evaluated(&self) -> impl Iterator<Item = (&BundleInfo, bool)> {
+        self.library
+            .bundles
+            .iter()
+            .filter(|b| b.kind == BundleKind::Generator)
+            .map(|b| (b, !self.table.left_out.contains(&b.id)))
+    }
+
+    /// What an evaluation started now would do; `None` without data or with nothing to score.
+    pub fn evaluation_setup(&self) -> Option<Setup> {
+        self.library.open.as_ref()?;
+        let folder = |kind| self.bundle(kind).ok().map(|b| b.folder.clone());
+        let bundles: Vec<PathBuf> =
+            self.evaluated().filter(|(_, chosen)| *chosen).map(|(b, _)| b.folder.clone()).collect();
+        (!bundles.is_empty()).then(|| Setup {
+            bundles,
+            mask_bundle: folder(BundleKind::Mask),
+            classifier: folder(BundleKind::Classifier),
+            engine: self.settings.pose_engine,
+            shift: self.settings.shift,
+            runtime: self.settings.runtime.into(),
+            grasps_per_tool: self.table.grasps_per_tool,
+            ..Setup::default()
+        })
+    }
+
+    /// The evaluation under way.
+    pub fn evaluating(&self) -> Option<(Ticket, &Task)> {
+        let ticket = self.table.running?;
+        Some((ticket, self.tasks.running.get(&ticket)?))
+    }
+
+    /// The rows to show: those of the table, and the published ones if wanted.
+    pub fn table_rows(&self) -> Vec<Row> {
+        let Some(result) = &self.table.result else { return Vec::new() };
+        let mut rows = result.rows.clone();
+        if self.table.published {
+            rows.extend(paper_rows());
+        }
+        rows
+    }
+}

@@ -1,0 +1,245 @@
+//! The paper's results table of a data set: generators, the measured imprints as the upper bound, and predictions that
+//! lie by the data, all through one pipeline (imprint, contact mask, pose, classifier). The verb `evaluate` and the
+//! studio's Evaluate pane both call [`evaluate`].
+
+mod export;
+mod load;
+mod methods;
+mod tool;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::super::error::TaskError;
+use super::JobCx;
+use crate::domain::dataset::PairId;
+use crate::domain::diffusion::Sampler;
+use crate::domain::evaluation::{self, Group, Row, Scores};
+use crate::domain::pose::Engine;
+use crate::domain::postprocess::ShiftMode;
+use crate::domain::sample::Scale;
+use crate::infer::engine::{EngineChoice, threads};
+use crate::io::dataset::Dataset;
+use methods::{Method, Models};
+
+pub use export::{Report, export, rows};
+
+/// What it is called in errors.
+const WHAT: &str = "Evaluate";
+
+/// Where the contact masks come from, for every method alike.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MaskBy {
+    /// The mask model: what a robot has.
+    #[default]
+    Unet,
+    /// The CAD model at the true pose, on whatever imprint: an upper bound.
+    Cad,
+    /// The simulator's true contact, whatever the imprint.
+    Truth,
+    /// Imprint depth above so many metres.
+    Threshold(f32),
+}
+
+/// What to evaluate, and how.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Setup {
+    /// Folders of generator bundles: a row each.
+    pub bundles: Vec<PathBuf>,
+    /// Folder of the mask model; without it there are no angles by [`MaskBy::Unet`].
+    pub mask_bundle: Option<PathBuf>,
+    /// Folder of the tool classifier; without it neither accuracy nor Fréchet distance.
+    pub classifier: Option<PathBuf>,
+    /// Where the contact masks come from.
+    pub mask: MaskBy,
+    /// The registration.
+    pub engine: Engine,
+    /// How decoder outputs become metres.
+    pub shift: ShiftMode,
+    /// Sampling steps instead of each bundle's own; not for bundles that draw in one step.
+    pub steps: Option<u32>,
+    /// Seed instead of each bundle's own; every image starts from the same one.
+    pub seed: Option<u64>,
+    /// Sampler instead of each bundle's own.
+    pub sampler: Option<Sampler>,
+    /// The engine that runs the models.
+    #[serde(skip)]
+    pub runtime: EngineChoice,
+    /// At most so many grasps of each tool, spread evenly.
+    pub grasps_per_tool: Option<usize>,
+    /// Whether images of both fingers are compared, or only the right one's. Poses always come from both.
+    pub both_fingers: bool,
+    /// Images that go through a generator at once.
+    pub batch: usize,
+    /// Drawings for the intervals.
+    pub resamples: usize,
+}
+
+impl Default for Setup {
+    fn default() -> Self {
+        Self {
+            bundles: Vec::new(),
+            mask_bundle: None,
+            classifier: None,
+            mask: MaskBy::default(),
+            engine: Engine::default(),
+            shift: ShiftMode::default(),
+            steps: None,
+            seed: None,
+            sampler: None,
+            runtime: EngineChoice::default(),
+            grasps_per_tool: None,
+            both_fingers: true,
+            batch: 8,
+            resamples: 400,
+        }
+    }
+}
+
+/// Something that could not be scored.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Skipped {
+    /// The pair or the tool.
+    pub what: String,
+    /// By which method; empty for all.
+    pub method: String,
+    /// Why.
+    pub why: String,
+}
+
+/// The table with what is behind it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// The data set's title.
+    pub dataset: String,
+    /// The rows, the upper bound first.
+    pub rows: Vec<Row>,
+    /// The column groups.
+    pub groups: Vec<Group>,
+    /// What PSNR and SSIM mean.
+    pub conventions: &'static str,
+    /// What the columns mean, and what is missing and why.
+    pub notes: Vec<String>,
+    /// What was left out.
+    pub skipped: Vec<Skipped>,
+    /// Whether everything asked for was scored: false if stopped early.
+    pub complete: bool,
+    /// How.
+    pub setup: Setup,
+    /// The engine of the models and its threads.
+    pub runtime: String,
+    /// Time it took, seconds.
+    pub seconds: f64,
+    /// Every method's figures of every grasp.
+    #[serde(skip)]
+    pub scores: Vec<Scores>,
+}
+
+/// Scores every grasp of `dataset` by every method of `setup`. Stops early when told to, with what was scored so far.
+///
+/// # Errors
+/// If a bundle cannot be used, nothing could be scored, or it was told to stop before anything was. Pairs and
+/// predictions that fail are left out and listed.
+pub fn evaluate(dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
+    let start = Instant::now();
+    cx.progress(0, 0, "loading the models");
+    let mut models = Models::open(setup, dataset)?;
+    let work = load::plan(dataset, setup);
+    let total: usize = work.iter().map(|tool| tool.ids.len()).sum();
+    if total == 0 {
+        return Err(TaskError::new(WHAT, "the data set has no pairs"));
+    }
+    let mut skipped = Vec::new();
+    let mut scores: Vec<Scores> = models
+        .methods
+        .iter()
+        .map(|method| Scores {
+            method: method.name().to_owned(),
+            upper_bound: matches!(method, Method::Measured),
+            grasps: Vec::new(),
+            measured_features: Vec::new(),
+        })
+        .collect();
+    let (mut done, mut scale) = (0, Scale::Measured);
+    load::ahead(dataset, setup, &work, cx, |batch| {
+        let mut tool = tool::Tool::new(dataset, batch.tool.clone(), &mut skipped);
+        for cases in batch.cases {
+            if cx.cancel.is_cancelled() {
+                break;
+            }
+            let cases = match cases {
+                Ok(cases) => cases,
+                Err(mut bad) => {
+                    skipped.append(&mut bad);
+                    continue;
+                }
+            };
+            let loaded = cases.good.len() + cases.bad.len();
+            skipped.extend(cases.bad);
+            if let Some(case) = cases.good.first() {
+                scale = case.sample.scale;
+            }
+            tool.score(&cases.good, setup, &mut models, &mut skipped, cx, &mut |method| {
+                let name = batch.tool.as_deref().unwrap_or("pictures");
+                cx.progress(done as u64, total as u64, format!("{name}, {method}"));
+            });
+            done += loaded;
+            cx.progress(done as u64, total as u64, batch.tool.clone().unwrap_or_default());
+        }
+        tool.finish(&mut scores);
+    });
+    let groups = evaluation::groups_of(scores.iter().flat_map(|s| &s.grasps));
+    if groups.is_empty() {
+        cx.check(WHAT)?;
+        let why = skipped.first().map_or("nothing could be scored".to_owned(), |s: &Skipped| {
+            format!("nothing could be scored; the first failure: {}: {}", s.what, s.why)
+        });
+        return Err(TaskError::new(WHAT, why));
+    }
+    cx.progress(total as u64, total as u64, "intervals");
+    scores.retain(|s| !s.grasps.is_empty());
+    let rows = scores.iter().map(|s| evaluation::row(s, &groups, setup.resamples)).collect();
+    let mut notes: Vec<String> = evaluation::NOTES.iter().map(|&n| n.to_owned()).collect();
+    notes.append(&mut models.missing(setup, scale));
+    Ok(Evaluation {
+        dataset: dataset.title.clone(),
+        rows,
+        groups,
+        conventions: evaluation::conventions(scale),
+        notes,
+        skipped,
+        complete: done == total && !cx.cancel.is_cancelled(),
+        setup: setup.clone(),
+        runtime: format!("{}, {} thread(s), {} images at a time", models.engine(), threads(), setup.batch.max(1)),
+        seconds: start.elapsed().as_secs_f64(),
+        scores,
+    })
+}
+
+/// The pairs of one tool.
+#[derive(Clone, Debug, PartialEq)]
+struct ToolWork {
+    tool: Option<String>,
+    ids: Vec<PairId>,
+}
+
+/// At most `limit` of the pairs, spread evenly.
+fn spread(ids: &[PairId], limit: Option<usize>) -> Vec<PairId> {
+    match limit {
+        Some(n) if n < ids.len() => (0..n).map(|i| ids[i * ids.len() / n]).collect(),
+        _ => ids.to_vec(),
+    }
+}
+
+/// The pairs by tool, in the order of the index.
+fn by_tool(dataset: &Dataset) -> BTreeMap<Option<String>, Vec<PairId>> {
+    let mut tools: BTreeMap<Option<String>, Vec<PairId>> = BTreeMap::new();
+    for (id, entry) in (0u32..).zip(&dataset.index.pairs) {
+        tools.entry(entry.tool.clone()).or_default().push(PairId(id));
+    }
+    tools
+}

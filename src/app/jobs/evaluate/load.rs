@@ -1,0 +1,107 @@
+//! Reading pairs while the ones before are scored.
+
+use std::sync::mpsc::sync_channel;
+
+use rayon::prelude::*;
+
+use super::super::JobCx;
+use super::{Setup, Skipped, ToolWork, by_tool, spread};
+use crate::domain::dataset::PairId;
+use crate::domain::evaluation::Group;
+use crate::domain::grid::Grid;
+use crate::domain::sample::{Sample, Scale};
+use crate::io::dataset::{Dataset, SourceKind};
+
+/// A loaded pair.
+pub(super) struct Case {
+    pub(super) name: String,
+    pub(super) group: Group,
+    pub(super) sample: Sample,
+    /// The bubble picture as it is in its file, and the lab's prediction of it, where the source has pictures.
+    pub(super) tile: Option<Grid<f32>>,
+    pub(super) lab: Option<Grid<f32>>,
+}
+
+/// Some pairs of a tool that are scored together.
+pub(super) struct Cases {
+    pub(super) good: Vec<Case>,
+    pub(super) bad: Vec<Skipped>,
+}
+
+/// The pairs of a tool, as they arrive.
+pub(super) struct Batch<'a> {
+    pub(super) tool: Option<String>,
+    pub(super) cases: Box<dyn Iterator<Item = Result<Cases, Vec<Skipped>>> + 'a>,
+}
+
+/// What is to be scored, tool by tool.
+pub(super) fn plan(dataset: &Dataset, setup: &Setup) -> Vec<ToolWork> {
+    by_tool(dataset)
+        .into_iter()
+        .map(|(tool, ids)| ToolWork { tool, ids: spread(&ids, setup.grasps_per_tool) })
+        .collect()
+}
+
+/// Calls `score` for each tool with its pairs; the next ones are read meanwhile, on all cores.
+pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &JobCx, mut score: impl FnMut(Batch<'_>)) {
+    // Both fingers of a grasp go through the generator together.
+    let grasps = setup.batch.div_ceil(2).max(1);
+    std::thread::scope(|scope| {
+        let (sender, receiver) = sync_channel(1);
+        scope.spawn(move || {
+            for ids in work.iter().flat_map(|tool| tool.ids.chunks(grasps)) {
+                if cx.cancel.is_cancelled() {
+                    return;
+                }
+                let loaded: Vec<Result<Case, Skipped>> = ids.par_iter().map(|&id| load(dataset, id)).collect();
+                let mut cases = Cases { good: Vec::new(), bad: Vec::new() };
+                for one in loaded {
+                    match one {
+                        Ok(case) => cases.good.push(case),
+                        Err(bad) => cases.bad.push(bad),
+                    }
+                }
+                // Nobody listens any more: the evaluation was stopped.
+                if sender.send(cases).is_err() {
+                    return;
+                }
+            }
+        });
+        for tool in work {
+            let chunks = tool.ids.len().div_ceil(grasps);
+            let lost = || {
+                vec![Skipped {
+                    what: tool.tool.clone().unwrap_or_default(),
+                    method: String::new(),
+                    why: "its pairs could not be read: the reading ended early".into(),
+                }]
+            };
+            let cases = (0..chunks).map(|_| receiver.recv().map_err(|_| lost()));
+            score(Batch { tool: tool.tool.clone(), cases: Box::new(cases) });
+            if cx.cancel.is_cancelled() {
+                break;
+            }
+        }
+    });
+}
+
+fn load(dataset: &Dataset, id: PairId) -> Result<Case, Skipped> {
+    let Some(entry) = dataset.index.get(id) else {
+        return Err(Skipped { what: format!("pair {}", id.0), method: String::new(), why: "no such pair".into() });
+    };
+    let skip = |why: String| Skipped { what: entry.name.clone(), method: String::new(), why };
+    let fail = |err: crate::io::dataset::LoadError| skip(format!("{err} ({})", err.hint()));
+    let sample = dataset.load(id).map_err(fail)?;
+    if sample.fingers.iter().flatten().all(|t| t.gelslim.is_none() || t.bubble.is_none()) {
+        return Err(skip("no finger has both a GelSlim image and a measured imprint".into()));
+    }
+    let pictures = sample.scale == Scale::Assumed;
+    let (tile, lab, clipped) = if pictures {
+        let clipped = dataset.gelslim_is_clipped(id).map_err(fail)?;
+        (dataset.bubble_tile(id).map_err(fail)?, dataset.vqvae_tile(id).map_err(fail)?, clipped)
+    } else {
+        (None, None, None)
+    };
+    let group = Group::of(entry, dataset.kind == SourceKind::Demo, clipped);
+    Ok(Case { name: entry.name.clone(), group, sample, tile, lab })
+}

@@ -1,0 +1,224 @@
+//! The models of an evaluation, and what each method makes of a few touches.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
+
+use super::super::super::error::TaskError;
+use super::super::JobCx;
+use super::load::Case;
+use super::{MaskBy, Setup, WHAT};
+use crate::domain::diffusion::GenerateConfig;
+use crate::domain::grid::{DepthMap, Grid, RgbGrid};
+use crate::domain::postprocess::{RawPrediction, ShiftMode};
+use crate::domain::resample::bilinear;
+use crate::domain::sample::Scale;
+use crate::domain::sensor::Finger;
+use crate::infer::bundle::Bundle;
+use crate::infer::classifier::ToolClassifier;
+use crate::infer::generator::{GenerateError, Generator};
+use crate::infer::mask::MaskModel;
+use crate::io::dataset::{Dataset, SourceKind};
+
+/// What stands for one row of the table.
+pub(super) enum Method {
+    /// The measured imprints themselves: the upper bound of everything behind them.
+    Measured,
+    /// A bundle.
+    Generator(Box<GeneratorMethod>),
+    /// Predictions that lie by the pictures.
+    Stored,
+}
+
+pub(super) struct GeneratorMethod {
+    name: String,
+    generator: Generator,
+    config: GenerateConfig,
+}
+
+/// What a method makes of one touch.
+pub(super) struct Made {
+    /// Imprints in metres, raw orientation, by finger.
+    pub(super) imprints: [Option<DepthMap>; 2],
+    /// A picture in the orientation and size of its file, where that is all there is.
+    pub(super) tile: Option<Grid<f32>>,
+    /// Time per image, seconds.
+    pub(super) seconds: Option<f64>,
+}
+
+/// Everything that runs.
+pub(super) struct Models {
+    pub(super) methods: Vec<Method>,
+    pub(super) mask: Option<MaskModel>,
+    pub(super) classifier: Option<ToolClassifier>,
+    engine: String,
+}
+
+fn open<T, E: std::error::Error>(
+    folder: &Path,
+    load: impl FnOnce(&Bundle) -> Result<T, E>,
+) -> Result<(T, String), TaskError> {
+    let what = format!("{WHAT}: {}", folder.display());
+    let bundle = Bundle::open(folder).map_err(|err| TaskError::from_error(&what, &err))?;
+    let model = load(&bundle).map_err(|err| TaskError::from_error(&what, &err))?;
+    Ok((model, bundle.name().to_owned()))
+}
+
+impl Models {
+    /// Loads everything that the setup names.
+    pub(super) fn open(setup: &Setup, dataset: &Dataset) -> Result<Self, TaskError> {
+        let mut methods = Vec::new();
+        let pictures = dataset.kind == SourceKind::Pictures;
+        if !pictures {
+            methods.push(Method::Measured);
+        }
+        let mut engine = String::new();
+        let mut names: Vec<String> = Vec::new();
+        for folder in &setup.bundles {
+            let (generator, name) = open(folder, |bundle| Generator::open(bundle, setup.runtime))?;
+            let defaults = generator.spec().defaults;
+            let config = GenerateConfig {
+                steps: setup.steps.filter(|_| defaults.steps > 1).unwrap_or(defaults.steps),
+                seed: setup.seed.unwrap_or(defaults.seed),
+                sampler: setup.sampler.unwrap_or(defaults.sampler),
+                ..defaults
+            };
+            engine = generator.engine().label().to_owned();
+            // Two runs of one trainer have the same name: their folders tell them apart.
+            let folder = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            let name = if names.contains(&name) { format!("{name} ({folder})") } else { name };
+            names.push(name.clone());
+            methods.push(Method::Generator(Box::new(GeneratorMethod { name, generator, config })));
+        }
+        if pictures {
+            methods.push(Method::Stored);
+        }
+        let mask = match (&setup.mask_bundle, setup.mask) {
+            (Some(folder), MaskBy::Unet) if !pictures => {
+                Some(open(folder, |bundle| MaskModel::open(bundle, setup.runtime))?.0)
+            }
+            _ => None,
+        };
+        let classifier = match &setup.classifier {
+            Some(folder) if !pictures => Some(open(folder, |bundle| ToolClassifier::open(bundle, setup.runtime))?.0),
+            _ => None,
+        };
+        if engine.is_empty() {
+            engine = mask.as_ref().map_or("no model", |m| m.engine().label()).to_owned();
+        }
+        Ok(Self { methods, mask, classifier, engine })
+    }
+
+    /// The engine's name.
+    pub(super) fn engine(&self) -> &str {
+        &self.engine
+    }
+
+    /// What is missing from the table, and why.
+    pub(super) fn missing(&self, setup: &Setup, scale: Scale) -> Vec<String> {
+        let mut notes = vec![if setup.both_fingers {
+            "images of both fingers; one angle per grasp, from the contact of both".to_owned()
+        } else {
+            "images of the right finger only; one angle per grasp, from the contact of both".to_owned()
+        }];
+        if scale == Scale::Assumed {
+            notes.push("pictures have no camera, pose or tool: no angle, tool or Fréchet distance".into());
+            return notes;
+        }
+        notes.push(match setup.mask {
+            MaskBy::Unet if self.mask.is_none() => "no mask model: no angle".into(),
+            MaskBy::Unet => "contact masks of the mask model, for measured and predicted imprints alike".into(),
+            MaskBy::Cad => "contact masks of the CAD model at the true pose: the truth leaks into every angle".into(),
+            MaskBy::Truth => "contact masks of the simulator's truth: the truth leaks into every angle".into(),
+            MaskBy::Threshold(m) => format!("contact masks: imprint deeper than {:.1} mm", m * 1e3),
+        });
+        if self.classifier.is_none() {
+            notes.push("no tool classifier: no tool accuracy and no Fréchet distance".into());
+        }
+        notes
+    }
+}
+
+impl Method {
+    /// The name of the row.
+    pub(super) fn name(&self) -> &str {
+        match self {
+            Self::Measured => "Measured (upper bound)",
+            Self::Generator(method) => &method.name,
+            Self::Stored => "Stored predictions (lab's VQ-VAE)",
+        }
+    }
+
+    /// What it makes of each touch, or why not; `None` once it was told to stop.
+    pub(super) fn make(&mut self, cases: &[Case], setup: &Setup, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
+        Some(match self {
+            Self::Measured => cases.iter().map(|case| Ok(measured(case))).collect(),
+            Self::Stored => cases.iter().map(stored).collect(),
+            Self::Generator(method) => return method.make(cases, setup.shift, cx),
+        })
+    }
+}
+
+fn measured(case: &Case) -> Made {
+    let imprint = |f: Finger| Some(case.sample.finger(f)?.bubble.as_ref()?.imprint.clone());
+    Made { imprints: Finger::BOTH.map(imprint), tile: None, seconds: None }
+}
+
+fn stored(case: &Case) -> Result<Made, String> {
+    let tile = case.lab.clone().ok_or("no stored prediction (NAME_vqvae.png) lies by this picture")?;
+    Ok(Made { imprints: [None, None], tile: Some(tile), seconds: None })
+}
+
+impl GeneratorMethod {
+    fn make(&mut self, cases: &[Case], shift: ShiftMode, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
+        let touches: Vec<(usize, Finger, &RgbGrid)> = cases
+            .iter()
+            .enumerate()
+            .flat_map(|(at, case)| {
+                Finger::BOTH
+                    .into_iter()
+                    .filter_map(move |f| Some((at, f, &case.sample.finger(f)?.gelslim.as_ref()?.difference)))
+            })
+            .collect();
+        let images: Vec<&RgbGrid> = touches.iter().map(|t| t.2).collect();
+        let start = Instant::now();
+        let raws = self.generate(&images, cx)?;
+        let seconds = start.elapsed().as_secs_f64() / images.len().max(1) as f64;
+        let mut made: Vec<Result<Made, String>> =
+            cases.iter().map(|_| Ok(Made { imprints: [None, None], tile: None, seconds: Some(seconds) })).collect();
+        for ((at, finger, _), raw) in touches.into_iter().zip(raws) {
+            let depth = raw.and_then(|raw| {
+                let depth = self.generator.depth(&raw, shift).map_err(|err| err.to_string())?;
+                let bubble = cases[at].sample.finger(finger).and_then(|t| t.bubble.as_ref());
+                Ok(match bubble.map(|b| b.imprint.size()) {
+                    Some([w, h]) if depth.size() != [w, h] && w * h > 0 => bilinear(&depth, w, h),
+                    _ => depth,
+                })
+            });
+            match (depth, &mut made[at]) {
+                (Ok(depth), Ok(made)) => made.imprints[finger.index()] = Some(depth),
+                (Err(why), slot) => *slot = Err(why),
+                (Ok(_), Err(_)) => {}
+            }
+        }
+        Some(made)
+    }
+
+    /// The decoder's pictures. One that fails does not take the others of its batch with it. `None` once told to stop.
+    fn generate(&mut self, images: &[&RgbGrid], cx: &JobCx) -> Option<Vec<Result<RawPrediction, String>>> {
+        let mut go = |_| if cx.cancel.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        match self.generator.generate_batch(images, &self.config, &mut go) {
+            Ok(raws) => return Some(raws.into_iter().map(Ok).collect()),
+            Err(GenerateError::Cancelled) => return None,
+            Err(_) => {}
+        }
+        let mut out = Vec::new();
+        for image in images {
+            match self.generator.generate(image, &self.config, &mut go) {
+                Err(GenerateError::Cancelled) => return None,
+                one => out.push(one.map_err(|err| err.to_string())),
+            }
+        }
+        Some(out)
+    }
+}

@@ -1,0 +1,255 @@
+//! Scoring the grasps of one tool: image figures wait until all its predictions are there, because the lab's SSIM takes
+//! its range from them.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::super::JobCx;
+use super::super::compute;
+use super::load::Case;
+use super::methods::{Made, Method, Models};
+use super::{MaskBy, Setup, Skipped};
+use crate::app::keys::MaskRecipe;
+use crate::domain::contact::LAB_CAD_DISTANCE_M;
+use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
+use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::metrics::{SsimRange, ssim_ranges, unit_range};
+use crate::domain::pose::{FingerInput, ToolModel, estimate};
+use crate::domain::resample::bilinear;
+use crate::domain::sample::{Sample, Scale};
+use crate::domain::sensor::Finger;
+use crate::domain::sim::pattern_of;
+use crate::domain::units::angle_error;
+use crate::infer::classifier::Verdict;
+use crate::io::dataset::Dataset;
+
+/// A prediction that waits for its image figures.
+struct Image {
+    finger: usize,
+    prediction: Grid<f32>,
+    /// `None` for the measured imprint itself, which is not compared with itself.
+    truth: Option<Grid<f32>>,
+    noise_free: Option<Grid<f32>>,
+    verdict: Option<Verdict>,
+}
+
+/// A grasp that waits for its image figures.
+struct Pending {
+    score: GraspScore,
+    images: Vec<Image>,
+}
+
+/// The grasps of one tool, by method.
+pub(super) struct Tool {
+    /// Its pattern's name.
+    pattern: Option<String>,
+    model: Option<ToolModel>,
+    class: Option<usize>,
+    pending: BTreeMap<usize, Vec<Pending>>,
+}
+
+impl Tool {
+    /// Reads the CAD model.
+    pub(super) fn new(dataset: &Dataset, tool: Option<String>, skipped: &mut Vec<Skipped>) -> Self {
+        let model = tool.as_deref().and_then(|name| {
+            let model = match dataset.tool_mesh(name) {
+                Ok(Some(mesh)) => ToolModel::new(mesh).map_err(|err| err.to_string()),
+                Ok(None) => Err(format!("no CAD model (expected tools_stls/{name}.stl), so its grasps have no pose")),
+                Err(err) => Err(format!("{err} ({})", err.hint())),
+            };
+            model.map_err(|why| skipped.push(Skipped { what: name.into(), method: String::new(), why })).ok()
+        });
+        let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
+        Self { pattern, model, class: None, pending: BTreeMap::new() }
+    }
+
+    /// Takes some of its grasps through every method. `say` is told which.
+    pub(super) fn score(
+        &mut self,
+        cases: &[Case],
+        setup: &Setup,
+        models: &mut Models,
+        skipped: &mut Vec<Skipped>,
+        cx: &JobCx,
+        say: &mut dyn FnMut(&str),
+    ) {
+        let Models { methods, mask, classifier, .. } = models;
+        self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
+        for (at, method) in methods.iter_mut().enumerate() {
+            say(method.name());
+            let upper = matches!(method, Method::Measured);
+            let Some(made) = method.make(cases, setup, cx) else { return };
+            let mut skip = |case: &Case, why: String| {
+                skipped.push(Skipped { what: case.name.clone(), method: method.name().to_owned(), why });
+            };
+            let mut kept: Vec<(&Case, Made, [Option<Mask>; 2])> = Vec::new();
+            for (case, made) in cases.iter().zip(made) {
+                let made = match made {
+                    Ok(made) => made,
+                    Err(why) => {
+                        skip(case, why);
+                        continue;
+                    }
+                };
+                let masks = Finger::BOTH.map(|f| {
+                    if self.model.is_none() || case.sample.grasp_from_object.is_none() {
+                        return None;
+                    }
+                    let imprint = made.imprints[f.index()].as_ref()?;
+                    let found = match (setup.mask, mask.as_mut()) {
+                        (MaskBy::Unet, Some(model)) => model.predict(imprint).map_err(|err| err.to_string()),
+                        (MaskBy::Unet, None) => return None,
+                        _ => self.mask(setup.mask, &case.sample, f, imprint),
+                    };
+                    found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", f.name()))).ok()
+                });
+                kept.push((case, made, masks));
+            }
+            // Poses on all cores; the models run one by one.
+            let with_masks = setup.mask != MaskBy::Unet || mask.is_some();
+            let angles: Vec<Option<f64>> = kept
+                .par_iter()
+                .map(|(case, made, masks)| with_masks.then(|| self.angle(setup, &case.sample, made, masks)).flatten())
+                .collect();
+            for ((case, made, _), angle_error_rad) in kept.into_iter().zip(angles) {
+                let mut images = images(case, &made, setup, upper);
+                if let Some(classifier) = classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured) {
+                    let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
+                    match classifier.classify(&pictures) {
+                        Ok(verdicts) => images.iter_mut().zip(verdicts).for_each(|(i, v)| i.verdict = Some(v)),
+                        Err(err) => skip(case, format!("tool classifier: {err}")),
+                    }
+                }
+                let score = GraspScore {
+                    pair: case.name.clone(),
+                    tool: self.pattern.clone(),
+                    group: case.group,
+                    scale: case.sample.scale,
+                    images: Vec::new(),
+                    angle_error_rad,
+                    seconds: made.seconds,
+                };
+                self.pending.entry(at).or_default().push(Pending { score, images });
+            }
+        }
+    }
+
+    /// A mask that needs no model.
+    fn mask(&self, by: MaskBy, sample: &Sample, finger: Finger, imprint: &DepthMap) -> Result<Mask, String> {
+        let recipe = match by {
+            MaskBy::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
+            MaskBy::Threshold(m) => MaskRecipe::Threshold(m.into()),
+            MaskBy::Truth | MaskBy::Unet => MaskRecipe::Truth,
+        };
+        let bubble = sample.finger(finger).and_then(|t| t.bubble.as_ref());
+        compute::mask(&recipe, imprint, bubble, self.model.as_ref(), sample.grasp_from_object)
+            .map_err(|err| err.to_string())
+    }
+
+    /// The error of the angle from both fingers: NaN without a pose, `None` where there can be none.
+    fn angle(&self, setup: &Setup, sample: &Sample, made: &Made, masks: &[Option<Mask>; 2]) -> Option<f64> {
+        let (model, truth) = (self.model.as_ref()?, sample.grasp_from_object?);
+        let fingers = Finger::BOTH.map(|f| {
+            let camera = sample.finger(f)?.bubble.as_ref()?.camera.as_ref()?;
+            let mask = Some(masks[f.index()].as_ref()?);
+            Some(FingerInput { imprint: made.imprints[f.index()].as_ref()?, camera, mask })
+        });
+        if Finger::BOTH.iter().all(|f| {
+            let bubble = sample.finger(*f).and_then(|t| t.bubble.as_ref());
+            bubble.is_none_or(|b| b.camera.is_none())
+        }) {
+            return None;
+        }
+        let found = estimate(&fingers, model, setup.engine, false).ok();
+        let truth = truth.inverse().theta_rad;
+        Some(found.map_or(f64::NAN, |p| angle_error(p.object_from_grasp.theta_rad, truth).abs()))
+    }
+
+    /// The image figures, now that all predictions of the tool are there.
+    pub(super) fn finish(self, scores: &mut [Scores]) {
+        let class = self.class;
+        let mut measured_features = Vec::new();
+        for (at, pending) in self.pending {
+            let range = spread(pending.iter().flat_map(|p| &p.images).map(|i| &i.prediction));
+            let done: Vec<GraspScore> = pending
+                .into_par_iter()
+                .map(|Pending { mut score, images }| {
+                    let assumed = score.scale == Scale::Assumed;
+                    let ranges = if assumed {
+                        [SsimRange::Explicit(1.0); 2]
+                    } else {
+                        [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)]
+                    };
+                    score.images = images.into_iter().map(|image| finished(image, class, ranges, assumed)).collect();
+                    score
+                })
+                .collect();
+            // The measured imprints come first: what the others' features are compared with.
+            if at == 0 {
+                measured_features = done
+                    .iter()
+                    .flat_map(|g| g.images.iter().map(move |i| (g.group, i.features.clone())))
+                    .filter(|(_, f)| !f.is_empty())
+                    .collect();
+            } else {
+                scores[at].measured_features.extend(measured_features.iter().cloned());
+            }
+            scores[at].grasps.extend(done);
+        }
+    }
+}
+
+/// The compared images of a grasp: in metres, or stretched to 0..1 where the scale was lost.
+fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
+    let image = |finger: Finger| {
+        let bubble = case.sample.finger(finger)?.bubble.as_ref()?;
+        if case.sample.scale == Scale::Assumed {
+            // On the picture's own pixels and in its orientation, so that stored predictions are not resampled.
+            let tile = case.tile.as_ref()?;
+            let prediction = match (&made.tile, &made.imprints[finger.index()]) {
+                (Some(stored), _) => stored.clone(),
+                (None, Some(imprint)) => bilinear(&imprint.rotated_180(), tile.width(), tile.height()),
+                (None, None) => return None,
+            };
+            let (prediction, truth) = (unit_range(&prediction), unit_range(tile));
+            return Some(Image {
+                finger: finger.index(),
+                prediction,
+                truth: Some(truth),
+                noise_free: None,
+                verdict: None,
+            });
+        }
+        let prediction = made.imprints[finger.index()].clone()?;
+        let truth = (!upper).then(|| bubble.imprint.clone());
+        let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
+        Some(Image { finger: finger.index(), prediction, truth, noise_free, verdict: None })
+    };
+    let present = |f: &&Finger| case.sample.finger(**f).is_some();
+    fingers(setup.both_fingers).iter().filter(present).filter_map(|f| image(*f)).collect()
+}
+
+/// Largest minus smallest value of some images.
+fn spread<'a>(images: impl Iterator<Item = &'a Grid<f32>>) -> f64 {
+    let (lo, hi) = images
+        .flat_map(|i| i.as_slice())
+        .filter(|v| v.is_finite())
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
+    f64::from(hi) - f64::from(lo)
+}
+
+fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed: bool) -> ImageScore {
+    let Image { finger, prediction, truth, noise_free, verdict } = image;
+    let ssim = truth.as_ref().and_then(|truth| ssim_ranges(&prediction, truth, &ranges).ok());
+    let of = |at: usize| ssim.as_ref().map(|found| found[at].mean);
+    ImageScore {
+        finger,
+        error: truth.and_then(|truth| squared_error(&prediction, &truth)).unwrap_or_default(),
+        noise_free: noise_free.and_then(|clean| squared_error(&prediction, &clean)),
+        ssim: of(0),
+        ssim_peak: of(1).filter(|_| !assumed),
+        tool_right: verdict.as_ref().zip(class).map(|(v, class)| v.class == class),
+        features: verdict.map_or_else(Vec::new, |v| v.features),
+    }
+}

@@ -1,0 +1,250 @@
+//! The table as text, Markdown and CSV.
+
+use super::{Estimate, Figures, Group, Row};
+use crate::domain::sample::Scale;
+
+/// A column of the table.
+#[derive(Clone, Copy)]
+pub struct Column {
+    /// With the unit.
+    pub heading: &'static str,
+    /// What it shows.
+    pub tip: &'static str,
+    /// Digits after the point.
+    pub decimals: usize,
+    /// Whether more of it is better.
+    pub larger_is_better: bool,
+    /// Its figure.
+    pub get: fn(&Figures) -> Option<Estimate>,
+    /// Its name in files.
+    key: &'static str,
+}
+
+fn plain(value: Option<f64>) -> Option<Estimate> {
+    value.map(|value| Estimate { value, interval: None })
+}
+
+const fn column(
+    heading: &'static str,
+    key: &'static str,
+    decimals: usize,
+    larger_is_better: bool,
+    get: fn(&Figures) -> Option<Estimate>,
+    tip: &'static str,
+) -> Column {
+    Column { heading, tip, decimals, larger_is_better, get, key }
+}
+
+/// The columns of a group, in the paper's order.
+const COLUMNS: [Column; 11] = [
+    column("PSNR dB", "psnr_db", 1, true, |f| f.psnr_db, "Against the measured imprint, decibels; peak 22.5 mm"),
+    column(
+        "clean dB",
+        "psnr_noise_free_db",
+        1,
+        true,
+        |f| f.psnr_noise_free_db,
+        "PSNR against the simulator's imprint before camera noise, decibels",
+    ),
+    column("SSIM", "ssim", 2, true, |f| f.ssim, "Structural similarity; range of the tool's predictions (the lab's)"),
+    column("SSIM 22.5", "ssim_peak", 2, true, |f| f.ssim_peak, "Structural similarity with the range 22.5 mm"),
+    column(
+        "FD",
+        "frechet_classifier",
+        2,
+        false,
+        |f| plain(f.frechet),
+        "Fréchet distance in the features of the tool classifier: not to be compared with a published FID",
+    ),
+    column("FID", "fid", 0, false, |f| plain(f.fid), "As published, with the features of an Inception network"),
+    column("angle °", "angle_deg", 1, false, |f| f.angle_deg, "Mean error of the in-hand angle, degrees"),
+    column("≤5° %", "success_5", 1, true, |f| f.success_5, "Share of grasps within 5 degrees, percent"),
+    column("≤10° %", "success_10", 1, true, |f| f.success_10, "Share of grasps within 10 degrees, percent"),
+    column(
+        "tool %",
+        "tool_accuracy",
+        1,
+        true,
+        |f| f.tool_accuracy,
+        "Share of imprints whose tool the classifier names, percent",
+    ),
+    column(
+        "s/image",
+        "seconds_per_image",
+        3,
+        false,
+        |f| plain(f.seconds),
+        "Median time to generate an image, seconds",
+    ),
+];
+
+/// What the columns mean, a line each.
+pub const NOTES: [&str; 6] = [
+    "each figure per tool, then the mean over the tools; square brackets: 95 % bootstrap interval over the grasps",
+    "clean: PSNR against the simulator's imprint before camera noise",
+    "FD: Fréchet distance in the features of the tool classifier, predicted against measured imprints of the group; it \
+     cannot be compared with a published FID, nor between groups of different size",
+    "FID: published, with the features of an Inception network",
+    "angle: error of the in-hand angle from both fingers' contact; without a pose a grasp fails and is in no mean",
+    "tool: share of imprints whose tool the classifier names",
+];
+
+/// What PSNR and SSIM mean.
+pub fn conventions(scale: Scale) -> &'static str {
+    match scale {
+        Scale::Measured => {
+            "PSNR: squared error pooled over a tool's images, peak 22.5 mm; SSIM: 11 x 11 window, zero padding, range of \
+             the tool's predictions (the lab's conventions), and with the range 22.5 mm; against the measured imprint"
+        }
+        Scale::Assumed => {
+            "PSNR and SSIM: each image stretched to 0..1 on its own, peak and range 1, then the mean (the source lost \
+             its scale)"
+        }
+    }
+}
+
+/// The columns that some row fills.
+pub fn columns(rows: &[Row]) -> Vec<&'static Column> {
+    let any = |column: &&Column| rows.iter().flat_map(|r| &r.groups).any(|f| (column.get)(f).is_some());
+    COLUMNS.iter().filter(any).collect()
+}
+
+fn groups(rows: &[Row]) -> Vec<Group> {
+    let mut groups: Vec<Group> =
+        rows.iter().flat_map(|r| &r.groups).filter(|f| f.grasps > 0).map(|f| f.group).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    groups
+}
+
+fn of(row: &Row, group: Group) -> Option<&Figures> {
+    row.groups.iter().find(|f| f.group == group)
+}
+
+/// A figure without its interval; `-` for none.
+fn number(estimate: Option<Estimate>, decimals: usize) -> String {
+    estimate.map_or_else(|| "-".into(), |e| format!("{:.decimals$}", e.value))
+}
+
+fn with_interval(estimate: Option<Estimate>, decimals: usize) -> String {
+    match estimate {
+        Some(Estimate { value, interval: Some([low, high]) }) => {
+            format!("{value:.decimals$} [{low:.decimals$} {high:.decimals$}]")
+        }
+        other => number(other, decimals),
+    }
+}
+
+/// A table per column group, for people.
+pub fn text(rows: &[Row]) -> String {
+    let columns = columns(rows);
+    let mut out = String::new();
+    for group in groups(rows) {
+        let present: Vec<(&Row, &Figures)> = rows.iter().filter_map(|r| Some((r, of(r, group)?))).collect();
+        let name = present.iter().map(|(r, _)| r.method.chars().count()).max().unwrap_or(0).max(8);
+        let cells: Vec<Vec<String>> = present
+            .iter()
+            .map(|(_, f)| columns.iter().map(|c| with_interval((c.get)(f), c.decimals)).collect())
+            .collect();
+        let width = |i: usize| {
+            cells.iter().map(|row| row[i].chars().count()).max().unwrap_or(0).max(columns[i].heading.chars().count())
+        };
+        let widths: Vec<usize> = (0..columns.len()).map(width).collect();
+        out += &format!("{}\n", group.label());
+        out += &format!("  {:<name$}  {:>6}", "method", "grasps");
+        for (column, width) in columns.iter().zip(&widths) {
+            out += &format!("  {:>width$}", column.heading);
+        }
+        out.push('\n');
+        for ((row, figures), cells) in present.iter().zip(&cells) {
+            out += &format!("  {:<name$}  {:>6}", row.method, figures.grasps);
+            for (cell, width) in cells.iter().zip(&widths) {
+                out += &format!("  {cell:>width$}");
+            }
+            out.push('\n');
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// One table with the column groups side by side, as the paper prints it.
+pub fn markdown(rows: &[Row]) -> String {
+    let (columns, groups) = (columns(rows), groups(rows));
+    let mut out = String::from("| method |");
+    let mut rule = String::from("|---|");
+    for group in &groups {
+        for column in &columns {
+            out += &format!(" {}: {} |", group.short(), column.heading);
+            rule.push_str("--:|");
+        }
+    }
+    out += &format!("\n{rule}\n");
+    for row in rows {
+        let star = if row.published { " (published, real data)" } else { "" };
+        out += &format!("| {}{star} |", row.method.replace('|', "/"));
+        for group in &groups {
+            for column in &columns {
+                out += &format!(" {} |", number(of(row, *group).and_then(column.get), column.decimals));
+            }
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// One line per method and column group with every figure and its interval.
+pub fn csv(rows: &[Row]) -> String {
+    let mut out = String::from("method,published,group,tools,grasps,images,without_pose");
+    for name in COLUMNS.map(|c| c.key) {
+        out += &format!(",{name},{name}_low,{name}_high");
+    }
+    out.push('\n');
+    for row in rows {
+        for f in row.groups.iter().filter(|f| f.grasps > 0) {
+            let method = row.method.replace('"', "\"\"");
+            let group = f.group.short();
+            out += &format!(
+                "\"{method}\",{},{group},{},{},{},{}",
+                row.published, f.tools, f.grasps, f.images, f.without_pose
+            );
+            for column in &COLUMNS {
+                let estimate = (column.get)(f);
+                let text = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
+                let interval = estimate.and_then(|e| e.interval);
+                out += &format!(
+                    ",{},{},{}",
+                    text(estimate.map(|e| e.value)),
+                    text(interval.map(|i| i[0])),
+                    text(interval.map(|i| i[1]))
+                );
+            }
+            out.push('\n');
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::paper_rows;
+    use super::*;
+
+    #[test]
+    fn every_form_holds_every_row_and_leaves_out_empty_columns() {
+        let mut rows = paper_rows();
+        rows[0].method = "odd \"name\" | with, signs".into();
+        let text = text(&rows);
+        assert!(text.contains("Unseen tools") && text.contains("20.4") && !text.contains("tool %"), "{text}");
+        let markdown = markdown(&rows);
+        let lines: Vec<&str> = markdown.lines().collect();
+        assert_eq!(lines.len(), 2 + rows.len());
+        let bars = |line: &str| line.matches('|').count();
+        assert!(lines.iter().all(|l| bars(l) == bars(lines[0])), "{markdown}");
+        let csv = csv(&rows);
+        assert_eq!(csv.lines().count(), 1 + 2 * rows.len());
+        assert!(csv.contains("\"odd \"\"name\"\" | with, signs\",true,unseen grasps,9,414,828,0,26.1,,"), "{csv}");
+        let commas = |line: &str| line.replace("with, signs", "").matches(',').count();
+        assert!(csv.lines().all(|l| commas(l) == commas(csv.lines().next().unwrap())));
+    }
+}

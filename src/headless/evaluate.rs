@@ -1,0 +1,196 @@
+//! `touch2touch evaluate`: the paper's results table of a dataset.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
+use strum::IntoEnumIterator as _;
+
+use super::contact_mask::MaskFrom;
+use super::predict::{RuntimeArg, ShiftArg, sampler};
+use super::{Common, Output, ToolArgs, VerbResult};
+use crate::app::jobs::evaluate::{Evaluation, MaskBy, Report, Setup, evaluate, rows};
+use crate::app::jobs::{Cancel, JobCx};
+use crate::domain::diffusion::Sampler;
+use crate::domain::evaluation::{self, Row, paper_rows};
+use crate::domain::pose::Engine;
+use crate::infer::bundle::{Bundle, Found, default_roots, find};
+use crate::io::atomic;
+
+/// Arguments of `evaluate`.
+#[derive(Debug, Args)]
+pub(super) struct EvaluateArgs {
+    /// The dataset: a folder in the lab's layout or of image pairs, or a built-in one: `test-set` (46 unseen grasps of
+    /// each of 9 seen and 3 unseen tools, simulated), `test-set-ambiguous`, `-mixed`, `-misaligned`, `-noise`, or `demo`.
+    #[arg(long)]
+    input: PathBuf,
+    /// A generator's bundle; repeat for several rows (default: every generator that is found).
+    #[arg(long = "bundle")]
+    bundles: Vec<PathBuf>,
+    /// The mask model's bundle (default: the first one found).
+    #[arg(long)]
+    mask_bundle: Option<PathBuf>,
+    /// The tool classifier's bundle (default: the first one found).
+    #[arg(long)]
+    classifier: Option<PathBuf>,
+    /// Where contact masks come from, for measured and predicted imprints alike. `auto`: the mask model.
+    #[arg(long, value_enum, default_value_t = MaskFrom::Auto)]
+    mask: MaskFrom,
+    /// Imprint depth from which a pixel counts as contact, for `--mask threshold`.
+    #[arg(long, default_value_t = 7.0)]
+    threshold_mm: f32,
+    /// The registration that gives the angles.
+    #[arg(long, default_value_t = Engine::default(), value_parser = engine())]
+    engine: Engine,
+    /// Whose images are compared. Angles always come from the contact of both fingers.
+    #[arg(long, value_enum, default_value_t = Fingers::Both)]
+    fingers: Fingers,
+    /// Take only this many grasps of each tool, spread evenly.
+    #[arg(long, value_name = "N")]
+    grasps: Option<usize>,
+    /// Sampling steps (default: each bundle's; a bundle that draws in one step keeps it).
+    #[arg(long)]
+    steps: Option<u32>,
+    /// Seed of the noise, the same for every image (default: each bundle's).
+    #[arg(long)]
+    seed: Option<u64>,
+    /// The way from noise to an image (default: each bundle's).
+    #[arg(long, value_parser = PossibleValuesParser::new(Sampler::iter().map(Sampler::key)).map(sampler))]
+    sampler: Option<Sampler>,
+    /// How the decoder's output becomes metres.
+    #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]
+    shift: ShiftArg,
+    /// The engine that runs the models.
+    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    runtime: RuntimeArg,
+    /// Images that go through a generator at once.
+    #[arg(long, default_value_t = Setup::default().batch, value_parser = batch)]
+    batch: usize,
+    /// Drawings for the 95 % intervals; 0 leaves them out.
+    #[arg(long, default_value_t = Setup::default().resamples)]
+    resamples: usize,
+    /// Add what the paper and the lab published on real data.
+    #[arg(long)]
+    paper: bool,
+    /// Write the table to this file as Markdown.
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
+    /// Write the figures and their intervals to this file, one line per method and group.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Add the figures of every grasp to the JSON.
+    #[arg(long)]
+    pairs: bool,
+    #[command(flatten)]
+    tool: ToolArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Fingers {
+    Both,
+    Right,
+}
+
+fn batch(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| (1..=256).contains(n)).ok_or_else(|| "choose 1 to 256 images".to_owned())
+}
+
+/// Reads the key of a registration.
+fn engine() -> impl TypedValueParser<Value = Engine> {
+    PossibleValuesParser::new(Engine::iter().map(Engine::key)).map(|key| key.parse().unwrap_or_default())
+}
+
+pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
+    let mut dataset = super::open(&args.input)?;
+    if let Some(scale) = args.tool.tool_scale {
+        dataset.tool_scale = Some(scale);
+    }
+    let setup = setup(args)?;
+    let output = Arc::new(Output::new(args.common, "evaluating", 0));
+    let bar = output.clone();
+    let watch = move |p: crate::app::tasks::Progress| {
+        bar.set(p.done as usize, p.total as usize);
+        bar.message(&p.text);
+    };
+    let cx = JobCx::new(Cancel::default(), Arc::new(watch));
+    let evaluation = evaluate(&dataset, &setup, &cx).map_err(|err| anyhow::anyhow!("{err}"))?;
+    drop(cx);
+    for skipped in &evaluation.skipped {
+        let by = if skipped.method.is_empty() { String::new() } else { format!(" ({})", skipped.method) };
+        output.note(&format!("{}{by}: {}", skipped.what, skipped.why));
+    }
+    let rows = rows(&evaluation, args.paper);
+    for (file, text) in [(&args.markdown, evaluation::markdown(&rows)), (&args.csv, evaluation::csv(&rows))] {
+        if let Some(file) = file {
+            write(file, &text)?;
+        }
+    }
+    let pairs = args.pairs.then_some(evaluation.scores.as_slice());
+    let published = if args.paper { paper_rows() } else { Vec::new() };
+    let report = Report { evaluation: &evaluation, published, pairs };
+    let Ok(output) = Arc::try_unwrap(output) else { anyhow::bail!("the evaluation is still being watched") };
+    output.finish(&report, || text(&evaluation, &rows))?;
+    Ok(evaluation.complete && evaluation.skipped.is_empty())
+}
+
+fn write(file: &Path, text: &str) -> anyhow::Result<()> {
+    atomic::write_bytes(file, text.as_bytes())
+        .map_err(|err| anyhow::anyhow!("cannot write the table: {err}: {}", file.display()))
+}
+
+fn text(evaluation: &Evaluation, rows: &[Row]) -> String {
+    let mut text = format!("{}\n\n{}", evaluation.dataset, evaluation::text(rows));
+    text += &format!("- {}\n", evaluation.conventions);
+    for note in &evaluation.notes {
+        text += &format!("- {note}\n");
+    }
+    if rows.iter().any(|r| r.published) {
+        text += "- rows of the paper and the lab were published on real data: compare the form, not the decimals\n";
+    }
+    text += &format!("- {}; {:.0} s in all", evaluation.runtime, evaluation.seconds);
+    if !evaluation.skipped.is_empty() {
+        text += &format!("\n- {} things could not be scored, see above", evaluation.skipped.len());
+    }
+    text
+}
+
+/// The bundles that the arguments name, and for the rest those that are found.
+fn setup(args: &EvaluateArgs) -> anyhow::Result<Setup> {
+    let Found { bundles, problems } = find(&default_roots());
+    let first = |named: &Option<PathBuf>, fits: fn(&Bundle) -> bool| {
+        named.clone().or_else(|| bundles.iter().find(|b| fits(b)).map(|b| b.dir().to_owned()))
+    };
+    let generators: Vec<PathBuf> = if args.bundles.is_empty() {
+        bundles.iter().filter(|b| b.generator().is_some()).map(|b| b.dir().to_owned()).collect()
+    } else {
+        args.bundles.clone()
+    };
+    if generators.is_empty() {
+        let refused: Vec<String> = problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
+        anyhow::bail!("no generator bundle was found; name one with --bundle{}", refused.concat());
+    }
+    Ok(Setup {
+        bundles: generators,
+        mask_bundle: first(&args.mask_bundle, |b| b.mask_unet().is_some()),
+        classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
+        mask: match args.mask {
+            MaskFrom::Auto | MaskFrom::Unet => MaskBy::Unet,
+            MaskFrom::Cad => MaskBy::Cad,
+            MaskFrom::Truth => MaskBy::Truth,
+            MaskFrom::Threshold => MaskBy::Threshold(args.threshold_mm / 1e3),
+        },
+        engine: args.engine,
+        shift: args.shift.mode(),
+        steps: args.steps,
+        seed: args.seed,
+        sampler: args.sampler,
+        runtime: args.runtime.choice(),
+        grasps_per_tool: args.grasps,
+        both_fingers: args.fingers == Fingers::Both,
+        batch: args.batch,
+        resamples: args.resamples,
+    })
+}

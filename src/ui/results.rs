@@ -1,0 +1,231 @@
+//! The paper's results table of the open data set: what is compared, how far it is, and the figures.
+
+use eframe::egui::{self, Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+
+use super::cx::Cx;
+use super::theme::{SMALL, caption, medium, section};
+use super::widget::{empty, progress};
+use crate::app::action::Action;
+use crate::app::command::Command;
+use crate::app::evaluation::{EvaluateCommand, GRASPS};
+use crate::domain::evaluation::{Column, Figures, Group, Row, columns};
+
+/// Height of a row, points.
+const ROW: f32 = 20.0;
+/// Share of the width that the method's name takes, in widths of a number.
+const NAME: f32 = 3.4;
+
+/// The pane.
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+    super::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        choices(cx, ui);
+        ui.separator();
+        let rows = cx.state.table_rows();
+        if rows.is_empty() {
+            let (what, why) = match cx.state.evaluating() {
+                Some(_) => ("The table appears when all grasps are scored", "Cancel keeps what was scored until then"),
+                None => (
+                    "No results yet",
+                    "PSNR, SSIM, angle error and success of every chosen generator, as the paper's table has them",
+                ),
+            };
+            let action = Action::EvaluateDataset.command(cx.state);
+            let action = action.map(|_| ("Evaluate", Action::EvaluateDataset.tooltip()));
+            if empty::show(ui, what, why, action) {
+                cx.act(Action::EvaluateDataset);
+            }
+            return;
+        }
+        table(cx, ui, &rows);
+    });
+}
+
+/// What is compared, and the buttons.
+fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
+        let bundles: Vec<_> = cx.state.evaluated().map(|(b, chosen)| (b.clone(), chosen)).collect();
+        if bundles.is_empty() {
+            ui.label(RichText::new("No generator was found").color(cx.p.caution));
+        }
+        for (bundle, chosen) in bundles {
+            let mut on = chosen;
+            let tip = format!("Give this generator a row ({})", bundle.folder.display());
+            if ui.checkbox(&mut on, &bundle.name).on_hover_text(tip).changed() {
+                cx.push(Command::Evaluate(EvaluateCommand::Choose(bundle.id.clone(), on)));
+            }
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.label(caption("Grasps per tool", cx.p));
+        let name = |n: Option<usize>| n.map_or_else(|| "all".to_owned(), |n| n.to_string());
+        let now = cx.state.table.grasps_per_tool;
+        let combo = egui::ComboBox::from_id_salt("grasps").width(48.0).selected_text(name(now));
+        let response = combo.show_ui(ui, |ui| {
+            for n in GRASPS {
+                if ui.selectable_label(n == now, name(n)).clicked() {
+                    cx.push(Command::Evaluate(EvaluateCommand::Grasps(n)));
+                }
+            }
+        });
+        let tip = "Grasps of each tool, spread evenly; the paper has 46. Default 4";
+        response.response.accessible_name("Grasps per tool").on_hover_text(tip);
+        let mut published = cx.state.table.published;
+        let tip = "Adds what the paper and the lab's notebook printed, on real data: compare the form, not the decimals";
+        if ui.checkbox(&mut published, "published rows").on_hover_text(tip).changed() {
+            cx.push(Command::Evaluate(EvaluateCommand::Published(published)));
+        }
+        match cx.state.evaluating() {
+            Some((ticket, task)) => {
+                let (fraction, cancelling) = (task.progress.fraction(), task.cancelling);
+                let done = format!("{} of {}", task.progress.done, task.progress.total);
+                let text = match (cancelling, fraction) {
+                    (true, _) => "stopping".to_owned(),
+                    (false, Some(_)) => format!("{done} grasps   {}", task.progress.text),
+                    (false, None) => task.progress.text.clone(),
+                };
+                progress::bar(ui, (ui.available_width() - 70.0).max(80.0), fraction, &text);
+                let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
+                if cancel.on_hover_text("Stop, and show what was scored until then").clicked() {
+                    cx.push(Command::Cancel(ticket));
+                }
+            }
+            None => {
+                cx.action_button(ui, Action::EvaluateDataset, "Evaluate");
+                cx.action_button(ui, Action::ExportTable, "Export…");
+            }
+        }
+    });
+}
+
+/// The column groups, one below the other.
+fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
+    let Some(result) = &cx.state.table.result else { return };
+    let shown = columns(rows);
+    ScrollArea::vertical().auto_shrink(false).id_salt("results").show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 0.0;
+        let mut groups: Vec<Group> = result.groups.clone();
+        groups.sort_unstable();
+        for group in groups {
+            let figures: Vec<(&Row, &Figures)> =
+                rows.iter().filter_map(|r| Some((r, r.groups.iter().find(|f| f.group == group)?))).collect();
+            heading(cx, ui, group, &shown);
+            let best = Best::of(&shown, &figures);
+            for (row, figures) in figures {
+                line(cx, ui, row, figures, &shown, &best);
+            }
+            ui.add_space(10.0);
+        }
+        ui.spacing_mut().item_spacing.y = 2.0;
+        let mut notes = vec![result.conventions.to_owned()];
+        notes.extend(result.notes.iter().cloned());
+        notes.push(format!("{}; {:.0} s in all", result.runtime, result.seconds));
+        if !result.complete {
+            ui.label(RichText::new("Stopped early: not all grasps are in").size(SMALL).color(cx.p.caution));
+        }
+        for note in notes {
+            ui.add(egui::Label::new(caption(note, cx.p)).wrap());
+        }
+    });
+}
+
+/// Left end and width of the method's name and of each number.
+fn cells(rect: Rect, count: usize) -> (Rect, Vec<Rect>) {
+    let w = rect.width() / (NAME + count as f32);
+    let name = Rect::from_min_size(rect.min, vec2(w * NAME, rect.height()));
+    let number = |i: usize| {
+        Rect::from_min_size(pos2(name.right() + w * i as f32, rect.top()), vec2(w, rect.height()))
+    };
+    (name, (0..count).map(number).collect())
+}
+
+fn heading(cx: &Cx<'_>, ui: &mut Ui, group: Group, shown: &[&Column]) {
+    ui.label(section(group.label(), cx.p));
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+    ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, cx.p.line));
+    let (name, numbers) = cells(rect, shown.len() + 1);
+    let font = FontId::new(SMALL, medium());
+    let left = pos2(name.left() + 4.0, name.center().y);
+    ui.painter_at(name).text(left, Align2::LEFT_CENTER, "Method", font.clone(), cx.p.weak);
+    let grasps = ("grasps", "Grasps that were scored");
+    let texts = std::iter::once(grasps).chain(shown.iter().map(|c| (c.heading, c.tip)));
+    for (at, ((text, tip), cell)) in texts.zip(numbers).enumerate() {
+        let right = pos2(cell.right() - 6.0, cell.center().y);
+        ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), cx.p.weak);
+        ui.interact(cell, ui.scope_id().with((group.label(), at)), Sense::hover()).on_hover_text(tip);
+    }
+}
+
+/// The best computed figure of each column, to be seen at a glance; the upper bound and published rows do not compete.
+struct Best(Vec<Option<f64>>);
+
+impl Best {
+    fn of(shown: &[&Column], figures: &[(&Row, &Figures)]) -> Self {
+        let of = |column: &&Column| {
+            let values: Vec<f64> = figures
+                .iter()
+                .filter(|(row, _)| competes(row))
+                .filter_map(|(_, f)| Some((column.get)(f)?.value))
+                .collect();
+            let pick = if column.larger_is_better { f64::max } else { f64::min };
+            (values.len() > 1).then(|| values.into_iter().reduce(pick)).flatten()
+        };
+        Self(shown.iter().map(of).collect())
+    }
+}
+
+fn competes(row: &Row) -> bool {
+    !row.published && !row.upper_bound
+}
+
+fn line(cx: &Cx<'_>, ui: &mut Ui, row: &Row, figures: &Figures, shown: &[&Column], best: &Best) {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+    if response.hovered() {
+        ui.painter().rect_filled(rect, 3.0, cx.p.control[0]);
+    }
+    let (name, numbers) = cells(rect, shown.len() + 1);
+    let color = match (row.upper_bound, row.published) {
+        (true, _) => cx.p.truth,
+        (_, true) => cx.p.weak,
+        _ => cx.p.prediction,
+    };
+    let font = FontId::proportional(12.0);
+    let left = pos2(name.left() + 4.0, name.center().y);
+    ui.painter_at(name.shrink2(vec2(4.0, 0.0))).text(left, Align2::LEFT_CENTER, &row.method, font.clone(), color);
+    let mut put = |cell: Rect, text: &str, color: Color32| {
+        let right = pos2(cell.right() - 6.0, cell.center().y);
+        ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), color);
+    };
+    put(numbers[0], &figures.grasps.to_string(), cx.p.weak);
+    let mut said = format!("{}: {} grasps, {} images", row.method, figures.grasps, figures.images);
+    for ((column, cell), best) in shown.iter().zip(&numbers[1..]).zip(&best.0) {
+        let found = (column.get)(figures);
+        let Some(e) = found else {
+            put(*cell, "–", cx.p.weak);
+            continue;
+        };
+        let is_best = competes(row) && best.is_some_and(|b| b == e.value);
+        let color = if row.published {
+            cx.p.weak
+        } else if is_best {
+            cx.p.good
+        } else {
+            cx.p.strong
+        };
+        let decimals = column.decimals;
+        put(*cell, &format!("{:.decimals$}", e.value), color);
+        said += &format!("\n{} {:.decimals$}", column.heading, e.value);
+        if let Some([low, high]) = e.interval {
+            said += &format!("   ({low:.decimals$} to {high:.decimals$} with 95 %)");
+        }
+    }
+    if figures.without_pose > 0 {
+        said += &format!("\n{} grasps without a pose", figures.without_pose);
+    }
+    if row.published {
+        said += "\nPublished, on real data";
+    }
+    response.widget_info(|| WidgetInfo::labeled(Role::Row, true, said.lines().next().unwrap_or_default()));
+    response.on_hover_text(said);
+}
