@@ -323,3 +323,87 @@ fn the_basin_map_of_a_pair_is_written() {
     assert!(map["cells"][0]["requested"]["z_m"].as_f64().unwrap() < -0.009);
     assert!(!map["own_starts"].as_array().unwrap().is_empty());
 }
+
+/// With the tiny bundles: the form of the table, not its figures.
+#[test]
+fn the_results_table_is_printed_and_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let (data, set) = (dir.path().join("data"), dir.path().join("set"));
+    let set_text = set.to_str().unwrap();
+    let tools = "pattern_31_rod,pattern_36";
+    let made = run(
+        &["simulate", "--out", set_text, "--tools", tools, "--grasps", "2", "--condition", "mixed", "--json"],
+        &data,
+    );
+    assert!(made.status.success(), "{}", error_text(&made));
+    assert_eq!(json(&made)["tools"].as_array().unwrap().len(), 4, "both tools, and both on a bare shaft");
+
+    let bundle = |name: &str| format!("{}/tests/data/bundles/{name}", env!("CARGO_MANIFEST_DIR"));
+    let (generator, mask, classifier) = (bundle("generator"), bundle("mask"), bundle("classifier"));
+    let (table, lines) = (dir.path().join("table.md"), dir.path().join("table.csv"));
+    let mut args = vec!["evaluate", "--input", set_text, "--bundle", &generator, "--bundle", &generator];
+    args.extend(["--mask-bundle", &mask, "--classifier", &classifier, "--resamples", "50", "--paper"]);
+    args.extend(["--markdown", table.to_str().unwrap(), "--csv", lines.to_str().unwrap()]);
+    let text = run(&args, &data);
+    assert!(text.status.success(), "{}", error_text(&text));
+    let text = String::from_utf8_lossy(&text.stdout).into_owned();
+    for expected in ["Unseen grasps of seen tools", "Unseen tools", "Measured (upper bound)", "Paper: VQ-VAE", "95 %"] {
+        assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
+    }
+    let markdown = std::fs::read_to_string(&table).unwrap();
+    assert!(markdown.lines().all(|l| l.starts_with('|')) && markdown.contains("unseen tools: angle °"), "{markdown}");
+    assert_eq!(std::fs::read_to_string(&lines).unwrap().lines().count(), 1 + 2 * 6, "six rows, two groups");
+
+    args.extend(["--json", "--pairs"]);
+    let report = json(&run(&args, &data));
+    assert_eq!(report["complete"], true);
+    let rows = report["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 3);
+    assert_ne!(rows[1]["method"], rows[2]["method"], "two bundles of one name can be told apart");
+    for (row, upper) in rows.iter().zip([true, false, false]) {
+        for figures in row["groups"].as_array().unwrap() {
+            assert_eq!((&figures["grasps"], &figures["images"]), (&Value::from(2), &Value::from(4)));
+            assert_eq!(figures["psnr_db"].is_null(), upper, "the measured imprints are not compared with themselves");
+            for key in ["psnr_noise_free_db", "success_5", "tool_accuracy"] {
+                assert!(figures[key]["value"].is_number(), "{key} in {figures}");
+            }
+            assert_eq!(figures["frechet"].is_number(), !upper);
+        }
+    }
+    assert_eq!(rows[1]["groups"], {
+        let mut same = rows[2]["groups"].clone();
+        for (a, b) in same.as_array_mut().unwrap().iter_mut().zip(rows[1]["groups"].as_array().unwrap()) {
+            a["seconds"] = b["seconds"].clone();
+        }
+        same
+    });
+    assert_eq!(report["pairs"].as_array().unwrap().len(), 3);
+
+    // A damaged pair is left out and named; the rest is scored.
+    std::fs::write(set.join("test/test_only/gelslims/pattern_36_data_0.pt"), b"no file").unwrap();
+    let rest = run(&args, &data);
+    assert!(!rest.status.success() && error_text(&rest).contains("pattern_36"), "{}", error_text(&rest));
+    let report = json(&rest);
+    assert_eq!(report["rows"][0]["groups"][1]["grasps"], 1);
+    assert_eq!(report["skipped"].as_array().unwrap().len(), 1);
+
+    let wrong = run(&["evaluate", "--input", "test-set", "--bundle", &mask], &data);
+    assert!(error_text(&wrong).contains("not a generator"), "{}", error_text(&wrong));
+}
+
+/// The lab's own predictions in the picture folder, as they were measured before.
+#[test]
+fn stored_predictions_get_a_row() {
+    let Some(pairs) = support::shared().map(|dir| dir.join("real-pairs")) else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let generator = format!("{}/tests/data/bundles/generator", env!("CARGO_MANIFEST_DIR"));
+    let args = ["evaluate", "--input", pairs.to_str().unwrap(), "--bundle", &generator, "--json"];
+    let report = json(&run(&args, dir.path()));
+    assert_eq!(report["groups"], serde_json::json!(["clean_pictures", "clipped_pictures"]));
+    let lab = &report["rows"][1]["groups"];
+    assert_eq!((&lab[0]["grasps"], &lab[1]["grasps"]), (&Value::from(19), &Value::from(17)));
+    let psnr = |at: usize| lab[at]["psnr_db"]["value"].as_f64().unwrap();
+    let mean = (19.0 * psnr(0) + 17.0 * psnr(1)) / 36.0;
+    assert!((mean - 26.0).abs() < 0.1, "26.0 dB over all pictures: {mean}");
+    assert!(lab[0]["angle_deg"].is_null() && lab[0]["frechet"].is_null());
+}

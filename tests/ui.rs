@@ -9,4 +9,5 @@ mod rig;
 
 mod inspect;
 mod job;
+mod results;
 mod workbench;

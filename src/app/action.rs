@@ -3,8 +3,8 @@
 use strum::{EnumIter, IntoEnumIterator};
 
 use super::command::{CameraPreset, Command, Pane, UiRequest};
-use super::evaluation::EvaluateCommand;
 use super::document::Review;
+use super::evaluation::EvaluateCommand;
 use super::inspect::{InspectCommand, Inspected};
 use super::keys::{ImprintSource, PoseEngine, Request, ShiftMode};
 use super::library::Place;

@@ -30,13 +30,7 @@ pub struct TableState {
 
 impl Default for TableState {
     fn default() -> Self {
-        Self {
-            left_out: BTreeSet::new(),
-            grasps_per_tool: Some(4),
-            published: false,
-            running: None,
-            result: None,
-        }
+        Self { left_out: BTreeSet::new(), grasps_per_tool: Some(4), published: false, running: None, result: None }
     }
 }
 

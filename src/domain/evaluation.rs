@@ -110,6 +110,8 @@ pub struct ImageScore {
     pub ssim: Option<f64>,
     /// With the range 0.0225 m.
     pub ssim_peak: Option<f64>,
+    /// As `ssim`, against the simulator's imprint without camera noise.
+    pub ssim_noise_free: Option<f64>,
     /// Whether the classifier names the right tool; `None` without one, or for a tool it does not know.
     pub tool_right: Option<bool>,
     /// What the classifier's last layer sees of the imprint.
@@ -179,6 +181,8 @@ pub struct Figures {
     pub ssim: Option<Estimate>,
     /// With the range 0.0225 m.
     pub ssim_peak: Option<Estimate>,
+    /// As `ssim`, against the simulator's imprint without camera noise.
+    pub ssim_noise_free: Option<Estimate>,
     /// Fréchet distance to the measured imprints in the classifier's features.
     pub frechet: Option<f64>,
     /// Published FID: Inception features, another scale than `frechet`.
@@ -209,6 +213,7 @@ impl Figures {
             psnr_noise_free_db: None,
             ssim: None,
             ssim_peak: None,
+            ssim_noise_free: None,
             frechet: None,
             fid: None,
             angle_deg: None,
@@ -278,6 +283,7 @@ fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples:
         psnr_noise_free_db: over(&|tool| psnr(tool, |image| image.noise_free)),
         ssim: over(&|tool| mean(images(tool).filter_map(|i| i.ssim))),
         ssim_peak: over(&|tool| mean(images(tool).filter_map(|i| i.ssim_peak))),
+        ssim_noise_free: over(&|tool| mean(images(tool).filter_map(|i| i.ssim_noise_free))),
         frechet: frechet_distance(&features, measured),
         fid: None,
         angle_deg: over(&|tool| angles(tool)?.mean_deg),

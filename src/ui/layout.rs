@@ -52,7 +52,7 @@ pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
         }
         Workspace::Evaluate => {
             &[Browser, Results, Table, Measured, Predicted, Error, SceneMeasured, Metrics, Generate, Log]
-        },
+        }
     }
 }
 

@@ -7,7 +7,9 @@ use super::cx::Cx;
 use super::theme::{SMALL, medium};
 use super::timemachine;
 use super::widget::help;
-use super::{basin, browser, generate, images, layers, log, masks, metrics, poses, results, scene, settings_pane, table};
+use super::{
+    basin, browser, generate, images, layers, log, masks, metrics, poses, results, scene, settings_pane, table,
+};
 use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
 

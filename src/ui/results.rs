@@ -1,6 +1,8 @@
 //! The paper's results table of the open data set: what is compared, how far it is, and the figures.
 
-use eframe::egui::{self, Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use eframe::egui::{
+    self, Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2,
+};
 
 use super::cx::Cx;
 use super::theme::{SMALL, caption, medium, section};
@@ -72,7 +74,8 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         let tip = "Grasps of each tool, spread evenly; the paper has 46. Default 4";
         response.response.accessible_name("Grasps per tool").on_hover_text(tip);
         let mut published = cx.state.table.published;
-        let tip = "Adds what the paper and the lab's notebook printed, on real data: compare the form, not the decimals";
+        let tip =
+            "Adds what the paper and the lab's notebook printed, on real data: compare the form, not the decimals";
         if ui.checkbox(&mut published, "published rows").on_hover_text(tip).changed() {
             cx.push(Command::Evaluate(EvaluateCommand::Published(published)));
         }
@@ -134,9 +137,7 @@ fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
 fn cells(rect: Rect, count: usize) -> (Rect, Vec<Rect>) {
     let w = rect.width() / (NAME + count as f32);
     let name = Rect::from_min_size(rect.min, vec2(w * NAME, rect.height()));
-    let number = |i: usize| {
-        Rect::from_min_size(pos2(name.right() + w * i as f32, rect.top()), vec2(w, rect.height()))
-    };
+    let number = |i: usize| Rect::from_min_size(pos2(name.right() + w * i as f32, rect.top()), vec2(w, rect.height()));
     (name, (0..count).map(number).collect())
 }
 
@@ -193,7 +194,7 @@ fn line(cx: &Cx<'_>, ui: &mut Ui, row: &Row, figures: &Figures, shown: &[&Column
     let font = FontId::proportional(12.0);
     let left = pos2(name.left() + 4.0, name.center().y);
     ui.painter_at(name.shrink2(vec2(4.0, 0.0))).text(left, Align2::LEFT_CENTER, &row.method, font.clone(), color);
-    let mut put = |cell: Rect, text: &str, color: Color32| {
+    let put = |cell: Rect, text: &str, color: Color32| {
         let right = pos2(cell.right() - 6.0, cell.center().y);
         ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), color);
     };

@@ -36,7 +36,7 @@ const fn column(
 }
 
 /// The columns of a group, in the paper's order.
-const COLUMNS: [Column; 11] = [
+const COLUMNS: [Column; 12] = [
     column("PSNR dB", "psnr_db", 1, true, |f| f.psnr_db, "Against the measured imprint, decibels; peak 22.5 mm"),
     column(
         "clean dB",
@@ -48,6 +48,14 @@ const COLUMNS: [Column; 11] = [
     ),
     column("SSIM", "ssim", 2, true, |f| f.ssim, "Structural similarity; range of the tool's predictions (the lab's)"),
     column("SSIM 22.5", "ssim_peak", 2, true, |f| f.ssim_peak, "Structural similarity with the range 22.5 mm"),
+    column(
+        "clean SSIM",
+        "ssim_noise_free",
+        2,
+        true,
+        |f| f.ssim_noise_free,
+        "SSIM against the simulator's imprint before camera noise, range of the tool's predictions",
+    ),
     column(
         "FD",
         "frechet_classifier",
@@ -68,20 +76,14 @@ const COLUMNS: [Column; 11] = [
         |f| f.tool_accuracy,
         "Share of imprints whose tool the classifier names, percent",
     ),
-    column(
-        "s/image",
-        "seconds_per_image",
-        3,
-        false,
-        |f| plain(f.seconds),
-        "Median time to generate an image, seconds",
-    ),
+    column("s/image", "seconds_per_image", 3, false, |f| plain(f.seconds), "Median time to generate an image, seconds"),
 ];
 
 /// What the columns mean, a line each.
 pub const NOTES: [&str; 6] = [
     "each figure per tool, then the mean over the tools; square brackets: 95 % bootstrap interval over the grasps",
-    "clean: PSNR against the simulator's imprint before camera noise",
+    "clean: against the simulator's imprint before camera noise, which no generator can know; the row of the measured \
+     imprints says how much that noise costs",
     "FD: Fréchet distance in the features of the tool classifier, predicted against measured imprints of the group; it \
      cannot be compared with a published FID, nor between groups of different size",
     "FID: published, with the features of an Inception network",

@@ -243,11 +243,13 @@ fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed:
     let Image { finger, prediction, truth, noise_free, verdict } = image;
     let ssim = truth.as_ref().and_then(|truth| ssim_ranges(&prediction, truth, &ranges).ok());
     let of = |at: usize| ssim.as_ref().map(|found| found[at].mean);
+    let clean = noise_free.as_ref().and_then(|clean| ssim_ranges(&prediction, clean, &ranges[..1]).ok());
     ImageScore {
         finger,
         error: truth.and_then(|truth| squared_error(&prediction, &truth)).unwrap_or_default(),
         noise_free: noise_free.and_then(|clean| squared_error(&prediction, &clean)),
         ssim: of(0),
+        ssim_noise_free: clean.map(|found| found[0].mean),
         ssim_peak: of(1).filter(|_| !assumed),
         tool_right: verdict.as_ref().zip(class).map(|(v, class)| v.class == class),
         features: verdict.map_or_else(Vec::new, |v| v.features),
