@@ -36,7 +36,7 @@ MASK_RANGE = [-0.0116, 0.0225]
 
 # Parts of a latent diffusion checkpoint that prediction does not need: the schedule (recomputed from its ends), the
 # first stage's encoder and loss, a second copy of the backbone.
-UNUSED = ("alphas_cumprod", "sqrt_", "log_one_minus_alphas_cumprod", "posterior_", "lvlb_weights", "logvar", "model_ema.",
+UNUSED = ("alphas_cumprod", "sqrt_", "log_one_minus_alphas_cumprod", "posterior_", "lvlb_weights", "logvar",
           "first_stage_model.encoder.", "first_stage_model.quant_conv.", "first_stage_model.loss.", "cond_stage_model.resnet.")
 
 # Largest difference allowed between torch and ONNX Runtime, in standard deviations of the output.
@@ -144,6 +144,7 @@ def diffusion(args, **widths):
     if ema:
         # The averages are stored under the names of the weights without their dots.
         weights.fill(unet, "model_ema.", lambda key: ("diffusion_model." + key).replace(".", ""))
+        weights.taken |= {"model_ema.decay", "model_ema.num_updates", *("model.diffusion_model." + key for key in unet.state_dict())}
     else:
         weights.fill(unet, "model.diffusion_model.")
     first = weights.fill(empty(lambda: lab_models.FirstStage(**widths.get("first", {}))), "first_stage_model.")
@@ -159,7 +160,7 @@ def diffusion(args, **widths):
     else:
         raise LabError(f"{path}: scale_factor: missing; latents were scaled by it in training: pass --scale-factor VALUE "
                        "(0.18215 for the public autoencoder, 1 if training did not scale)")
-    weights.finish((*UNUSED, "model.diffusion_model.") if ema else UNUSED)
+    weights.finish(UNUSED if ema else (*UNUSED, "model_ema."))
 
     embed = first.post_quant_conv.in_channels
     cells = 256 // 8

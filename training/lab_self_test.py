@@ -84,6 +84,8 @@ def diffusion(folder):
     refused("diffusion", folder, lambda s: s.update({first: torch.zeros(2, 2)}), [first, "(2, 2)", "shape"])
     refused("diffusion", folder, lambda s: s.update({first: s[first] * float("nan")}), [first, "not finite"])
     refused("diffusion", folder, lambda s: s.update({"cond_stage_model.extra": torch.zeros(1)}), ["cond_stage_model.extra", "--ignore"])
+    for extra in ("model.diffusion_model.label_emb.weight", "model_ema.diffusion_modellabel_embweight"):
+        refused("diffusion", folder, lambda s, extra=extra: s.update({extra: torch.zeros(1)}), [extra])
     refused("diffusion", folder, lambda s: s.pop("scale_factor"), ["scale_factor", "--scale-factor"])
     refused("diffusion", folder, lambda s: s["betas"].mul_(torch.rand(1000)), ["betas"])
     refused("diffusion", folder, lambda s: s.clear(), ["missing"])
