@@ -96,9 +96,9 @@ def generation(graphs, manifest, difference, noise, steps):
     return (metres.flip(0, 1) if out["rotation_deg"] == 180 else metres).numpy()
 
 
-def compare(args):
+def compare(args, folder):
+    """Prints one JSON object per bundle and engine; files go to `folder`."""
     graphs, manifest = lab_export.KINDS[args.kind](args)
-    folder = Path(tempfile.mkdtemp(prefix="lab_compare_", dir=args.scratch))
     inputs = {role: lab_export.tried(graph, 1) for role, graph in graphs.items()}
     np.savez(folder / "in.npz", **{f"{role}.{name}": value.numpy() for role, graph in graphs.items()
                                    for name, value in zip(graph.inputs, inputs[role])})
@@ -106,7 +106,6 @@ def compare(args):
     with torch.no_grad():
         for role, graph in graphs.items():
             expected[role] = graph.net(*inputs[role]).numpy()
-    rows = []
     for bundle in args.bundles:
         run([args.programs / "touch2touch", "bundle", "check", bundle])
         for engine in args.engines:
@@ -125,8 +124,10 @@ def compare(args):
                 report = json.loads((out / "generate.json").read_text())
                 if whole is None:
                     name = report["pairs"][0]["name"]
-                    [path] = [p for p in args.data.rglob("*.pt") if "gelslim" in str(p.relative_to(args.data)) and str(p).endswith(Path(name).name + ".pt")][:1]
-                    sample = read(path)
+                    paths = [p for p in args.data.rglob(Path(name).name + ".pt") if "gelslim" in str(p.relative_to(args.data))]
+                    if not paths:
+                        raise LabError(f"{args.data}: no GelSlim file of the pair {name}; give a dataset in the lab's layout")
+                    sample = read(paths[0])
                     difference = sample["gelslim"][0].float() - sample["gelslim_ref"][0].float()
                     with torch.no_grad():
                         whole = generation(graphs, manifest, difference, arrays["noise"], args.steps)
@@ -134,9 +135,7 @@ def compare(args):
                 gap = np.abs(np.load(made) - whole)
                 row["generation"] = {"steps": args.steps, "max_abs_mm": float(gap.max() * 1e3), "mean_abs_mm": float(gap.mean() * 1e3),
                                      "std_mm": float(whole.std() * 1e3), "seconds": report["pairs"][0]["seconds"], "peak_mib": peak}
-            rows.append(row)
             print(json.dumps(row), flush=True)
-    return rows
 
 
 def main():
@@ -150,8 +149,11 @@ def main():
     parser.add_argument("--scratch", type=Path, help="where temporary files go")
     parser.add_argument("--programs", type=Path, default=Path("target/release"), help="folder of touch2touch and examples/graph_outputs")
     args = parser.parse_args()
+    if not (args.kind and args.checkpoint and (args.data or args.kind == "mask")):
+        parser.error("give KIND, CHECKPOINT and, but for the mask UNet, --data")
     try:
-        compare(args)
+        with tempfile.TemporaryDirectory(prefix="lab_compare_", dir=args.scratch) as folder:
+            compare(args, Path(folder))
     except LabError as err:
         sys.exit(f"error: {err}")
     print(json.dumps({"torch_peak_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024}))
