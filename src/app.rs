@@ -15,6 +15,7 @@ pub mod document;
 pub mod effect;
 pub mod error;
 pub mod evaluation;
+mod generating;
 pub mod history;
 pub mod inspect;
 pub mod jobs;

@@ -5,6 +5,7 @@
 
 mod basin;
 mod bench;
+mod cache;
 mod contact_mask;
 mod doctor;
 mod evaluate;
@@ -63,6 +64,8 @@ enum Verb {
     /// Model bundles.
     #[command(subcommand)]
     Bundle(models::BundleVerb),
+    /// Predictions kept on the disk: how many, where, and a way to remove them.
+    Cache(cache::CacheArgs),
     /// Say which model runtime is used and why, or fetch the faster one.
     Runtime(models::RuntimeArgs),
 }
@@ -102,6 +105,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Doctor(args)) => doctor::run(&args),
         Some(Verb::Bench(verb)) => bench::run(&verb),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
+        Some(Verb::Cache(args)) => cache::run(&args),
         Some(Verb::Runtime(args)) => models::runtime(&args),
     };
     match result {

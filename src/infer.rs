@@ -5,7 +5,7 @@
 //! * [`runtime`]: where that library is looked for, and how it is fetched.
 //! * [`generator`], [`mask`], [`classifier`]: what a bundle does, from a GelSlim difference to a decoder's picture, and
 //!   from a depth map to a contact mask or to the tool that made it.
-//! * [`recipe`]: everything a generated result depends on.
+//! * [`recipe`]: everything a generated result depends on; [`store`]: results on the disk, by recipe.
 //!
 //! Without the feature `onnx` everything here compiles, bundles can be opened and checked, and running one is an
 //! error that says so.
@@ -18,3 +18,4 @@ pub mod mask;
 mod onnx_header;
 pub mod recipe;
 pub mod runtime;
+pub mod store;

@@ -19,6 +19,8 @@ fn run(args: &[&str], data: &Path) -> Output {
         // Nothing of the user's may be read or written by a test.
         .env("TOUCH2TOUCH_DATA", data)
         .env("XDG_DATA_HOME", data)
+        .env("XDG_CONFIG_HOME", data)
+        .env("TOUCH2TOUCH_CACHE", data)
         .output()
         .unwrap()
 }

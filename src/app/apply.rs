@@ -119,7 +119,7 @@ fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
         Command::Save => save_all(state, effects),
         Command::ExportMasks(folder) => {
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-            let ticket = state.tasks.start("Export masks".into(), None);
+            let ticket = state.tasks.start("Export masks".into(), Vec::new());
             effects.push(Effect::ExportMasks { ticket, source, labels: state.document.labels.clone(), folder });
         }
 
@@ -146,7 +146,7 @@ fn open(state: &mut State, place: Place, effects: &mut Vec<Effect>) {
     masks::end_stroke(state, effects);
     state.library.last_seq.0 += 1;
     let seq = state.library.last_seq;
-    let ticket = state.tasks.start(format!("Open {place}"), None);
+    let ticket = state.tasks.start(format!("Open {place}"), Vec::new());
     if let Some(task) = state.tasks.running.get_mut(&ticket) {
         task.opening = Some(seq);
     }

@@ -13,7 +13,7 @@ use super::evaluation::EvaluateCommand;
 use super::inspect::{InspectCommand, Inspection};
 use super::keys::{DatasetSeq, ImprintSource, PoseEngine, Recipe, Request, ShiftMode};
 use super::library::{BundleInfo, Place, Sort};
-use super::results::{Clouds, Comparison, LayerResult, PoseResult, Prediction};
+use super::results::{Clouds, Comparison, LayerResult, PoseResult, Prediction, Preview};
 use super::services::{DataSource, NamedTool};
 use super::settings::{
     ColourMap, ColourRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, RuntimeChoice, Settings, Theme,
@@ -274,6 +274,8 @@ pub enum Command {
     SetPoseEngine(PoseEngine),
     /// The model runtime.
     SetRuntime(RuntimeChoice),
+    /// What kept predictions may take on the disk, MiB.
+    SetCacheBudget(u32),
     /// Whether the 3D views move together.
     SetCamerasLinked(bool),
     /// The workspace in front.
@@ -302,8 +304,10 @@ pub enum Command {
     Demanded(Vec<Request>),
     /// A result that a pane asked for.
     Computed(Request, Computed),
-    /// A prediction is there.
-    Generated(Ticket, Arc<Prediction>),
+    /// Predictions are there.
+    Generated(Ticket, Vec<Arc<Prediction>>),
+    /// A prediction as it looks on the way.
+    Previewed(Ticket, Arc<Preview>),
     /// A job is under way.
     Progressed(Ticket, Progress),
     /// A job without a result is done, with a line for the log.
@@ -344,6 +348,8 @@ pub enum Computed {
     Labels(Box<PairLabels>),
     /// Of [`Request::Tool`].
     Tool(Arc<NamedTool>),
+    /// Of [`Request::Stored`] and [`Request::Prediction`].
+    Predictions(Vec<Arc<Prediction>>),
     /// Of [`Request::Imprint`] and [`Request::Thumbnail`].
     Depth(Arc<DepthMap>),
     /// Of [`Request::Comparison`].

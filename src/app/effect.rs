@@ -28,12 +28,12 @@ pub enum Effect {
     },
     /// Look for bundles.
     FindBundles(Vec<PathBuf>),
-    /// Make a prediction.
+    /// Make predictions of one pair, all in one go.
     Generate {
         /// The job.
         ticket: Ticket,
         /// What to make.
-        recipe: Recipe,
+        recipes: Vec<Recipe>,
         /// The bundle.
         bundle: BundleInfo,
         /// The data.
@@ -87,7 +87,7 @@ impl std::fmt::Debug for Effect {
         match self {
             Self::Open { place, .. } => write!(f, "Open({place})"),
             Self::FindBundles(folders) => write!(f, "FindBundles({folders:?})"),
-            Self::Generate { ticket, recipe, .. } => write!(f, "Generate({ticket:?}, {recipe:?})"),
+            Self::Generate { ticket, recipes, .. } => write!(f, "Generate({ticket:?}, {recipes:?})"),
             Self::Cancel(ticket) => write!(f, "Cancel({ticket:?})"),
             Self::SaveLabels(_, save) => write!(f, "SaveLabels({})", save.name),
             Self::SaveSettings(_) => write!(f, "SaveSettings"),

@@ -5,12 +5,13 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-pub use crate::domain::diffusion::Sampler;
+pub use crate::domain::diffusion::{Preset, Sampler, Spacing};
 pub use crate::domain::postprocess::ShiftMode;
 
 use super::settings::RuntimeChoice;
 use crate::domain::align::basin::Plane;
 use crate::domain::dataset::PairId;
+use crate::domain::diffusion::GenerateConfig;
 use crate::domain::frames::PlanarPose;
 use crate::domain::sensor::Finger;
 
@@ -84,8 +85,41 @@ pub struct Recipe {
     pub sampler: Sampler,
     /// DDIM's noise share, 0..1.
     pub eta: Bits,
+    /// The training steps visited.
+    pub spacing: Spacing,
+    /// Scale of the guidance; 1 is none.
+    pub guidance: Bits,
     /// The model runtime: two of them round differently.
     pub runtime: RuntimeChoice,
+}
+
+impl Recipe {
+    /// The recipe of a touch with a bundle, a runtime and the choices of one generation.
+    pub fn new(touch: TouchKey, bundle: Arc<str>, runtime: RuntimeChoice, config: &GenerateConfig) -> Self {
+        Self {
+            touch,
+            bundle,
+            steps: config.steps,
+            seed: config.seed,
+            sampler: config.sampler,
+            eta: (config.eta as f32).into(),
+            spacing: config.spacing,
+            guidance: (config.guidance as f32).into(),
+            runtime,
+        }
+    }
+
+    /// The choices of one generation.
+    pub fn config(&self) -> GenerateConfig {
+        GenerateConfig {
+            steps: self.steps,
+            eta: f64::from(self.eta.get()),
+            seed: self.seed,
+            sampler: self.sampler,
+            spacing: self.spacing,
+            guidance: f64::from(self.guidance.get()),
+        }
+    }
 }
 
 /// Which imprint of a touch.
@@ -229,6 +263,10 @@ pub enum Request {
     Labels(PairKey),
     /// The CAD model of a tool and what the registration derives from it.
     Tool(DatasetSeq, Arc<str>),
+    /// The predictions of a touch that lie on the disk from before.
+    Stored(TouchKey),
+    /// The prediction that a pane needs because the one of the other finger was made.
+    Prediction(Recipe),
     /// A prediction in metres (of a raw prediction that exists).
     Imprint(Recipe, ShiftMode),
     /// A prediction against the measurement.
@@ -257,7 +295,10 @@ impl Request {
         match self {
             Self::Sample(pair) | Self::Labels(pair) | Self::Thumbnail(pair) => Some(pair.dataset),
             Self::Tool(dataset, _) => Some(*dataset),
-            Self::Imprint(recipe, _) | Self::Comparison(recipe, _) => Some(recipe.touch.pair.dataset),
+            Self::Stored(touch) => Some(touch.pair.dataset),
+            Self::Prediction(recipe) | Self::Imprint(recipe, _) | Self::Comparison(recipe, _) => {
+                Some(recipe.touch.pair.dataset)
+            }
             Self::Mask(key) => Some(key.imprint.touch().pair.dataset),
             Self::Cloud(key)
             | Self::Pose(PoseKey { cloud: key, .. })

@@ -13,6 +13,7 @@ use super::error::TaskError;
 use super::keys::{DatasetSeq, PairKey};
 use super::services::DataSource;
 use crate::domain::dataset::{Index, PairEntry, PairId};
+use crate::domain::diffusion::GenerateConfig;
 
 /// What can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -92,7 +93,7 @@ impl OpenDataset {
 }
 
 /// A model bundle that was found.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BundleInfo {
     /// Its identity: the digest of its manifest and files.
     pub id: Arc<str>,
@@ -102,8 +103,19 @@ pub struct BundleInfo {
     pub kind: BundleKind,
     /// Its folder.
     pub folder: PathBuf,
-    /// The denoising steps it recommends, if it is a generator.
-    pub steps: Option<u32>,
+    /// What can be chosen, if it is a generator.
+    pub generator: Option<GeneratorInfo>,
+}
+
+/// The choices that a generator's bundle leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeneratorInfo {
+    /// What it recommends.
+    pub defaults: GenerateConfig,
+    /// The steps of its training: no more can be taken.
+    pub training_steps: usize,
+    /// Whether it was trained for guidance.
+    pub guided: bool,
 }
 
 /// What a bundle does.

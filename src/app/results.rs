@@ -1,6 +1,6 @@
 //! Results, each under the recipe that made it, within a budget of bytes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -116,6 +116,19 @@ pub struct Prediction {
     pub output: Generated,
     /// Time it took, seconds.
     pub seconds: f64,
+}
+
+/// A prediction as it looks on the way.
+#[derive(Clone, Debug)]
+pub struct Preview {
+    /// What is being made.
+    pub recipe: Recipe,
+    /// Steps done.
+    pub step: u32,
+    /// Steps in all.
+    pub of: u32,
+    /// As the model sees it now, metres, as large as the bubble image.
+    pub depth: DepthMap,
 }
 
 /// A prediction against the measurement of the same touch.
@@ -283,6 +296,10 @@ pub struct Results {
     pub basins: Cache<BasinKey, Basin>,
     /// Tools.
     pub tools: Cache<String, NamedTool>,
+    /// What is on its way to each touch.
+    pub previews: BTreeMap<TouchKey, Arc<Preview>>,
+    /// Touches whose predictions from before were looked for on the disk.
+    pub looked_up: BTreeSet<TouchKey>,
     /// The prediction shown for each touch: the last one generated, or the one chosen.
     pub chosen: BTreeMap<TouchKey, Recipe>,
     /// All predictions made for each touch, oldest first.
@@ -314,6 +331,8 @@ impl Default for Results {
             inspections: Cache::new(64 * MIB),
             basins: Cache::new(32 * MIB),
             tools: Cache::new(128 * MIB),
+            previews: BTreeMap::new(),
+            looked_up: BTreeSet::new(),
             chosen: BTreeMap::new(),
             made: BTreeMap::new(),
             latest: BTreeMap::new(),
@@ -339,6 +358,8 @@ impl Results {
         self.inspections.clear();
         self.basins.clear();
         self.tools.clear();
+        self.previews.clear();
+        self.looked_up.clear();
         self.chosen.clear();
         self.made.clear();
         self.latest.clear();

@@ -9,9 +9,10 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::apply::apply;
 use super::command::{Command, UiRequest};
-use super::jobs::{Cancel, Lane};
-use super::keys::{DatasetSeq, Request};
+use super::jobs::{Cancel, Lane, PreviewWish};
+use super::keys::{DatasetSeq, Request, TouchKey};
 use super::library::Place;
+use super::results::Preview;
 use super::services::SharedServices;
 use super::state::State;
 use super::tasks::{Progress, Ticket};
@@ -43,6 +44,10 @@ pub struct Runtime {
     sender: Sender<Event>,
     /// Progress by ticket, only the latest.
     progress: Arc<std::sync::Mutex<BTreeMap<Ticket, Progress>>>,
+    /// Pictures on the way, only the latest of each touch.
+    previews: Arc<std::sync::Mutex<BTreeMap<TouchKey, (Ticket, Arc<Preview>)>>>,
+    /// What of them would be looked at.
+    preview_wish: Arc<std::sync::Mutex<PreviewWish>>,
     wake: Wake,
     cancels: BTreeMap<Ticket, Cancel>,
 }
@@ -61,7 +66,17 @@ impl Runtime {
     fn new(services: SharedServices, wake: Wake, threaded: bool) -> Self {
         let (sender, events) = channel();
         let lanes = Lanes::new(threaded, &sender, &wake);
-        Self { services, lanes, events, sender, progress: Arc::default(), wake, cancels: BTreeMap::new() }
+        Self {
+            services,
+            lanes,
+            events,
+            sender,
+            progress: Arc::default(),
+            previews: Arc::default(),
+            preview_wish: Arc::default(),
+            wake,
+            cancels: BTreeMap::new(),
+        }
     }
 
     /// Reads the settings, looks for bundles and opens `place` (else what was open last, else the demo).
@@ -89,8 +104,16 @@ impl Runtime {
         for (ticket, progress) in progress {
             self.run(state, Command::Progressed(ticket, progress), &mut ui);
         }
+        let previews = std::mem::take(&mut *lock(&self.previews));
+        for (ticket, preview) in previews.into_values() {
+            self.run(state, Command::Previewed(ticket, preview), &mut ui);
+        }
         for command in commands {
             self.run(state, command, &mut ui);
+        }
+        let wish = state.preview_wish();
+        if wish != *lock(&self.preview_wish) {
+            *lock(&self.preview_wish) = wish;
         }
         let wanted = state.wanted();
         if wanted != state.tasks.demanded {

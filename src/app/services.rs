@@ -3,6 +3,7 @@
 //! The studio and the command line use [`DataSource`] and [`Services`] as [`live`] implements them over `io` and `infer`.
 
 pub mod live;
+mod predictions;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,8 +13,9 @@ use super::command::Opened;
 use super::document::PairLabels;
 use super::error::TaskError;
 use super::jobs::JobCx;
-use super::keys::{Recipe, ShiftMode};
+use super::keys::{Recipe, ShiftMode, TouchKey};
 use super::library::{BundleInfo, Place};
+use super::results::Prediction;
 use super::settings::{RuntimeChoice, Settings};
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
@@ -74,6 +76,17 @@ pub trait DataSource: Send + Sync {
     ) -> Result<String, TaskError>;
 }
 
+/// A prediction to be made. All of one call have the same bundle, runtime and choices but for the seed.
+#[derive(Clone, Debug)]
+pub struct GenerateItem<'a> {
+    /// What to make.
+    pub recipe: Recipe,
+    /// The condition.
+    pub difference: &'a RgbGrid,
+    /// `[width, height]` of the bubble image; `[0, 0]` where there is none.
+    pub size: [usize; 2],
+}
+
 /// A generator's own output, with the ways to metres.
 #[derive(Clone, Debug)]
 pub struct Generated {
@@ -83,6 +96,8 @@ pub struct Generated {
     pub chains: BTreeMap<ShiftMode, Result<DepthChain, String>>,
     /// The runtime that made it.
     pub runtime: String,
+    /// What it took, seconds, where it was made earlier and only read now.
+    pub kept: Option<f64>,
 }
 
 /// A tool's name and its CAD model with what the registration derives from it.
@@ -105,18 +120,30 @@ pub trait Services: Send + Sync {
     /// The bundles that ship with the program and those in `folders`; what is wrong with those that were refused.
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>);
 
-    /// Runs the generator on a GelSlim difference image. The model stays loaded between calls; the runtime calls this
-    /// on one lane only.
+    /// Runs the generator on GelSlim difference images, all in one batch; one answer for each, in order. The model
+    /// stays loaded between calls; the runtime calls this on one lane only.
     ///
     /// # Errors
     /// If the model cannot be loaded or run, or the job was told to stop.
     fn generate(
         &self,
-        recipe: &Recipe,
         bundle: &BundleInfo,
-        difference: &RgbGrid,
+        items: &[GenerateItem<'_>],
         cx: &JobCx,
-    ) -> Result<Generated, TaskError>;
+    ) -> Result<Vec<Generated>, TaskError>;
+
+    /// What was made of a touch before and is kept on the disk, oldest first, with the recipes that `bundles` and
+    /// `runtime` give it now. Never fails: what cannot be read is not there.
+    fn stored(
+        &self,
+        bundles: &[BundleInfo],
+        runtime: RuntimeChoice,
+        touch: TouchKey,
+        difference: &RgbGrid,
+    ) -> Vec<Prediction> {
+        let _ = (bundles, runtime, touch, difference);
+        Vec::new()
+    }
 
     /// Runs the mask model on an imprint in metres. Called on the same lane as [`Self::generate`].
     ///

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::keys::{PoseEngine, Sampler, ShiftMode};
-use super::library::Place;
+use super::keys::{PoseEngine, Preset, Sampler, ShiftMode, Spacing};
+use super::library::{BundleInfo, Place};
+use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
 pub const SETTINGS_VERSION: u32 = 1;
@@ -16,6 +17,9 @@ pub const MAX_RECENT: usize = 12;
 pub const BRUSH_RADIUS_PX: std::ops::RangeInclusive<f32> = 0.5..=40.0;
 /// Denoising steps that can be chosen.
 pub const STEPS: std::ops::RangeInclusive<u32> = 1..=1000;
+
+/// Largest budget of kept predictions, MiB: a terabyte.
+pub const MAX_CACHE_MIB: u32 = 1 << 20;
 
 /// All preferences.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,6 +45,8 @@ pub struct Settings {
     pub pose_engine: PoseEngine,
     /// The runtime that runs models.
     pub runtime: RuntimeChoice,
+    /// What the predictions kept on the disk may take, MiB; 0 keeps none.
+    pub cache_mib: u32,
     /// Whether the 3D views of prediction and measurement move together.
     pub cameras_linked: bool,
     /// Whether the mask is drawn over imprints.
@@ -76,6 +82,7 @@ impl Default for Settings {
             mask: MaskSettings::default(),
             pose_engine: PoseEngine::default(),
             runtime: RuntimeChoice::default(),
+            cache_mib: 512,
             cameras_linked: true,
             mask_visible: true,
             mask_outline: false,
@@ -103,6 +110,7 @@ impl Settings {
         }
         self.generate = self.generate.validated();
         self.mask = self.mask.validated();
+        self.cache_mib = self.cache_mib.min(MAX_CACHE_MIB);
         self.recent.truncate(MAX_RECENT);
         self
     }
@@ -203,6 +211,8 @@ impl ColourMap {
 pub struct GenerateSettings {
     /// The bundle's name; `None` takes the first generator found.
     pub bundle: Option<String>,
+    /// How the steps are chosen; `None` takes the numbers below.
+    pub preset: Option<Preset>,
     /// Denoising steps.
     pub steps: u32,
     /// Seed of the noise.
@@ -213,6 +223,12 @@ pub struct GenerateSettings {
     pub sampler: Sampler,
     /// DDIM's noise share, 0..1.
     pub eta: f32,
+    /// The training steps visited.
+    pub spacing: Spacing,
+    /// Scale of the guidance, for bundles trained for it; 1 is none.
+    pub guidance: f32,
+    /// A picture on the way after so many steps, and after the first; 0 = none.
+    pub preview_every: u32,
     /// Whether both fingers are generated (the pose needs both), or only the one selected.
     pub both_fingers: bool,
 }
@@ -221,12 +237,16 @@ impl Default for GenerateSettings {
     fn default() -> Self {
         Self {
             bundle: None,
-            // The knee of the shipped generator: more steps cost time and half a decibel.
+            // What the bundle recommends; the numbers below are where somebody who chooses himself starts.
+            preset: Some(Preset::Default),
             steps: 10,
             seed: 42,
             seed_locked: true,
             sampler: Sampler::Ddim,
             eta: 0.0,
+            spacing: Spacing::Trailing,
+            guidance: 1.0,
+            preview_every: 4,
             both_fingers: true,
         }
     }
@@ -238,7 +258,49 @@ impl GenerateSettings {
     pub fn validated(mut self) -> Self {
         self.steps = self.steps.clamp(*STEPS.start(), *STEPS.end());
         self.eta = clamp_or(self.eta, 0.0, 1.0, 0.0);
+        self.guidance = clamp_or(self.guidance, *GUIDANCE.start() as f32, *GUIDANCE.end() as f32, 1.0);
+        self.preview_every = self.preview_every.min(*STEPS.end());
         self
+    }
+
+    /// The choices of one generation with a bundle.
+    pub fn config(&self, bundle: &BundleInfo) -> GenerateConfig {
+        let own = GenerateConfig {
+            steps: self.steps,
+            eta: self.eta.into(),
+            seed: self.seed,
+            sampler: self.sampler,
+            spacing: self.spacing,
+            guidance: self.guidance.into(),
+        };
+        match (self.preset, &bundle.generator) {
+            (Some(preset), Some(g)) => {
+                GenerateConfig { seed: self.seed, ..preset.config(g.defaults, g.training_steps) }
+            }
+            // Without the training for it a scale means nothing, whatever was chosen for another bundle.
+            (None, Some(g)) if !g.guided => GenerateConfig { guidance: 1.0, ..own },
+            _ => own,
+        }
+    }
+
+    /// The same with the numbers that `preset` or the bundle stand for, so that they can be changed one by one.
+    #[must_use]
+    pub fn spelt_out(&self, bundle: Option<&BundleInfo>) -> Self {
+        let Some(config) = bundle.map(|bundle| self.config(bundle)) else { return self.clone() };
+        Self {
+            steps: config.steps,
+            eta: config.eta as f32,
+            sampler: config.sampler,
+            spacing: config.spacing,
+            guidance: config.guidance as f32,
+            ..self.clone()
+        }
+    }
+
+    /// Whether the numbers that a preset stands for are the same.
+    pub fn same_numbers(&self, other: &Self) -> bool {
+        let numbers = |s: &Self| (s.steps, s.sampler, s.spacing, s.eta.to_bits(), s.guidance.to_bits());
+        numbers(self) == numbers(other)
     }
 }
 

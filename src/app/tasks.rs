@@ -34,8 +34,8 @@ pub struct Task {
     pub title: String,
     /// How far it is.
     pub progress: Progress,
-    /// The prediction it makes, if it makes one.
-    pub recipe: Option<Recipe>,
+    /// The predictions it makes, if it makes any: one per finger.
+    pub recipes: Vec<Recipe>,
     /// The data set it opens, if it opens one.
     pub opening: Option<DatasetSeq>,
     /// Whether it was told to stop and has not stopped yet.
@@ -62,7 +62,12 @@ impl Tasks {
 
     /// The task that generates `recipe`.
     pub fn generating(&self, recipe: &Recipe) -> Option<(Ticket, &Task)> {
-        self.running.iter().find(|(_, task)| task.recipe.as_ref() == Some(recipe)).map(|(t, task)| (*t, task))
+        self.running.iter().find(|(_, task)| task.recipes.contains(recipe)).map(|(t, task)| (*t, task))
+    }
+
+    /// A task that makes predictions.
+    pub fn any_generating(&self) -> Option<(Ticket, &Task)> {
+        self.running.iter().find(|(_, task)| !task.recipes.is_empty()).map(|(t, task)| (*t, task))
     }
 
     /// Whether nothing runs and nothing waits.
@@ -70,11 +75,11 @@ impl Tasks {
         self.running.is_empty() && self.demanded.is_empty()
     }
 
-    pub(super) fn start(&mut self, title: String, recipe: Option<Recipe>) -> Ticket {
+    pub(super) fn start(&mut self, title: String, recipes: Vec<Recipe>) -> Ticket {
         self.last_ticket += 1;
         let ticket = Ticket(self.last_ticket);
         self.running
-            .insert(ticket, Task { title, progress: Progress::default(), recipe, opening: None, cancelling: false });
+            .insert(ticket, Task { title, progress: Progress::default(), recipes, opening: None, cancelling: false });
         ticket
     }
 }

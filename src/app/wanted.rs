@@ -388,7 +388,20 @@ impl State {
         list.list
     }
 
-    fn is_visible(&self, panes: &[Pane]) -> bool {
+    /// Whether the cloud of an imprint is needed for the 3D views and what lies beside them (with its pose), and
+    /// whether it is needed at all.
+    pub(super) fn shows_cloud(&self, source: ImprintSource) -> (bool, bool) {
+        let (own, other) = match source {
+            ImprintSource::Measured => (Pane::SceneMeasured, Pane::ScenePredicted),
+            ImprintSource::Predicted => (Pane::ScenePredicted, Pane::SceneMeasured),
+        };
+        let layers = self.is_visible(&[Pane::Layers]) && self.workbench.side == source;
+        let both = self.workbench.both_clouds && self.is_visible(&[other]);
+        let scene = layers || both || self.is_visible(&[own, Pane::Metrics, Pane::Poses]);
+        (scene, scene || (self.is_visible(&INSPECT_PANES) && self.inspect.source == source))
+    }
+
+    pub(super) fn is_visible(&self, panes: &[Pane]) -> bool {
         panes.iter().any(|pane| self.selection.panes.contains(pane))
     }
 }
@@ -439,19 +452,8 @@ impl Wanted<'_> {
         let name = state.pair_name();
         self.ask(state.document.stored.contains_key(name), Request::Labels(pair));
         let (measured, predicted) = (ImprintSource::Measured, ImprintSource::Predicted);
-        let metrics = state.is_visible(&[Pane::Metrics]);
-        let poses = metrics || state.is_visible(&[Pane::Poses]);
-        let bench = &state.workbench;
-        // A cloud is needed for its own view, for the other one's that shows both, and for what lies beside them.
-        let needed = |source: ImprintSource, own: Pane, other: Pane| {
-            let layers = state.is_visible(&[Pane::Layers]) && bench.side == source;
-            poses || layers || state.is_visible(&[own]) || (bench.both_clouds && state.is_visible(&[other]))
-        };
-        let scene_measured = needed(measured, Pane::SceneMeasured, Pane::ScenePredicted);
-        let scene_predicted = needed(predicted, Pane::ScenePredicted, Pane::SceneMeasured);
-        let inspected = state.is_visible(&INSPECT_PANES).then_some(state.inspect.source);
-        let cloud_measured = scene_measured || inspected == Some(measured);
-        let cloud_predicted = scene_predicted || inspected == Some(predicted);
+        let (scene_measured, cloud_measured) = state.shows_cloud(measured);
+        let (scene_predicted, cloud_predicted) = state.shows_cloud(predicted);
 
         let shown = state.selection.fingers();
         for finger in Finger::BOTH {
@@ -459,7 +461,11 @@ impl Wanted<'_> {
             let image = state.is_visible(&[Pane::Predicted]) && on_screen;
             let compared = state.is_visible(&[Pane::Error, Pane::Metrics]) && on_screen;
             if image || compared || cloud_predicted {
+                self.stored(finger, pair.finger(finger));
                 self.imprint(finger, pair.finger(finger));
+            }
+            if cloud_predicted {
+                self.other_finger(finger);
             }
             if compared {
                 self.comparison(finger, pair.finger(finger));
@@ -483,6 +489,30 @@ impl Wanted<'_> {
                 }
             }
             self.inspection();
+        }
+    }
+
+    /// What was made of a touch before this start of the program.
+    fn stored(&mut self, finger: Finger, touch: TouchKey) {
+        let state = self.state;
+        if state.gelslim(finger).ready().is_some() && state.bundle(BundleKind::Generator).is_ok() {
+            self.ask(state.results.looked_up.contains(&touch), Request::Stored(touch));
+        }
+    }
+
+    /// The prediction of a finger that nobody looked at when the other one's was made.
+    fn other_finger(&mut self, finger: Finger) {
+        let state = self.state;
+        let other = if finger == Finger::Right { Finger::Left } else { Finger::Right };
+        let (Some(touch), Some(made)) = (state.touch_key(finger), state.chosen(other)) else { return };
+        let looked_up = state.results.looked_up.contains(&touch);
+        if !state.settings.generate.both_fingers || !looked_up || state.chosen(finger).is_some() {
+            return;
+        }
+        let recipe = Recipe { touch, ..made.clone() };
+        let under_way = state.tasks.generating(&recipe).is_some();
+        if state.library.bundle(&recipe.bundle).is_some() && state.gelslim(finger).ready().is_some() && !under_way {
+            self.ask(state.results.predictions.contains(&recipe), Request::Prediction(recipe));
         }
     }
 

@@ -8,13 +8,20 @@
 //! spacing of the public latent-diffusion release.
 
 mod ddim;
+mod guidance;
 mod noise;
+mod preset;
 mod schedule;
 mod tensor;
+mod watch;
 
 pub use ddim::{
     Denoiser, DiffusionError, GenerateConfig, Latent, ModelError, Prediction, Progress, Sampler, sample, sample_seeds,
+    sample_watched,
 };
+pub use guidance::{GUIDANCE, Guided};
 pub use noise::GaussianNoise;
+pub use preset::Preset;
 pub use schedule::{Schedule, ScheduleError, Spacing, Step};
 pub use tensor::Tensor;
+pub use watch::Watch;

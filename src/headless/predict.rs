@@ -2,20 +2,23 @@
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
 
-use crate::domain::diffusion::{GenerateConfig, Sampler};
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::postprocess::ShiftMode;
+use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
+use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::postprocess::{RawPrediction, ShiftMode};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::infer::bundle::{Bundle, default_roots, find};
 use crate::infer::engine::EngineChoice;
 use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
+use crate::infer::recipe::{Recipe, input_digest};
+use crate::infer::store::Store;
 
 /// Which models, and how they are run.
 #[derive(Debug, Clone, Args)]
@@ -26,16 +29,27 @@ pub(super) struct ModelArgs {
     /// The mask model's bundle (default: the shipped one).
     #[arg(long)]
     mask_bundle: Option<PathBuf>,
-    /// Sampling steps (default: the bundle's).
+    /// How good: `fast` (two steps), `default` (what the bundle recommends) or `best`. The options below change single
+    /// numbers of it.
+    #[arg(long, value_parser = PossibleValuesParser::new(Preset::iter().map(Preset::key)).map(preset), default_value = "default")]
+    preset: Preset,
+    /// Sampling steps (default: the preset's).
     #[arg(long)]
     steps: Option<u32>,
     /// Seed of the noise (default: the bundle's).
     #[arg(long)]
     seed: Option<u64>,
-    /// Share of fresh noise per step, 0 to 1, for DDIM (default: the bundle's).
+    /// Share of fresh noise per step, 0 to 1, for DDIM (default: the preset's).
     #[arg(long)]
     eta: Option<f64>,
-    /// The way from noise to an image (default: the bundle's).
+    /// Scale of classifier-free guidance, 1 for none; only for a bundle that was trained for it (default: the bundle's).
+    #[arg(long, value_parser = guidance)]
+    guidance: Option<f64>,
+    /// The training steps visited: `trailing` starts at the noisiest, `lab` is the public release's (default: the
+    /// preset's).
+    #[arg(long, value_enum)]
+    spacing: Option<SpacingArg>,
+    /// The way from noise to an image (default: the preset's).
     #[arg(long, value_parser = PossibleValuesParser::new(Sampler::iter().map(Sampler::key)).map(sampler))]
     sampler: Option<Sampler>,
     /// How the decoder's output becomes metres.
@@ -44,6 +58,27 @@ pub(super) struct ModelArgs {
     /// The engine that runs the models.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
+    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
+    #[arg(long)]
+    no_cache: bool,
+}
+
+/// Of a key that the parser has already compared with the list.
+fn preset(key: String) -> Preset {
+    key.parse().unwrap_or_default()
+}
+
+fn guidance(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|scale| GUIDANCE.contains(scale));
+    value.ok_or_else(|| format!("choose {} to {}; 1 is none", GUIDANCE.start(), GUIDANCE.end()))
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum SpacingArg {
+    /// From the noisiest training step on.
+    Trailing,
+    /// The public latent-diffusion release's.
+    Lab,
 }
 
 /// Of a key that the parser has already compared with the list.
@@ -99,12 +134,20 @@ pub(super) struct Predictor {
     bundle_name: String,
     generator: Option<Generator>,
     mask_model: Option<MaskModel>,
+    store: Option<Store>,
+}
+
+/// A predicted picture, and whether it was made before.
+pub(super) struct Made {
+    pub(super) raw: RawPrediction,
+    pub(super) kept: bool,
 }
 
 impl Predictor {
     /// Nothing is loaded yet.
     pub(super) fn new(args: &ModelArgs) -> Self {
-        Self { args: args.clone(), bundle_name: String::new(), generator: None, mask_model: None }
+        let store = if args.no_cache { None } else { super::cache::store() };
+        Self { args: args.clone(), bundle_name: String::new(), generator: None, mask_model: None, store }
     }
 
     fn choice(&self) -> EngineChoice {
@@ -142,14 +185,59 @@ impl Predictor {
     /// The bundle's defaults with what the command line says instead.
     pub(super) fn config(&mut self) -> anyhow::Result<GenerateConfig> {
         let args = self.args.clone();
-        let defaults = self.generator()?.spec().defaults;
+        let spec = self.generator()?.spec();
+        let preset = args.preset.config(spec.defaults, spec.schedule.training_steps());
+        let spacing = args.spacing.map(|spacing| match spacing {
+            SpacingArg::Trailing => Spacing::Trailing,
+            SpacingArg::Lab => Spacing::Lab,
+        });
         Ok(GenerateConfig {
-            steps: args.steps.unwrap_or(defaults.steps),
-            seed: args.seed.unwrap_or(defaults.seed),
-            eta: args.eta.unwrap_or(defaults.eta),
-            sampler: args.sampler.unwrap_or(defaults.sampler),
-            ..defaults
+            steps: args.steps.unwrap_or(preset.steps),
+            seed: args.seed.unwrap_or(preset.seed),
+            eta: args.eta.unwrap_or(preset.eta),
+            sampler: args.sampler.unwrap_or(preset.sampler),
+            spacing: spacing.unwrap_or(preset.spacing),
+            guidance: args.guidance.unwrap_or(preset.guidance),
         })
+    }
+
+    /// Predictions of GelSlim difference images, all in one batch, in their order. What was made before is not made
+    /// again.
+    pub(super) fn predict(&mut self, differences: &[&RgbGrid]) -> anyhow::Result<Vec<Made>> {
+        let config = self.config()?;
+        let store = self.store.take();
+        let made = self.predict_with(store.as_ref(), differences, &config);
+        self.store = store;
+        made
+    }
+
+    fn predict_with(
+        &mut self,
+        store: Option<&Store>,
+        differences: &[&RgbGrid],
+        config: &GenerateConfig,
+    ) -> anyhow::Result<Vec<Made>> {
+        let generator = self.generator()?;
+        let key = |difference: &RgbGrid| generator.recipe(input_digest(difference), config);
+        let keys: Vec<Recipe> = differences.iter().map(|difference| key(difference)).collect();
+        let mut found: Vec<Option<Made>> = keys
+            .iter()
+            .map(|key| store.and_then(|store| store.get(key)).map(|stored| Made { raw: stored.raw, kept: true }))
+            .collect();
+        let fresh: Vec<usize> = (0..keys.len()).filter(|at| found[*at].is_none()).collect();
+        let images: Vec<&RgbGrid> = fresh.iter().map(|at| differences[*at]).collect();
+        let start = Instant::now();
+        let made = generator.generate_batch(&images, config, &mut |_| ControlFlow::Continue(()))?;
+        let each = start.elapsed().as_secs_f64() / fresh.len().max(1) as f64;
+        for (at, raw) in fresh.into_iter().zip(made) {
+            if let Some(store) = store
+                && let Err(err) = store.put(&keys[at], &raw, each)
+            {
+                log::warn!("a prediction could not be kept: {err}: {}", store.folder().display());
+            }
+            found[at] = Some(Made { raw, kept: false });
+        }
+        Ok(found.into_iter().flatten().collect())
     }
 
     /// The reading of the decoder's output.
@@ -159,15 +247,14 @@ impl Predictor {
 
     /// Predicted imprints (metres, raw orientation) of the fingers that have a GelSlim image.
     pub(super) fn imprints(&mut self, sample: &Sample) -> anyhow::Result<[Option<DepthMap>; 2]> {
-        let config = self.config()?;
         let shift = self.shift();
-        let generator = self.generator()?;
+        let gelslim = |finger| sample.finger(finger).and_then(|t| t.gelslim.as_ref());
+        let fingers: Vec<Finger> = Finger::BOTH.into_iter().filter(|finger| gelslim(*finger).is_some()).collect();
+        let differences: Vec<&RgbGrid> = fingers.iter().filter_map(|f| Some(&gelslim(*f)?.difference)).collect();
+        let made = self.predict(&differences)?;
         let mut out = [None, None];
-        for finger in Finger::BOTH {
-            if let Some(gelslim) = sample.finger(finger).and_then(|t| t.gelslim.as_ref()) {
-                let raw = generator.generate(&gelslim.difference, &config, &mut |_| ControlFlow::Continue(()))?;
-                out[finger.index()] = Some(generator.depth(&raw, shift)?);
-            }
+        for (finger, made) in fingers.into_iter().zip(made) {
+            out[finger.index()] = Some(self.generator()?.depth(&made.raw, shift)?);
         }
         Ok(out)
     }

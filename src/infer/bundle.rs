@@ -66,6 +66,11 @@
 //! }
 //! ```
 //!
+//! A generator whose denoiser was trained with the condition left out now and then may say so, and is then offered with
+//! classifier-free guidance: `"guidance": { "unconditional": "zero_condition", "scale": 2.0 }`. `unconditional` is
+//! `zero_condition` (a condition of zeros) or `zero_difference` (what the condition encoder makes of a GelSlim that
+//! feels nothing); `scale` is the default, 1 for none. Without the key, guidance is refused.
+//!
 //! `shift` may be left out (the paper's shift is then not offered), and so may `reduction`, `resampling`,
 //! `rotation_deg`, `cast` and `threshold` (mean, bilinear, 0, saturate, 0.5); `features`
 //! where the classifier hands none out. The fields of the structs below say what
@@ -99,8 +104,8 @@ use crate::domain::dataset::Problem;
 pub use find::{Found, default_roots, find};
 pub use manifest::{
     BubbleSensor, BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, FileEntry, GelslimSensor,
-    GeneratorInput, GeneratorSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind,
-    ScheduleSpec, TensorSpec, TimestepType,
+    GeneratorInput, GeneratorSpec, GuidanceSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind,
+    ScheduleSpec, TensorSpec, TimestepType, Unconditional,
 };
 
 /// The manifest's file name.
@@ -312,5 +317,10 @@ fn inside(dir: &Path, name: &str) -> Option<PathBuf> {
 
 /// SHA-256 in lower-case hex.
 pub(super) fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    hex(&Sha256::digest(bytes))
+}
+
+/// Lower-case hex.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -1,16 +1,20 @@
 //! [`Generator`]: a GelSlim difference image to a decoder's picture, with the graphs of a bundle.
 
+mod preview;
+
 use std::ops::ControlFlow;
 
-use super::bundle::{Bundle, GeneratorInput, GeneratorSpec, InputScale, Role, TimestepType};
+pub use preview::Observer;
+use preview::Watching;
+
+use super::bundle::{Bundle, GeneratorInput, GeneratorSpec, InputScale, Role, TimestepType, Unconditional};
 use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, resolve};
 use super::recipe::Recipe;
 use crate::domain::diffusion::{
-    Denoiser, DiffusionError, GenerateConfig, ModelError, Prediction, Progress, Tensor, sample_seeds,
+    Denoiser, DiffusionError, GenerateConfig, Guided, ModelError, Prediction, Progress, Tensor, sample_watched,
 };
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{PostprocessError, RawPrediction, ShiftMode};
-use crate::domain::sensor::Finger;
 
 /// Why there is no prediction.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +34,24 @@ pub enum GenerateError {
     /// The condition encoder or the decoder failed.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// Guidance was asked of a bundle that was not trained for it.
+    #[error(
+        "the bundle \"{bundle}\" was not trained for guidance (its manifest has no key \"guidance\"), so a scale of {scale} means nothing; leave guidance out, or use another bundle"
+    )]
+    NoGuidance {
+        /// Its name.
+        bundle: String,
+        /// What was asked for.
+        scale: f64,
+    },
+    /// An item names an image that was not given.
+    #[error("item of image {image}, but there are {images}")]
+    NoImage {
+        /// Which.
+        image: usize,
+        /// How many there are.
+        images: usize,
+    },
     /// The image has no pixels, or some are not numbers.
     #[error(
         "the difference image of {width} x {height} pixels has {bad} values that are not numbers; nothing can be predicted from it"
@@ -53,6 +75,18 @@ pub struct Generator {
     encoder: Graph,
     denoiser: Graph,
     decoder: Graph,
+    name: String,
+    /// Prepared images and their conditions, the last used last.
+    encoded: Vec<(Tensor, Tensor)>,
+}
+
+/// One picture to be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Item {
+    /// Which of the images.
+    pub image: usize,
+    /// Seed of its noise.
+    pub seed: u64,
 }
 
 impl Generator {
@@ -72,6 +106,8 @@ impl Generator {
             denoiser: load(Role::Denoiser)?,
             decoder: load(Role::Decoder)?,
             hash: bundle.hash().to_owned(),
+            name: bundle.name().to_owned(),
+            encoded: Vec::new(),
             spec,
             engine,
         })
@@ -87,9 +123,10 @@ impl Generator {
         self.engine
     }
 
-    /// The key of what [`Generator::generate`] returns for `pair` and `finger`.
-    pub fn recipe(&self, pair: &str, finger: Finger, config: &GenerateConfig) -> Recipe {
-        Recipe::new(pair.to_owned(), finger, self.hash.clone(), self.engine, config)
+    /// The key of what [`Generator::generate`] returns for the image with the digest `input` (see
+    /// [`super::recipe::input_digest`]).
+    pub fn recipe(&self, input: String, config: &GenerateConfig) -> Recipe {
+        Recipe::new(input, self.hash.clone(), self.engine, config)
     }
 
     /// Predicts what the Soft Bubble feels where the GelSlim felt `difference` (signed, 0..255 scale, any size).
@@ -103,9 +140,9 @@ impl Generator {
         &mut self,
         difference: &RgbGrid,
         config: &GenerateConfig,
-        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+        mut progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<RawPrediction, GenerateError> {
-        let mut one = self.run(&[(difference, config.seed)], config, progress)?;
+        let mut one = self.run(&[difference], &[Item { image: 0, seed: config.seed }], config, &mut progress)?;
         Ok(one.remove(0))
     }
 
@@ -118,10 +155,10 @@ impl Generator {
         &mut self,
         differences: &[&RgbGrid],
         config: &GenerateConfig,
-        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+        mut progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Vec<RawPrediction>, GenerateError> {
-        let items: Vec<(&RgbGrid, u64)> = differences.iter().map(|&d| (d, config.seed)).collect();
-        self.run(&items, config, progress)
+        let items: Vec<Item> = (0..differences.len()).map(|image| Item { image, seed: config.seed }).collect();
+        self.run(differences, &items, config, &mut progress)
     }
 
     /// Several predictions of one image, one per seed.
@@ -133,10 +170,10 @@ impl Generator {
         difference: &RgbGrid,
         seeds: &[u64],
         config: &GenerateConfig,
-        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+        mut progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<Vec<RawPrediction>, GenerateError> {
-        let items: Vec<(&RgbGrid, u64)> = seeds.iter().map(|&seed| (difference, seed)).collect();
-        self.run(&items, config, progress)
+        let items: Vec<Item> = seeds.iter().map(|&seed| Item { image: 0, seed }).collect();
+        self.run(&[difference], &items, config, &mut progress)
     }
 
     /// The depth in metres, in the raw orientation of the lab's bubble files, as the user wants it read.
@@ -147,45 +184,120 @@ impl Generator {
         self.spec.depth_chain(mode)?.run(raw)
     }
 
-    fn run(
+    /// Any images from any seeds, all in one batch: each image is encoded once, however many seeds it has, and the
+    /// denoiser is called once a step. `config.seed` is not used. Answers in the order of `items`.
+    ///
+    /// # Errors
+    /// See [`GenerateError`]; an item of an image that is not there is a [`GenerateError::NoImage`].
+    pub fn run(
         &mut self,
-        items: &[(&RgbGrid, u64)],
+        images: &[&RgbGrid],
+        items: &[Item],
         config: &GenerateConfig,
-        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+        observer: &mut dyn Observer,
     ) -> Result<Vec<RawPrediction>, GenerateError> {
         if items.is_empty() {
             return Ok(Vec::new());
         }
-        let spec = &self.spec;
-        let with_batch =
-            |shape: &[usize]| std::iter::once(items.len()).chain(shape.iter().copied()).collect::<Vec<_>>();
-        let images = items.iter().map(|(image, _)| prepare(image, &spec.input)).collect::<Result<Vec<_>, _>>()?;
-        let images = Tensor::stack(&images).expect("prepared images have one shape and there is at least one");
+        if config.guidance != 1.0 && self.spec.guidance.is_none() {
+            return Err(GenerateError::NoGuidance { bundle: self.name.clone(), scale: config.guidance });
+        }
+        let conditions: Vec<Option<Tensor>> = (0..images.len())
+            .map(|at| {
+                // An image that no item is of is not encoded.
+                items.iter().any(|item| item.image == at).then(|| self.condition(images[at])).transpose()
+            })
+            .collect::<Result<_, _>>()?;
+        let of_item = |item: &Item| {
+            let condition = conditions.get(item.image).and_then(Option::as_ref).cloned();
+            condition.ok_or(GenerateError::NoImage { image: item.image, images: images.len() })
+        };
+        let condition = items.iter().map(of_item).collect::<Result<Vec<_>, _>>()?;
+        let condition = Tensor::stack(&condition).expect("conditions have one shape and there is at least one");
+        let blank = match self.spec.guidance.filter(|_| config.guidance != 1.0) {
+            Some(guidance) => Some(self.blank(guidance.unconditional)?),
+            None => None,
+        };
 
-        let condition =
-            self.encoder.run(&[("gelslim", Input::F32(&images))], "condition", &with_batch(&spec.condition.shape))?;
-        let seeds: Vec<u64> = items.iter().map(|&(_, seed)| seed).collect();
-        let mut denoiser = BundleDenoiser { graph: &mut self.denoiser, spec };
-        let latent = sample_seeds(&mut denoiser, &spec.schedule, config, &seeds, &condition, progress);
-        let mut latent = latent.map_err(|err| match err {
+        let seeds: Vec<u64> = items.iter().map(|item| item.seed).collect();
+        let spec = &self.spec;
+        let mut plain = BundleDenoiser { graph: &mut self.denoiser, spec };
+        let mut watch = Watching::new(observer, &mut self.decoder, spec, items.len());
+        let latent = match blank {
+            None => sample_watched(&mut plain, &spec.schedule, config, &seeds, &condition, &mut watch),
+            Some(blank) => {
+                let mut guided = Guided::new(&mut plain, blank, config.guidance);
+                sample_watched(&mut guided, &spec.schedule, config, &seeds, &condition, &mut watch)
+            }
+        };
+        let latent = latent.map_err(|err| match err {
             DiffusionError::Cancelled => GenerateError::Cancelled,
             DiffusionError::Model(err) => GenerateError::Model(err),
             err => GenerateError::Diffusion(err),
         })?;
-
-        let scale = spec.latent.scale_factor;
-        latent.data_mut().iter_mut().for_each(|v| *v = (f64::from(*v) / scale) as f32);
-        let [width, height] = spec.output.size;
-        let channels = spec.output.channels;
-        let shape = with_batch(&[channels, height, width]);
-        let pictures = self.decoder.run(&[("latent", Input::F32(&latent))], "image", &shape)?;
-        let planes: Vec<Grid<f32>> = pictures
-            .data()
-            .chunks_exact(width * height)
-            .map(|plane| Grid::from_vec(width, height, plane.to_vec()).expect("the chunks have this length"))
-            .collect();
-        Ok(planes.chunks_exact(channels).map(|channels| RawPrediction { channels: channels.to_vec() }).collect())
+        Ok(decode(&mut self.decoder, spec, latent)?)
     }
+
+    /// The condition of one image, without the batch axis. The last few are kept: another seed of the same image, or
+    /// the same image with other settings, does not run the encoder again.
+    fn condition(&mut self, image: &RgbGrid) -> Result<Tensor, GenerateError> {
+        let prepared = prepare(image, &self.spec.input)?;
+        Ok(self.encode(prepared)?)
+    }
+
+    fn encode(&mut self, prepared: Tensor) -> Result<Tensor, ModelError> {
+        if let Some(at) = self.encoded.iter().position(|(known, _)| *known == prepared) {
+            let known = self.encoded.remove(at);
+            let condition = known.1.clone();
+            self.encoded.push(known);
+            return Ok(condition);
+        }
+        // One at a time: a condition does not depend on what else is in the batch, not even in its last bit.
+        let input = Tensor::stack(std::slice::from_ref(&prepared)).expect("there is one");
+        let shape: Vec<usize> = std::iter::once(1).chain(self.spec.condition.shape).collect();
+        let condition = self.encoder.run(&[("gelslim", Input::F32(&input))], "condition", &shape)?;
+        let condition = condition.item(0).expect("the shape was checked: there is one");
+        if self.encoded.len() >= KEPT_CONDITIONS {
+            self.encoded.remove(0);
+        }
+        self.encoded.push((prepared, condition.clone()));
+        Ok(condition)
+    }
+
+    /// The condition that says nothing.
+    fn blank(&mut self, unconditional: Unconditional) -> Result<Tensor, GenerateError> {
+        match unconditional {
+            Unconditional::ZeroCondition => Ok(Tensor::filled(self.spec.condition.shape.to_vec(), 0.0)),
+            Unconditional::ZeroDifference => {
+                let [width, height] = self.spec.input.size;
+                self.condition(&RgbGrid::filled(width, height, [0.0; 3]))
+            }
+        }
+    }
+
+    /// The three graphs, for measuring what they take by themselves: condition encoder, denoiser, decoder.
+    pub fn graphs(&mut self) -> [&mut Graph; 3] {
+        [&mut self.encoder, &mut self.denoiser, &mut self.decoder]
+    }
+}
+
+/// Conditions kept for the next run.
+const KEPT_CONDITIONS: usize = 8;
+
+/// The decoder's pictures of clean latents, one per entry of the batch.
+fn decode(decoder: &mut Graph, spec: &GeneratorSpec, mut latent: Tensor) -> Result<Vec<RawPrediction>, ModelError> {
+    let scale = spec.latent.scale_factor;
+    latent.data_mut().iter_mut().for_each(|v| *v = (f64::from(*v) / scale) as f32);
+    let [width, height] = spec.output.size;
+    let channels = spec.output.channels;
+    let pictures =
+        decoder.run(&[("latent", Input::F32(&latent))], "image", &[latent.batch(), channels, height, width])?;
+    let planes: Vec<Grid<f32>> = pictures
+        .data()
+        .chunks_exact(width * height)
+        .map(|plane| Grid::from_vec(width, height, plane.to_vec()).expect("the chunks have this length"))
+        .collect();
+    Ok(planes.chunks_exact(channels).map(|channels| RawPrediction { channels: channels.to_vec() }).collect())
 }
 
 /// The denoiser's graph, as the sampler wants it.

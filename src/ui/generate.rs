@@ -8,9 +8,10 @@ use super::theme::{SMALL, caption, section, value};
 use super::widget::progress;
 use crate::app::action::Action;
 use crate::app::command::Command;
-use crate::app::keys::{Recipe, Sampler, ShiftMode};
-use crate::app::library::BundleKind;
+use crate::app::keys::{Preset, Recipe, Sampler, ShiftMode};
+use crate::app::library::{BundleInfo, BundleKind};
 use crate::app::settings::{GenerateSettings, STEPS};
+use crate::domain::diffusion::GUIDANCE;
 use crate::domain::sensor::Finger;
 
 /// Width of the captions at the left.
@@ -45,8 +46,10 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let old = cx.state.settings.generate.clone();
-    let mut new = old.clone();
+    let bundle = cx.state.bundle(BundleKind::Generator).ok();
+    let guided = bundle.and_then(|bundle| bundle.generator.as_ref()).is_some_and(|g| g.guided);
+    let spelt_out = cx.state.settings.generate.spelt_out(bundle);
+    let mut new = spelt_out.clone();
     row(ui, cx.p.weak, "Model", |ui| {
         let bundles: Vec<_> = cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator).collect();
         let current = cx.state.bundle(BundleKind::Generator).map_or("none found", |b| b.name.as_str());
@@ -66,6 +69,18 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     for problem in &cx.state.library.bundle_problems {
         ui.label(RichText::new(problem.to_string()).size(SMALL).color(cx.p.wrong));
     }
+    row(ui, cx.p.weak, "Quality", |ui| {
+        for preset in Preset::iter() {
+            let chosen = spelt_out.preset == Some(preset);
+            let button = ui.add(egui::Button::selectable(chosen, preset_name(preset)));
+            if button.on_hover_text(preset_help(preset, bundle)).clicked() {
+                new = GenerateSettings { preset: Some(preset), ..spelt_out.clone() };
+            }
+        }
+        if spelt_out.preset.is_none() {
+            ui.label(caption("own numbers", cx.p));
+        }
+    });
     row(ui, cx.p.weak, "Sampler", |ui| {
         let combo = egui::ComboBox::from_id_salt("sampler").width(72.0).selected_text(sampler_name(new.sampler));
         let response = combo.show_ui(ui, |ui| {
@@ -88,7 +103,8 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     row(ui, cx.p.weak, "Steps", |ui| {
         let drag = egui::DragValue::new(&mut new.steps).speed(0.2).range(STEPS);
         let tip = "Denoising steps: more take longer and add detail";
-        reset(ui.add(drag).accessible_name("Steps"), tip, "10", || new.steps = GenerateSettings::default().steps);
+        let recommended = bundle.and_then(|bundle| bundle.generator.as_ref()).map_or(10, |g| g.defaults.steps);
+        reset(ui.add(drag).accessible_name("Steps"), tip, &recommended.to_string(), || new.steps = recommended);
         let both = ui.checkbox(&mut new.both_fingers, "both fingers");
         both.on_hover_text("Generate for both fingers: the pose needs both. Off: only the active finger");
     });
@@ -108,7 +124,26 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         cx.action_button(ui, Action::GenerateNewSeed, "New");
     });
-    if new != old {
+    if guided {
+        row(ui, cx.p.weak, "Guidance", |ui| {
+            let range = *GUIDANCE.start()..=*GUIDANCE.end();
+            let drag = egui::DragValue::new(&mut new.guidance).speed(0.05).range(range).fixed_decimals(1);
+            let tip = "How strongly the touch decides: above 1 more than the model alone would let it";
+            reset(ui.add(drag).accessible_name("Guidance"), tip, "1.0", || new.guidance = 1.0);
+        });
+    }
+    row(ui, cx.p.weak, "Preview", |ui| {
+        let drag = egui::DragValue::new(&mut new.preview_every).speed(0.1).range(0..=100);
+        let tip = "A picture on the way after so many steps, and after the first; 0 shows only the result";
+        reset(ui.add(drag.prefix("every ").suffix(" steps")).accessible_name("Preview"), tip, "4", || {
+            new.preview_every = GenerateSettings::default().preview_every;
+        });
+    });
+    if new != spelt_out {
+        // Whoever changes a number has left the preset.
+        if new.preset == spelt_out.preset && !new.same_numbers(&spelt_out) {
+            new.preset = None;
+        }
         cx.push(Command::SetGenerate(new));
     }
 }
@@ -123,11 +158,11 @@ fn reset(response: egui::Response, tip: &str, default: &str, mut set: impl FnMut
 
 fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(2.0);
-    let running = cx.state.tasks.running.iter().find(|(_, t)| t.recipe.is_some());
+    let running = cx.state.tasks.any_generating();
     let width = ui.available_width();
     match running {
         Some((ticket, task)) => {
-            let (ticket, fraction, text) = (*ticket, task.progress.fraction(), task.progress.text.clone());
+            let (ticket, fraction, text) = (ticket, task.progress.fraction(), task.progress.text.clone());
             let text = if text.is_empty() { "starting".to_owned() } else { text };
             ui.horizontal(|ui| {
                 progress::bar(ui, width - 76.0, fraction, &text);
@@ -151,6 +186,31 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
                 ui.label(RichText::new(why).size(SMALL).color(cx.p.caution));
             }
         }
+    }
+}
+
+/// The name on screen.
+fn preset_name(preset: Preset) -> &'static str {
+    match preset {
+        Preset::Fast => "Fast",
+        Preset::Default => "Default",
+        Preset::Best => "Best",
+    }
+}
+
+/// What a preset does with this bundle, for its tooltip.
+fn preset_help(preset: Preset, bundle: Option<&BundleInfo>) -> String {
+    let what = match preset {
+        Preset::Fast => "For looking through a data set",
+        Preset::Default => "What the model's bundle recommends",
+        Preset::Best => "As many steps as still change anything",
+    };
+    match bundle.and_then(|bundle| bundle.generator.as_ref()) {
+        Some(g) => {
+            let config = preset.config(g.defaults, g.training_steps);
+            format!("{what}: {} with {} steps", sampler_name(config.sampler), config.steps)
+        }
+        None => what.to_owned(),
     }
 }
 
@@ -211,7 +271,15 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             .get(&(recipe.clone(), shift))
             .and_then(|c| c.psnr_db)
             .map_or(String::new(), |v| format!("{v:.1} dB"));
-        let seconds = cx.state.results.predictions.get(recipe).map_or(String::new(), |p| format!("{:.1} s", p.seconds));
+        let made = cx.state.results.predictions.get(recipe);
+        let seconds = made.map_or(String::new(), |p| match p.output.kept {
+            Some(_) => "kept".to_owned(),
+            None => format!("{:.1} s", p.seconds),
+        });
+        let took = made.map_or(String::new(), |p| match p.output.kept {
+            Some(seconds) => format!("Made earlier in {seconds:.1} s and kept on the disk"),
+            None => format!("Made in {:.2} s", p.seconds),
+        });
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             let text = format!("seed {}", recipe.seed);
@@ -221,16 +289,19 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
             ui.label(caption(format!("{} steps", recipe.steps), cx.p));
             ui.label(value(psnr, cx.p).size(SMALL));
-            ui.label(caption(seconds, cx.p));
+            ui.label(caption(seconds, cx.p)).on_hover_text(took);
             let reuse = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).min_size(vec2(30.0, 18.0)));
             let reuse = reuse.accessible_name(format!("Use seed {}", recipe.seed));
-            if reuse.on_hover_text("Take the seed, steps and eta of this result for the next run").clicked() {
+            if reuse.on_hover_text("Take the seed, the sampler and its numbers for the next run").clicked() {
                 cx.push(Command::SetGenerate(GenerateSettings {
+                    preset: None,
                     steps: recipe.steps,
                     seed: recipe.seed,
                     seed_locked: true,
                     sampler: recipe.sampler,
                     eta: recipe.eta.get(),
+                    spacing: recipe.spacing,
+                    guidance: recipe.guidance.get(),
                     ..cx.state.settings.generate.clone()
                 }));
             }

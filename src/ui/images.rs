@@ -1,5 +1,7 @@
 //! The image panes: GelSlim, measured and predicted imprint, error. Linked pan, zoom and cross-hair.
 
+use std::sync::Arc;
+
 use eframe::egui::{Align2, Color32, PointerButton, Rect, TextureId, Ui, UiBuilder, pos2, vec2};
 
 use super::cx::{Cx, Painting, side_color};
@@ -11,6 +13,7 @@ use super::widget::{brush_cursor, empty};
 use crate::app::command::{Command, Hover, Pane};
 use crate::app::error::TaskError;
 use crate::app::keys::{ImprintSource, MaskVersion, ShiftMode};
+use crate::app::results::Preview;
 use crate::app::settings::{ColourMap, ColourRange, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
 use crate::domain::colormap::{ColorMap, Range};
@@ -172,7 +175,10 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger) -> Opt
             None
         }
         Pane::Measured => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Measured, finger)),
-        Pane::Predicted => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
+        Pane::Predicted => match state.preview(finger) {
+            Some(preview) => preview_image(cx, ui, finger, preview),
+            None => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
+        },
         _ => {
             let error = state.comparison(finger).and_then(Absent::NoPrediction, |c| Some(&c.error));
             depth_pane(cx, ui, pane, finger, error)
@@ -226,7 +232,7 @@ pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     use crate::app::action::Action;
     // A prediction on its way shows how far it is, where it will appear.
     if absent == Absent::NoPrediction
-        && let Some((_, task)) = cx.state.tasks.running.iter().find(|(_, t)| t.recipe.is_some())
+        && let Some((_, task)) = cx.state.tasks.any_generating()
     {
         let (fraction, text) = (task.progress.fraction(), task.progress.text.clone());
         let rect = ui.available_rect_before_wrap();
@@ -408,6 +414,41 @@ fn depth_pane(
         paint_stroke(cx, ui, &output, pane, source, finger);
     }
     captions(cx, &output, pane, finger);
+    histogram
+}
+
+/// A prediction on its way, in the colours and the place of the result: nothing can be painted or measured on it.
+fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger, preview: &Arc<Preview>) -> Option<Histogram> {
+    let pane = Pane::Predicted;
+    let mut view = cx.local.bubble_view;
+    let label = format!("{} {}, preview", super::pane::title(pane), finger.name());
+    let canvas = ImageCanvas {
+        label: &label,
+        size: preview.depth.size(),
+        rotated: false,
+        primary: Primary::Pan,
+        background: cx.p.canvas,
+    };
+    let output = canvas.show(ui, &mut view);
+    cx.local.bubble_view = view;
+    let squares = shows_squares(&output.map, ui.pixels_per_point());
+    let (map, range) = (map_of(cx.state), range_of(cx.state));
+    let key = (&preview.recipe, preview.step, map, range.lo.to_bits(), range.hi.to_bits());
+    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), key, squares, || {
+        (depth_image(&preview.depth, map, range), Histogram::of(preview.depth.as_slice()))
+    });
+    let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
+    output.paint(texture, Color32::WHITE);
+    if cx.state.settings.footprint_visible {
+        output.dashed_rect(gelslim_footprint_in_bubble(finger), Color32::from_gray(235));
+    }
+    if let Some(px) = output.hovered {
+        readout(cx, &output, pane, finger, &preview.depth, px);
+        hover(cx, finger, px);
+    }
+    output.caption(Align2::LEFT_TOP, &finger_text(cx.state, finger), cx.p.strong_on_image());
+    let text = format!("preview, step {} of {}", preview.step, preview.of);
+    output.caption(Align2::RIGHT_TOP, &text, super::theme::DARK.caution);
     histogram
 }
 

@@ -7,7 +7,7 @@ use super::cx::Cx;
 use super::theme::{caption, section};
 use crate::app::action::Action;
 use crate::app::command::Command;
-use crate::app::settings::{ColourMap, RuntimeChoice, Theme};
+use crate::app::settings::{ColourMap, MAX_CACHE_MIB, RuntimeChoice, Theme};
 
 /// The pane.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -72,6 +72,18 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         });
         response.response.accessible_name("Runtime").on_hover_text("What runs the models");
+    });
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Keep predictions").color(cx.p.weak));
+        let mut mib = settings.cache_mib;
+        let drag = egui::DragValue::new(&mut mib).speed(8.0).range(0..=MAX_CACHE_MIB).suffix(" MiB");
+        let response = ui.add(drag.update_while_editing(false)).accessible_name("Keep predictions");
+        if response.changed() {
+            cx.out.push(Command::SetCacheBudget(mib));
+        }
+        response.on_hover_text(
+            "What predictions kept on the disk may take; the least recently used go first. 0 keeps none. Default 512 MiB",
+        );
     });
     if let Ok(device) = cx.device {
         ui.label(caption(format!("Graphics: {}", device.adapter()), cx.p));

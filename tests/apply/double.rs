@@ -9,13 +9,15 @@ use touch2touch::app::command::{Command, Opened};
 use touch2touch::app::document::{PairLabels, Review};
 use touch2touch::app::error::TaskError;
 use touch2touch::app::jobs::JobCx;
-use touch2touch::app::keys::{Recipe, ShiftMode};
-use touch2touch::app::library::{BundleInfo, BundleKind, Place};
+use touch2touch::app::keys::{Recipe, ShiftMode, TouchKey};
+use touch2touch::app::library::{BundleInfo, BundleKind, GeneratorInfo, Place};
+use touch2touch::app::results::Prediction;
 use touch2touch::app::runtime::Runtime;
-use touch2touch::app::services::{DataSource, Generated, Services};
+use touch2touch::app::services::{DataSource, GenerateItem, Generated, Services};
 use touch2touch::app::settings::{RuntimeChoice, Settings};
 use touch2touch::app::state::State;
 use touch2touch::app::tasks::Level;
+use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::dataset::{Index, PairEntry, PairId, Problem, Split};
 use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use touch2touch::domain::mesh::TriMesh;
@@ -174,6 +176,12 @@ pub(crate) struct Double {
     panics: AtomicBool,
     cancel_at: AtomicU64,
     settings_saved: AtomicU64,
+    /// Calls of the generator, whatever is in them.
+    pub(crate) batches: AtomicU64,
+    /// Times the disk was looked through.
+    pub(crate) looked_up: AtomicU64,
+    /// What lies on the disk.
+    pub(crate) kept: Mutex<Vec<Prediction>>,
     bundles: bool,
 }
 
@@ -185,6 +193,9 @@ impl Double {
             panics: AtomicBool::new(false),
             cancel_at: AtomicU64::new(u64::MAX),
             settings_saved: AtomicU64::new(0),
+            batches: AtomicU64::new(0),
+            looked_up: AtomicU64::new(0),
+            kept: Mutex::default(),
             bundles,
         }
     }
@@ -224,7 +235,11 @@ impl Services for Double {
             name: id.into(),
             kind,
             folder: PathBuf::from(id),
-            steps: Some(20),
+            generator: (kind == BundleKind::Generator).then(|| GeneratorInfo {
+                defaults: GenerateConfig { steps: 20, ..GenerateConfig::default() },
+                training_steps: 1000,
+                guided: false,
+            }),
         };
         match self.bundles {
             true => (vec![bundle("gen", BundleKind::Generator), bundle("unet", BundleKind::Mask)], Vec::new()),
@@ -234,11 +249,44 @@ impl Services for Double {
 
     fn generate(
         &self,
-        recipe: &Recipe,
         _: &BundleInfo,
-        difference: &RgbGrid,
+        items: &[GenerateItem<'_>],
         cx: &JobCx,
-    ) -> Result<Generated, TaskError> {
+    ) -> Result<Vec<Generated>, TaskError> {
+        self.batches.fetch_add(1, Ordering::Relaxed);
+        items.iter().map(|item| self.generate_one(&item.recipe, item.difference, cx)).collect()
+    }
+
+    fn stored(
+        &self,
+        _: &[BundleInfo],
+        _: RuntimeChoice,
+        touch: TouchKey,
+        _: &RgbGrid,
+    ) -> Vec<Prediction> {
+        self.looked_up.fetch_add(1, Ordering::Relaxed);
+        let kept = self.kept.lock().unwrap();
+        kept.iter().filter(|p| p.recipe.touch.pair.pair == touch.pair.pair && p.recipe.touch.finger == touch.finger)
+            .map(|p| Prediction { recipe: Recipe { touch, ..p.recipe.clone() }, ..p.clone() })
+            .collect()
+    }
+
+    fn mask_by_model(&self, _: &BundleInfo, _: RuntimeChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
+        Ok(imprint.map(|v| *v > 0.006))
+    }
+
+    fn load_settings(&self) -> (Settings, Option<TaskError>) {
+        (Settings::default(), None)
+    }
+
+    fn save_settings(&self, _: &Settings) -> Result<(), TaskError> {
+        self.settings_saved.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+impl Double {
+    fn generate_one(&self, recipe: &Recipe, difference: &RgbGrid, cx: &JobCx) -> Result<Generated, TaskError> {
         self.generated.fetch_add(1, Ordering::Relaxed);
         assert!(!self.panics.load(Ordering::Relaxed), "the model fell over");
         for step in 0..u64::from(recipe.steps) {
@@ -267,20 +315,7 @@ impl Services for Double {
         };
         let chains = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse]
             .map(|mode| (mode, chain.clone().with_mode(mode, None).map_err(|err| err.to_string())));
-        Ok(Generated { raw, chains: chains.into(), runtime: "double".into() })
-    }
-
-    fn mask_by_model(&self, _: &BundleInfo, _: RuntimeChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
-        Ok(imprint.map(|v| *v > 0.006))
-    }
-
-    fn load_settings(&self) -> (Settings, Option<TaskError>) {
-        (Settings::default(), None)
-    }
-
-    fn save_settings(&self, _: &Settings) -> Result<(), TaskError> {
-        self.settings_saved.fetch_add(1, Ordering::Relaxed);
-        Ok(())
+        Ok(Generated { raw, chains: chains.into(), runtime: "double".into(), kept: None })
     }
 }
 

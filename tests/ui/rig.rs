@@ -8,11 +8,11 @@ use egui_kittest::Harness;
 use touch2touch::app::command::{Command, Opened};
 use touch2touch::app::error::TaskError;
 use touch2touch::app::jobs::JobCx;
-use touch2touch::app::keys::Recipe;
-use touch2touch::app::library::{BundleInfo, BundleKind, Place};
+use touch2touch::app::library::{BundleInfo, BundleKind, GeneratorInfo, Place};
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::app::services::{Generated, Services};
+use touch2touch::app::services::{GenerateItem, Generated, Services};
 use touch2touch::app::settings::{RuntimeChoice, Settings};
+use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use touch2touch::domain::postprocess::{
     DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift, ShiftMode, ShiftStats,
@@ -55,21 +55,25 @@ impl Services for QuickGenerator {
             name: "quick double".into(),
             kind: BundleKind::Generator,
             folder: PathBuf::new(),
-            steps: Some(4),
+            generator: Some(GeneratorInfo {
+                defaults: GenerateConfig { steps: 4, ..GenerateConfig::default() },
+                training_steps: 1000,
+                guided: false,
+            }),
         };
         (vec![info], Vec::new())
     }
 
     fn generate(
         &self,
-        recipe: &Recipe,
         _bundle: &BundleInfo,
-        difference: &RgbGrid,
+        items: &[GenerateItem<'_>],
         cx: &JobCx,
-    ) -> Result<Generated, TaskError> {
-        for step in 0..recipe.steps {
+    ) -> Result<Vec<Generated>, TaskError> {
+        let steps = items.first().map_or(0, |item| item.recipe.steps);
+        for step in 0..steps {
             cx.check("Generate")?;
-            cx.progress(step.into(), recipe.steps.into(), format!("step {} of {}", step + 1, recipe.steps));
+            cx.progress(step.into(), steps.into(), format!("step {} of {steps}", step + 1));
         }
         let chain = DepthChain {
             range: DepthRange { min_m: -0.0063, max_m: 0.018 },
@@ -85,8 +89,11 @@ impl Services for QuickGenerator {
             .into_iter()
             .map(|mode| (mode, chain.clone().with_mode(mode, Some(stats)).map_err(|e| e.to_string())))
             .collect();
-        let raw = RawPrediction { channels: vec![picture(difference, recipe.seed)] };
-        Ok(Generated { raw, chains, runtime: "double".into() })
+        let one = |item: &GenerateItem<'_>| {
+            let raw = RawPrediction { channels: vec![picture(item.difference, item.recipe.seed)] };
+            Generated { raw, chains: chains.clone(), runtime: "double".into(), kept: None }
+        };
+        Ok(items.iter().map(one).collect())
     }
 
     fn mask_by_model(

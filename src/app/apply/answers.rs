@@ -7,11 +7,11 @@ use super::super::command::{Command, Computed, Opened};
 use super::super::document::{Document, PairLabels, Stored};
 use super::super::effect::Effect;
 use super::super::error::{TaskError, TaskErrorKind};
-use super::super::keys::{DatasetSeq, ImprintKey, ImprintSource, PairKey, PoseKey, Request};
+use super::super::keys::{DatasetSeq, ImprintKey, ImprintSource, PairKey, PoseKey, Request, TouchKey};
 use super::super::library::{BundleKind, OpenDataset, Place};
 use super::super::results::Prediction;
 use super::super::state::State;
-use super::super::tasks::{Level, Ticket};
+use super::super::tasks::{Level, Task, Ticket};
 use super::{cancel_all, inspect, is_selected, masks, preferences, remember, reorder, workbench};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
@@ -57,9 +57,17 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
                 store(state, request, computed);
             }
         }
-        Command::Generated(ticket, prediction) => {
-            state.tasks.running.remove(&ticket);
-            generated(state, prediction);
+        Command::Generated(ticket, predictions) => {
+            forget(state, ticket);
+            for prediction in predictions {
+                generated(state, prediction);
+            }
+        }
+        Command::Previewed(ticket, preview) => {
+            // One that comes after its result, or after Cancel, is too late.
+            if state.tasks.running.get(&ticket).is_some_and(|task| !task.cancelling) {
+                state.results.previews.insert(preview.recipe.touch, preview);
+            }
         }
         Command::Progressed(ticket, progress) => {
             if let Some(task) = state.tasks.running.get_mut(&ticket) {
@@ -150,6 +158,12 @@ fn store(state: &mut State, request: Request, computed: Computed) {
             // The registration's field and tree are of the mesh's order, at least a few MB.
             results.tools.insert(name.to_string(), tool, 8 * mesh + (4 << 20));
         }
+        (Request::Stored(touch), Computed::Predictions(list)) => stored(state, touch, list),
+        (Request::Prediction(_), Computed::Predictions(list)) => {
+            for prediction in list {
+                generated(state, prediction);
+            }
+        }
         (Request::Imprint(recipe, shift), Computed::Depth(depth)) => {
             let size = bytes(&depth);
             results.imprints.insert((recipe, shift), depth, size);
@@ -232,6 +246,32 @@ fn store_labels(state: &mut State, key: PairKey, mut labels: PairLabels) {
     doc.set_review(&name, review);
 }
 
+/// Ends a task; what it showed on the way is not shown any more.
+fn forget(state: &mut State, ticket: Ticket) -> Option<Task> {
+    let task = state.tasks.running.remove(&ticket)?;
+    for recipe in &task.recipes {
+        if state.results.previews.get(&recipe.touch).is_some_and(|preview| preview.recipe == *recipe) {
+            state.results.previews.remove(&recipe.touch);
+        }
+    }
+    Some(task)
+}
+
+/// Keeps what was made of a touch before; what fits the settings is shown if nothing is yet, else the last used.
+fn stored(state: &mut State, touch: TouchKey, predictions: Vec<Arc<Prediction>>) {
+    state.results.looked_up.insert(touch);
+    let shown = state.results.chosen.get(&touch).cloned();
+    let fitting = state.recipe(touch).filter(|recipe| predictions.iter().any(|p| p.recipe == *recipe));
+    for prediction in predictions {
+        if !state.results.predictions.contains(&prediction.recipe) {
+            generated(state, prediction);
+        }
+    }
+    if let Some(recipe) = shown.or(fitting).filter(|recipe| state.results.predictions.contains(recipe)) {
+        state.results.chosen.insert(touch, recipe);
+    }
+}
+
 fn generated(state: &mut State, prediction: Arc<Prediction>) {
     let recipe = prediction.recipe.clone();
     if state.library.open.as_ref().map(|open| open.seq) != Some(recipe.touch.pair.dataset) {
@@ -254,9 +294,9 @@ fn generated(state: &mut State, prediction: Arc<Prediction>) {
 }
 
 fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
-    let Some(task) = state.tasks.running.remove(&ticket) else { return };
+    let Some(task) = forget(state, ticket) else { return };
     let current = state.library.open.as_ref().map(|open| open.seq);
-    let outdated = task.recipe.as_ref().is_some_and(|r| Some(r.touch.pair.dataset) != current);
+    let outdated = task.recipes.iter().any(|r| Some(r.touch.pair.dataset) != current);
     if outdated && err.is_cancelled() {
         return;
     }

@@ -8,7 +8,7 @@ use super::super::state::{Absent, State};
 use super::save_settings;
 use crate::domain::sensor::Finger;
 
-/// Starts a prediction for each finger asked for; one that exists is shown instead.
+/// Starts the predictions of the fingers that are looked at, in one go; one that exists is shown instead.
 pub(super) fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
     if let Err(absent) = state.can_generate() {
         return state.log.error(&refusal(absent));
@@ -17,50 +17,40 @@ pub(super) fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effe
         state.settings.generate.seed = next_seed(state.settings.generate.seed);
         save_settings(state, effects);
     }
-    let fingers: &[Finger] =
-        if state.settings.generate.both_fingers { &Finger::BOTH } else { &[state.selection.finger] };
-    let mut possible = 0;
-    for finger in fingers {
-        // A finger without a GelSlim image is left out; while the sample loads, the job finds out.
-        if state.sample().ready().is_some() && state.gelslim(*finger).ready().is_none() {
-            continue;
-        }
-        possible += 1;
-        start(state, *finger, effects);
+    // A finger without a GelSlim image is left out; while the sample loads, the job finds out.
+    let loaded = state.sample().ready().is_some();
+    let mut fingers = state.fingers_to_generate();
+    fingers.retain(|finger| !loaded || state.gelslim(*finger).ready().is_some());
+    if fingers.is_empty() {
+        return state.log.error(&refusal(Absent::NoGelSlim));
     }
-    if possible == 0 {
-        state.log.error(&refusal(Absent::NoGelSlim));
-    }
+    start(state, &fingers, effects);
 }
 
 fn refusal(absent: Absent) -> TaskError {
     TaskError::new("Generate", absent.text().trim_end_matches('.'))
 }
 
-fn start(state: &mut State, finger: Finger, effects: &mut Vec<Effect>) {
+fn start(state: &mut State, fingers: &[Finger], effects: &mut Vec<Effect>) {
     let Ok(bundle) = state.bundle(BundleKind::Generator).cloned() else { return };
-    let (Some(touch), Some(open)) = (state.touch_key(finger), &state.library.open) else { return };
-    let settings = &state.settings.generate;
-    let recipe = Recipe {
-        touch,
-        bundle: bundle.id.clone(),
-        steps: settings.steps,
-        seed: settings.seed,
-        sampler: settings.sampler,
-        eta: settings.eta.into(),
-        runtime: state.settings.runtime,
-    };
-    if state.results.predictions.contains(&recipe) {
-        state.results.chosen.insert(touch, recipe);
+    let (Some(pair), Some(open)) = (state.pair_key(), &state.library.open) else { return };
+    let (source, sample) = (open.source.clone(), state.results.samples.get(&pair).cloned());
+    let mut recipes: Vec<Recipe> = Vec::new();
+    for finger in fingers {
+        let Some(recipe) = state.recipe(pair.finger(*finger)) else { continue };
+        if state.results.predictions.contains(&recipe) {
+            state.results.chosen.insert(recipe.touch, recipe);
+        } else if state.tasks.generating(&recipe).is_none_or(|(_, task)| task.cancelling) {
+            recipes.push(recipe);
+        }
+    }
+    if recipes.is_empty() {
         return;
     }
-    if state.tasks.generating(&recipe).is_some_and(|(_, task)| !task.cancelling) {
-        return;
-    }
-    let (source, sample) = (open.source.clone(), state.results.samples.get(&touch.pair).cloned());
-    let title = format!("Generate {} {}", state.pair_name(), finger.name());
-    let ticket = state.tasks.start(title, Some(recipe.clone()));
-    effects.push(Effect::Generate { ticket, recipe, bundle, source, sample });
+    let names: Vec<&str> = recipes.iter().map(|recipe| recipe.touch.finger.name()).collect();
+    let title = format!("Generate {} {}", state.pair_name(), names.join(" and "));
+    let ticket = state.tasks.start(title, recipes.clone());
+    effects.push(Effect::Generate { ticket, recipes, bundle, source, sample });
 }
 
 /// The seed after `seed`: scattered, so that neighbours share nothing, and short enough to be read out.

@@ -3,7 +3,7 @@
 use super::super::command::Command;
 use super::super::effect::Effect;
 use super::super::keys::ImprintSource;
-use super::super::settings::{ColourRange, MaskTool, Settings};
+use super::super::settings::{ColourRange, GenerateSettings, MaskTool, Settings};
 use super::super::state::State;
 use super::save_settings;
 
@@ -23,7 +23,13 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
         Command::RangeFromShown => range_from_shown(state),
         Command::SetColourMap(map) => settings.colour_map = map,
         Command::SetShift(shift) => settings.shift = shift,
-        Command::SetGenerate(generate) => settings.generate = generate,
+        Command::SetGenerate(generate) => {
+            // Whoever changes a number of a preset has left it.
+            let before = &settings.generate;
+            let left = generate.preset == before.preset && !generate.same_numbers(before);
+            let preset = generate.preset.filter(|_| !left);
+            settings.generate = GenerateSettings { preset, ..generate };
+        }
         Command::SetMask(mask) => settings.mask = mask,
         Command::SetMaskTool(tool) => set_tool(settings, tool),
         Command::LastMaskTool => set_tool(settings, settings.mask.last_tool),
@@ -35,6 +41,7 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
         Command::SetFootprintVisible(visible) => settings.footprint_visible = visible,
         Command::SetPoseEngine(engine) => settings.pose_engine = engine,
         Command::SetRuntime(runtime) => settings.runtime = runtime,
+        Command::SetCacheBudget(mib) => settings.cache_mib = mib,
         Command::SetCamerasLinked(linked) => settings.cameras_linked = linked,
         Command::SetWorkspace(workspace) => settings.workspace = workspace,
         Command::SetLayout(workspace, layout) => {

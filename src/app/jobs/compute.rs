@@ -14,6 +14,7 @@ use crate::domain::inspect::{basin_map, recorded};
 use crate::domain::mesh::TriMesh;
 use crate::domain::metrics::{self, SsimRange};
 use crate::domain::pose::{ToolModel, register};
+use crate::domain::postprocess::{DepthChain, PostprocessError, RawPrediction};
 use crate::domain::resample::bilinear;
 use crate::domain::sample::{BubbleCamera, BubbleTouch, Sample, Scale};
 use crate::domain::sensor::Finger;
@@ -37,7 +38,16 @@ pub fn imprint(prediction: &Prediction, shift: ShiftMode, size: [usize; 2]) -> R
         }
         None => return Err(TaskError::new(what, "the bundle does not offer it")),
     };
-    let depth = chain.run(&prediction.output.raw).map_err(|err| TaskError::from_error(&what, &err))?;
+    in_metres(chain, &prediction.output.raw, size).map_err(|err| TaskError::from_error(&what, &err))
+}
+
+/// A decoder's picture in metres, as large as the bubble image `size` (`[width, height]`; with a zero in it the chain's
+/// own size is kept).
+///
+/// # Errors
+/// If the chain does not fit the picture.
+pub fn in_metres(chain: &DepthChain, raw: &RawPrediction, size: [usize; 2]) -> Result<DepthMap, PostprocessError> {
+    let depth = chain.run(raw)?;
     if depth.size() == size || size.contains(&0) { Ok(depth) } else { Ok(bilinear(&depth, size[0], size[1])) }
 }
 

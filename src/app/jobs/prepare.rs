@@ -8,7 +8,7 @@ use super::super::inspect::Inspection;
 use super::super::keys::{CloudKey, ImprintKey, MaskRecipe, MaskVersion, PairKey, Request, RunKey, TouchKey};
 use super::super::services::SharedServices;
 use super::super::state::State;
-use super::{JobCx, Lane, compute, inspect};
+use super::{JobCx, Lane, compute, generate, inspect};
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::Sample;
 
@@ -98,6 +98,35 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 what,
                 Box::new(move |_| Ok(Computed::Tool(Arc::new(compute::named_tool(&name, source.tool_mesh(&name)?)?)))),
+            )
+        }
+        Request::Stored(touch) => {
+            let (services, touch) = (services.clone(), *touch);
+            let bundles = state.library.bundles.clone();
+            let runtime = state.settings.runtime;
+            let sample = results.samples.get(&touch.pair)?.clone();
+            sample.finger(touch.finger)?.gelslim.as_ref()?;
+            job(
+                Lane::Files,
+                "Look for earlier predictions".into(),
+                Box::new(move |_| {
+                    let gelslim = sample.finger(touch.finger).and_then(|t| t.gelslim.as_ref());
+                    let found = gelslim.map(|g| services.stored(&bundles, runtime, touch, &g.difference));
+                    Ok(Computed::Predictions(found.unwrap_or_default().into_iter().map(Arc::new).collect()))
+                }),
+            )
+        }
+        Request::Prediction(recipe) => {
+            let (services, recipe) = (services.clone(), recipe.clone());
+            let bundle = state.library.bundle(&recipe.bundle)?.clone();
+            let sample = results.samples.get(&recipe.touch.pair).cloned();
+            job(
+                Lane::Models,
+                format!("Generate with {}", bundle.name),
+                Box::new(move |cx| {
+                    let made = generate::generate(&*services, vec![recipe], &bundle, &*source, sample, cx)?;
+                    Ok(Computed::Predictions(made))
+                }),
             )
         }
         Request::Imprint(recipe, shift) => {

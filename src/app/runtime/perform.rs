@@ -1,7 +1,6 @@
 //! From effects to jobs.
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::super::command::{Command, UiRequest};
 use super::super::effect::Effect;
@@ -9,12 +8,12 @@ use super::super::error::TaskError;
 use super::super::evaluation::EvaluateCommand;
 use super::super::jobs::evaluate;
 use super::super::jobs::prepare::Body;
-use super::super::jobs::{Cancel, JobCx, Lane};
-use super::super::results::Prediction;
+use super::super::jobs::generate::generate;
+use super::super::jobs::{Cancel, JobCx, Lane, PreviewSink};
+use super::super::results::Preview;
 use super::super::tasks::Ticket;
 use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
-use crate::domain::sample::Sample;
 
 impl Runtime {
     pub(super) fn perform(&mut self, effect: Effect, ui: &mut Vec<UiRequest>) {
@@ -40,19 +39,18 @@ impl Runtime {
                     }),
                 );
             }
-            Effect::Generate { ticket, recipe, bundle, source, sample } => {
+            Effect::Generate { ticket, recipes, bundle, source, sample } => {
                 let services = self.services.clone();
                 let what = format!("Generate with {}", bundle.name);
+                let (wish, latest, wake) = (self.preview_wish.clone(), self.previews.clone(), self.wake.clone());
                 let body: Body<Command> = Box::new(move |cx| {
-                    let start = Instant::now();
-                    let sample = match sample {
-                        Some(sample) => sample,
-                        None => Arc::new(source.load(recipe.touch.pair.pair)?),
-                    };
-                    let difference = difference(&sample, &recipe)?;
-                    let output = services.generate(&recipe, &bundle, difference, cx)?;
-                    let seconds = start.elapsed().as_secs_f64();
-                    Ok(Command::Generated(ticket, Arc::new(Prediction { recipe, output, seconds })))
+                    let show: PreviewSink = Arc::new(move |preview: Preview| {
+                        lock(&latest).insert(preview.recipe.touch, (ticket, Arc::new(preview)));
+                        wake();
+                    });
+                    let cx = cx.clone().with_previews(wish, show);
+                    let made = generate(&*services, recipes, &bundle, &*source, sample, &cx)?;
+                    Ok(Command::Generated(ticket, made))
                 });
                 self.task(Lane::Models, ticket, what, body);
             }
@@ -146,15 +144,4 @@ impl Runtime {
         let failed = Box::new(Command::SaveFailed);
         self.lanes.submit(lane, Job { id, what: what.to_owned(), cx: JobCx::unwatched(), body, failed });
     }
-}
-
-/// The GelSlim image that is the condition.
-fn difference<'a>(
-    sample: &'a Sample,
-    recipe: &super::super::keys::Recipe,
-) -> Result<&'a crate::domain::grid::RgbGrid, TaskError> {
-    let touch = sample.finger(recipe.touch.finger).and_then(|touch| touch.gelslim.as_ref());
-    touch.map(|gelslim| &gelslim.difference).ok_or_else(|| {
-        TaskError::new("Generate", format!("the {} finger has no GelSlim image", recipe.touch.finger.name()))
-    })
 }

@@ -2,30 +2,28 @@
 //! configuration folder.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-use strum::IntoEnumIterator as _;
 
 use super::super::command::Opened;
 use super::super::document::{HandMask, PairLabels, Review};
 use super::super::error::TaskError;
 use super::super::jobs::JobCx;
-use super::super::keys::{Recipe, Revision, ShiftMode};
-use super::super::library::{BundleInfo, BundleKind, Place};
+use super::super::keys::{Revision, TouchKey};
+use super::super::library::{BundleInfo, BundleKind, GeneratorInfo, Place};
+use super::super::results::Prediction;
 use super::super::settings::{RuntimeChoice, SETTINGS_VERSION, Settings};
-use super::{DataSource, Generated, Services};
+use super::{DataSource, GenerateItem, Generated, Services};
 use crate::domain::dataset::{Index, PairId, Problem};
-use crate::domain::diffusion::{self, GenerateConfig};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::infer::bundle::{self, Bundle, BundleSpec};
 use crate::infer::engine::EngineChoice;
-use crate::infer::generator::{GenerateError, Generator};
+use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
+use crate::infer::store::{self, Store};
 use crate::io::atomic;
 use crate::io::dataset::Dataset;
 use crate::io::export_unet::{self, ExportConfig, ExportEntry};
@@ -37,29 +35,34 @@ const SETTINGS_FILE: &str = "settings.json";
 const BAD_SETTINGS_FILE: &str = "settings.bad.json";
 
 /// A model in memory, with the bundle's identity and the runtime it was loaded for.
-type Loaded<T> = Option<((Arc<str>, RuntimeChoice), T)>;
+pub(super) type Loaded<T> = Option<((Arc<str>, RuntimeChoice), T)>;
 
 /// The program's services. Models stay loaded between calls.
 #[derive(Debug, Default)]
 pub struct LiveServices {
     config_folder: Option<PathBuf>,
-    generator: Mutex<Loaded<Generator>>,
+    /// Predictions kept on the disk.
+    pub(super) store: Option<Mutex<Store>>,
+    pub(super) generator: Mutex<Loaded<Generator>>,
     mask_model: Mutex<Loaded<MaskModel>>,
 }
 
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl LiveServices {
     /// With settings in the user's configuration folder.
     pub fn new() -> Self {
-        Self { config_folder: user_config_folder(), ..Self::default() }
+        let store = store::user_folder().map(|folder| Mutex::new(Store::new(folder, store::DEFAULT_BUDGET)));
+        Self { config_folder: user_config_folder(), store, ..Self::default() }
     }
 
-    /// With settings in a given folder; `None` keeps none.
+    /// With settings and kept predictions in a given folder; `None` keeps none.
     pub fn with_config_folder(folder: Option<PathBuf>) -> Self {
-        Self { config_folder: folder, ..Self::default() }
+        let kept = folder.as_ref().map(|folder| folder.join("predictions"));
+        let store = kept.map(|folder| Mutex::new(Store::new(folder, store::DEFAULT_BUDGET)));
+        Self { config_folder: folder, store, ..Self::default() }
     }
 }
 
@@ -318,44 +321,21 @@ impl Services for LiveServices {
 
     fn generate(
         &self,
-        recipe: &Recipe,
         bundle: &BundleInfo,
-        difference: &RgbGrid,
+        items: &[GenerateItem<'_>],
         cx: &JobCx,
-    ) -> Result<Generated, TaskError> {
-        let what = format!("Generate with {}", bundle.name);
-        cx.progress(0, recipe.steps.into(), "loading the model");
-        let key = (bundle.id.clone(), recipe.runtime);
-        let mut loaded = lock(&self.generator);
-        if loaded.as_ref().is_none_or(|(k, _)| *k != key) {
-            // Before the new one is loaded, so that both are never in memory.
-            *loaded = None;
-            let checked = open_bundle(&what, bundle)?;
-            let generator =
-                Generator::open(&checked, recipe.runtime.into()).map_err(|err| TaskError::from_error(&what, &err))?;
-            *loaded = Some((key, generator));
-        }
-        let Some((_, generator)) = loaded.as_mut() else { return Err(TaskError::new(what, "no model is loaded")) };
-        let config = GenerateConfig {
-            steps: recipe.steps,
-            eta: f64::from(recipe.eta.get()),
-            seed: recipe.seed,
-            sampler: recipe.sampler,
-            spacing: generator.spec().defaults.spacing,
-        };
-        let mut progress = |p: diffusion::Progress| {
-            cx.progress(p.step.into(), p.of.into(), format!("step {} of {}", p.step, p.of));
-            if cx.cancel.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let raw = match generator.generate(difference, &config, &mut progress) {
-            Ok(raw) => raw,
-            Err(GenerateError::Cancelled) => return Err(TaskError::cancelled(what)),
-            Err(err) => return Err(TaskError::from_error(what, &err)),
-        };
-        let chains = ShiftMode::iter()
-            .map(|mode| (mode, generator.spec().depth_chain(mode).map_err(|err| err.to_string())))
-            .collect();
-        Ok(Generated { raw, chains, runtime: generator.engine().label().to_owned() })
+    ) -> Result<Vec<Generated>, TaskError> {
+        super::predictions::generate(self, bundle, items, cx)
+    }
+
+    fn stored(
+        &self,
+        bundles: &[BundleInfo],
+        runtime: RuntimeChoice,
+        touch: TouchKey,
+        difference: &RgbGrid,
+    ) -> Vec<Prediction> {
+        super::predictions::stored(self, bundles, runtime, touch, difference)
     }
 
     fn mask_by_model(
@@ -378,6 +358,32 @@ impl Services for LiveServices {
     }
 
     fn load_settings(&self) -> (Settings, Option<TaskError>) {
+        let (settings, problem) = self.read_settings();
+        self.keep_at_most(&settings);
+        (settings, problem)
+    }
+
+    fn save_settings(&self, settings: &Settings) -> Result<(), TaskError> {
+        const WHAT: &str = "Save the preferences";
+        self.keep_at_most(settings);
+        let Some(folder) = &self.config_folder else { return Ok(()) };
+        let file = folder.join(SETTINGS_FILE);
+        let fail = |err: std::io::Error| TaskError::new(WHAT, format!("{err} ({})", file.display()));
+        let text = serde_json::to_vec_pretty(settings).map_err(|err| fail(err.into()))?;
+        std::fs::create_dir_all(folder).map_err(fail)?;
+        atomic::write_bytes(&file, &text).map_err(fail)
+    }
+}
+
+impl LiveServices {
+    /// The budget of the kept predictions as the settings say.
+    fn keep_at_most(&self, settings: &Settings) {
+        if let Some(store) = &self.store {
+            lock(store).set_budget(u64::from(settings.cache_mib) << 20);
+        }
+    }
+
+    fn read_settings(&self) -> (Settings, Option<TaskError>) {
         let Some(folder) = &self.config_folder else { return (Settings::default(), None) };
         let file = folder.join(SETTINGS_FILE);
         let bytes = match std::fs::read(&file) {
@@ -401,16 +407,6 @@ impl Services for LiveServices {
                 (Settings::default(), Some(problem))
             }
         }
-    }
-
-    fn save_settings(&self, settings: &Settings) -> Result<(), TaskError> {
-        const WHAT: &str = "Save the preferences";
-        let Some(folder) = &self.config_folder else { return Ok(()) };
-        let file = folder.join(SETTINGS_FILE);
-        let fail = |err: std::io::Error| TaskError::new(WHAT, format!("{err} ({})", file.display()));
-        let text = serde_json::to_vec_pretty(settings).map_err(|err| fail(err.into()))?;
-        std::fs::create_dir_all(folder).map_err(fail)?;
-        atomic::write_bytes(&file, &text).map_err(fail)
     }
 }
 
@@ -437,12 +433,16 @@ pub fn info(bundle: &Bundle) -> BundleInfo {
             BundleSpec::ToolClassifier(_) => BundleKind::Classifier,
         },
         folder: bundle.dir().to_owned(),
-        steps: bundle.generator().map(|spec| spec.defaults.steps),
+        generator: bundle.generator().map(|spec| GeneratorInfo {
+            defaults: spec.defaults,
+            training_steps: spec.schedule.training_steps(),
+            guided: spec.guidance.is_some(),
+        }),
     }
 }
 
 /// Opens a bundle that was found before. It must still be the same: its identity is part of the recipe.
-fn open_bundle(what: &str, bundle: &BundleInfo) -> Result<Bundle, TaskError> {
+pub(super) fn open_bundle(what: &str, bundle: &BundleInfo) -> Result<Bundle, TaskError> {
     let checked = Bundle::open(&bundle.folder).map_err(|err| TaskError::from_error(what, &err))?;
     if checked.hash() == &*bundle.id {
         return Ok(checked);

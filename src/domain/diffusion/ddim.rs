@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use super::{GaussianNoise, Schedule, ScheduleError, Spacing, Step, Tensor};
+use super::{GUIDANCE, GaussianNoise, Schedule, ScheduleError, Spacing, Step, Tensor, Watch};
 
 /// A clean latent, `[batch, channels, height, width]`.
 pub type Latent = Tensor;
@@ -71,12 +71,21 @@ pub struct GenerateConfig {
     pub sampler: Sampler,
     /// The training steps visited.
     pub spacing: Spacing,
+    /// Scale of classifier-free guidance, [`GUIDANCE`]; 1 is none. Whoever makes the denoiser sees to it (with
+    /// [`super::Guided`]); the sampler itself only passes it on.
+    #[serde(default = "no_guidance")]
+    pub guidance: f64,
 }
 
 impl Default for GenerateConfig {
     fn default() -> Self {
-        Self { steps: 50, eta: 0.0, seed: 42, sampler: Sampler::Ddim, spacing: Spacing::Trailing }
+        let guidance = no_guidance();
+        Self { steps: 50, eta: 0.0, seed: 42, sampler: Sampler::Ddim, spacing: Spacing::Trailing, guidance }
     }
+}
+
+fn no_guidance() -> f64 {
+    1.0
 }
 
 /// How far a generation is. Sent before each step; answer `Break` to cancel.
@@ -136,6 +145,9 @@ pub enum DiffusionError {
     /// Eta outside [0, 1] or NaN.
     #[error("eta is {0}; choose 0 (deterministic) to 1")]
     Eta(f64),
+    /// A guidance scale that cannot be used.
+    #[error("the guidance scale is {0}; choose {start} to {end}, 1 for none", start = GUIDANCE.start(), end = GUIDANCE.end())]
+    Guidance(f64),
     /// Seeds and conditions do not match in number.
     #[error("{seeds} seeds for {conditions} conditions")]
     Batch {
@@ -190,10 +202,28 @@ pub fn sample_seeds(
     config: &GenerateConfig,
     seeds: &[u64],
     condition: &Tensor,
-    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    mut progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<Latent, DiffusionError> {
+    sample_watched(denoiser, schedule, config, seeds, condition, &mut progress)
+}
+
+/// As [`sample_seeds`], with clean latents on the way for a [`Watch`] that wants them.
+///
+/// # Errors
+/// See [`DiffusionError`].
+pub fn sample_watched(
+    denoiser: &mut dyn Denoiser,
+    schedule: &Schedule,
+    config: &GenerateConfig,
+    seeds: &[u64],
+    condition: &Tensor,
+    watch: &mut dyn Watch,
 ) -> Result<Latent, DiffusionError> {
     if !(0.0..=1.0).contains(&config.eta) {
         return Err(DiffusionError::Eta(config.eta));
+    }
+    if !GUIDANCE.contains(&config.guidance) {
+        return Err(DiffusionError::Guidance(config.guidance));
     }
     if seeds.len() != condition.batch() {
         return Err(DiffusionError::Batch { seeds: seeds.len(), conditions: condition.batch() });
@@ -201,7 +231,7 @@ pub fn sample_seeds(
     let prediction = denoiser.prediction();
     let steps = schedule.steps(config.steps, config.spacing, prediction)?;
     let of = steps.len() as u32;
-    let mut tell = |step: u32| match progress(Progress { step, of }) {
+    let tell = |watch: &mut dyn Watch, step: u32| match watch.progress(Progress { step, of }) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(DiffusionError::Cancelled),
     };
@@ -220,7 +250,7 @@ pub fn sample_seeds(
     }
 
     for (done, step) in steps.iter().enumerate() {
-        tell(done as u32)?;
+        tell(watch, done as u32)?;
         input.data_mut().iter_mut().zip(&x).for_each(|(to, &from)| *to = from as f32);
         let output = denoiser.predict(&input, step.timestep, condition)?;
         if output.shape() != shape {
@@ -230,6 +260,12 @@ pub fn sample_seeds(
         let count = output.non_finite();
         if count > 0 {
             return Err(ModelError::NonFinite { graph: "denoiser".into(), count }.into());
+        }
+        let after = Progress { step: done as u32 + 1, of };
+        if after.step < of && watch.wants_estimate(after) {
+            let update = Update::new(step, prediction, 0.0);
+            let clean = x.iter().zip(output.data()).map(|(&x, &output)| update.split(x, f64::from(output)).0 as f32);
+            watch.estimate(after, &Tensor::new(shape.clone(), clean.collect()).expect("one value per latent value"));
         }
         if config.sampler == Sampler::DpmSolver2m {
             let update = SecondOrder::new(step, done.checked_sub(1).map(|before| &steps[before]), prediction);
@@ -246,7 +282,7 @@ pub fn sample_seeds(
             }
         }
     }
-    tell(of)?;
+    tell(watch, of)?;
     input.data_mut().iter_mut().zip(&x).for_each(|(to, &from)| *to = from as f32);
     Ok(input)
 }

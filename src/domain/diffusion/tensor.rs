@@ -62,6 +62,16 @@ impl Tensor {
         Some(Tensor { shape, data: items.iter().flat_map(|t| t.data.iter().copied()).collect() })
     }
 
+    /// Joins tensors along their first axis; `None` for none, for scalars, or where the other axes differ.
+    pub fn concat(items: &[&Tensor]) -> Option<Tensor> {
+        let rest = items.first()?.shape.get(1..)?.to_vec();
+        if items.iter().any(|t| t.shape.get(1..) != Some(&rest)) {
+            return None;
+        }
+        let shape = std::iter::once(items.iter().map(|t| t.batch()).sum()).chain(rest).collect();
+        Some(Tensor { shape, data: items.iter().flat_map(|t| t.data.iter().copied()).collect() })
+    }
+
     /// How many values are NaN or infinite.
     pub fn non_finite(&self) -> usize {
         self.data.iter().filter(|v| !v.is_finite()).count()
@@ -79,6 +89,9 @@ mod tests {
         assert_eq!(both.shape(), [2, 2, 2]);
         assert_eq!(both.item(0), Some(a.clone()));
         assert_eq!(both.item(2), None);
+        let long = Tensor::concat(&[&both, &both]).unwrap();
+        assert_eq!((long.shape(), long.item(3)), (&[4, 2, 2][..], both.item(1)));
+        assert_eq!(Tensor::concat(&[&both, &a]), None);
         assert_eq!(Tensor::stack(&[a, Tensor::filled(vec![4], 0.5)]), None);
         assert_eq!(Tensor::new(vec![2, 2], vec![0.0; 3]), None);
         assert_eq!(Tensor::new(vec![usize::MAX, 2], vec![]), None);

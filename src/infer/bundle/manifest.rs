@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::{Problems, Role};
-use crate::domain::diffusion::{GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
+use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
 use crate::domain::postprocess::{
     DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
 };
@@ -60,6 +60,28 @@ pub struct GeneratorSpec {
     pub defaults: GenerateConfig,
     /// What the denoiser's graph takes as its timestep.
     pub timestep: TimestepType,
+    /// How classifier-free guidance is done; `None` if the model was not trained for it.
+    pub guidance: Option<GuidanceSpec>,
+}
+
+/// `guidance`: only for a denoiser that was trained with the condition left out now and then.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GuidanceSpec {
+    /// What stands in the condition's place.
+    pub unconditional: Unconditional,
+    /// The scale to generate with if nobody chooses; 1 is none.
+    pub scale: f64,
+}
+
+/// The condition that says nothing, as in training.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Unconditional {
+    /// A condition of zeros.
+    ZeroCondition,
+    /// What the condition encoder makes of a GelSlim that feels nothing: a difference of zeros.
+    ZeroDifference,
 }
 
 impl GeneratorSpec {
@@ -424,6 +446,8 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
     let output: Option<OutputSpec> = section(keys, "output", problems);
     let shift: Option<ShiftStats> = if keys.contains_key("shift") { section(keys, "shift", problems) } else { None };
     let defaults: Option<Defaults> = section(keys, "defaults", problems);
+    let guidance: Option<GuidanceSpec> =
+        if keys.contains_key("guidance") { section(keys, "guidance", problems) } else { None };
 
     let mut check = |fine: bool, what: &str, hint: &str| {
         if !fine {
@@ -458,6 +482,11 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         let finite = [s.pred_mean, s.pred_std, s.gt_mean, s.gt_std].iter().all(|v| v.is_finite());
         check(finite && s.pred_std >= 0.0 && s.gt_std >= 0.0, "shift: not usable", "give four finite numbers");
     }
+    if let Some(guidance) = &guidance {
+        let (least, most) = (GUIDANCE.start(), GUIDANCE.end());
+        let hint = format!("choose {least} to {most}; 1 is none");
+        check(GUIDANCE.contains(&guidance.scale), "guidance.scale: out of range", &hint);
+    }
     let schedule = schedule.and_then(|spec| {
         let built = spec.build();
         built.map_err(|err| problems.add(format!("schedule: {err}"), "give the schedule used in training")).ok()
@@ -468,6 +497,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         seed: d.seed,
         sampler: d.sampler,
         spacing: d.spacing,
+        guidance: guidance.map_or(1.0, |g| g.scale),
     });
     if let Some(d) = &defaults {
         if !(0.0..=1.0).contains(&d.eta) {
@@ -489,6 +519,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         shift,
         defaults: defaults?,
         timestep: TimestepType::Int64,
+        guidance,
     })))
 }
 

@@ -1,0 +1,81 @@
+//! [`Preset`]: three ways to generate, for people who do not want to choose a sampler.
+
+use serde::{Deserialize, Serialize};
+
+use super::{GenerateConfig, Sampler, Spacing};
+
+/// Fast, as the bundle recommends, or as good as more steps make it.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    Serialize,
+    Deserialize,
+    strum::EnumIter,
+    strum::EnumString,
+    strum::IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum Preset {
+    /// Two steps: for looking through a data set, and for a robot that waits.
+    Fast,
+    /// What the bundle recommends.
+    #[default]
+    Default,
+    /// As many steps as still change anything.
+    Best,
+}
+
+impl Preset {
+    /// Name in settings, files and on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
+    /// The choices of one generation, with the bundle's `defaults` for what the preset leaves open. Never more steps
+    /// than the bundle's `training_steps`.
+    ///
+    /// Few steps start at the noisiest training step ([`Spacing::Trailing`]): the first step then takes pure noise for
+    /// what it is, which the lab's spacing does not.
+    #[must_use]
+    pub fn config(self, defaults: GenerateConfig, training_steps: usize) -> GenerateConfig {
+        let limit = u32::try_from(training_steps).unwrap_or(u32::MAX);
+        let with = |steps: u32, sampler| GenerateConfig {
+            steps: steps.min(limit),
+            sampler,
+            eta: 0.0,
+            spacing: Spacing::Trailing,
+            ..defaults
+        };
+        match self {
+            Self::Fast => with(2, Sampler::Ddim),
+            Self::Default => defaults,
+            Self::Best => with(50, Sampler::DpmSolver2m),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use strum::IntoEnumIterator as _;
+
+    use super::*;
+
+    #[test]
+    fn presets_keep_the_seed_and_never_ask_for_more_steps_than_there_are() {
+        let defaults = GenerateConfig { seed: 7, steps: 3, eta: 0.5, spacing: Spacing::Lab, ..Default::default() };
+        for preset in Preset::iter() {
+            assert_eq!(preset.key().parse(), Ok(preset));
+            let config = preset.config(defaults, 4);
+            assert_eq!(config.seed, 7);
+            assert!((1..=4).contains(&config.steps), "{preset:?}");
+        }
+        assert_eq!(Preset::Default.config(defaults, 1000), defaults);
+        assert!(Preset::Fast.config(defaults, 1000).steps <= 4);
+    }
+}
