@@ -58,7 +58,7 @@ enum Verb {
     Masks(masks::MasksVerb),
     /// Open a dataset and list what is wrong with it.
     Doctor(doctor::DoctorArgs),
-    /// Time and error of the registration engines, side by side.
+    /// Time and error of the registration engines and of the generator, side by side.
     #[command(subcommand)]
     Bench(bench::BenchVerb),
     /// Model bundles.

@@ -2,12 +2,14 @@
 //! thread, so that every order of events can be had on purpose.
 
 mod double;
+mod generating;
 mod inspect;
 mod masks;
 mod random;
 mod whole;
 
 use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{Command, Pane, UiRequest};
@@ -39,8 +41,14 @@ fn from_opening_to_the_figures() {
     assert_eq!(bench.state.imprint(ImprintSource::Measured, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
     assert!(matches!(bench.state.imprint(ImprintSource::Predicted, RIGHT), Lookup::Absent(Absent::NoPrediction)));
     bench.send(Command::Generate);
-    assert_eq!(bench.state.tasks.running.len(), 2, "both fingers");
+    let task = bench.state.tasks.running.values().next().unwrap();
+    assert_eq!(
+        (bench.state.tasks.running.len(), task.recipes.len()),
+        (1, 2),
+        "the figures need both fingers: one batch"
+    );
     bench.settle();
+    assert_eq!((bench.services.generated(), bench.services.batches.load(Ordering::Relaxed)), (2, 1));
     let recipe = bench.state.chosen(RIGHT).unwrap().clone();
     assert_eq!(recipe.seed, 42);
     assert_eq!(bench.state.imprint(ImprintSource::Predicted, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);

@@ -14,6 +14,8 @@ mod pose;
 mod sim;
 mod stability;
 
+#[cfg(feature = "onnx")]
+mod generating;
 #[cfg(feature = "gui")]
 mod gpu;
 #[cfg(feature = "ui-test")]

@@ -495,8 +495,7 @@ mod running {
     fn the_recipe_names_everything_the_result_depends_on() {
         let bundle = Bundle::open(&fixture("generator")).unwrap();
         let generator = Generator::open(&bundle, EngineChoice::Rten).unwrap();
-        let finger = touch2touch::domain::sensor::Finger::Right;
-        let recipe = generator.recipe("tool/data_1", finger, &config());
+        let recipe = generator.recipe("the digest of an image".into(), &config());
         assert_eq!((recipe.bundle.as_str(), recipe.engine), (bundle.hash(), EngineKind::Rten));
         assert_eq!(recipe.config(), config());
     }

@@ -1,10 +1,11 @@
-//! `touch2touch bench`: time and error of the registration engines, on known grasps, side by side.
+//! `touch2touch bench`: time and error of the registration engines and of the generator, on known grasps, side by side.
 
 mod canvas;
 mod cases;
 mod dataset;
 mod figures;
 mod front;
+mod generator;
 mod peers;
 mod registration;
 mod strokes;
@@ -19,6 +20,8 @@ use super::VerbResult;
 pub(super) enum BenchVerb {
     /// Every registration engine, and Open3D and small_gicp where Python has them, on a folder of known grasps.
     Registration(registration::RegistrationArgs),
+    /// Error against time of sampler, steps and engine of a generator, on simulated grasps.
+    Generator(generator::GeneratorArgs),
     /// Write fresh known grasps of the built-in simulator, for `bench registration`.
     Cases(cases::CasesArgs),
     /// Seconds for a whole dataset on all cores, on simulated pairs.
@@ -28,6 +31,7 @@ pub(super) enum BenchVerb {
 pub(super) fn run(verb: &BenchVerb) -> VerbResult {
     match verb {
         BenchVerb::Registration(args) => registration::run(args),
+        BenchVerb::Generator(args) => generator::run(args),
         BenchVerb::Cases(args) => cases::run(args),
         BenchVerb::Dataset(args) => dataset::run(args),
     }

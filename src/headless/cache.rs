@@ -42,7 +42,9 @@ pub(super) fn run(args: &CacheArgs) -> VerbResult {
         anyhow::anyhow!("this system names no folder for such files; set TOUCH2TOUCH_CACHE to one (an absolute path)")
     })?;
     let removed = match args.clear {
-        true => Some(store.clear().map_err(|err| anyhow::anyhow!("cannot remove: {err}: {}", store.folder().display()))?),
+        true => {
+            Some(store.clear().map_err(|err| anyhow::anyhow!("cannot remove: {err}: {}", store.folder().display()))?)
+        }
         false => None,
     };
     let usage = store.usage();

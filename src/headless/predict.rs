@@ -128,6 +128,19 @@ impl RuntimeArg {
     }
 }
 
+/// The bundle in the named folder, else the first one found that fits.
+pub(super) fn find_bundle(named: Option<&PathBuf>, kind: &str, fits: fn(&Bundle) -> bool) -> anyhow::Result<Bundle> {
+    if let Some(dir) = named {
+        return Ok(Bundle::open(dir)?);
+    }
+    let found = find(&default_roots());
+    found.bundles.into_iter().find(fits).ok_or_else(|| {
+        let refused: Vec<String> =
+            found.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
+        anyhow::anyhow!("no {kind} bundle was found; name one with an option{}", refused.concat())
+    })
+}
+
 /// The models of one run of the program.
 pub(super) struct Predictor {
     args: ModelArgs,
@@ -154,23 +167,10 @@ impl Predictor {
         self.args.runtime.choice()
     }
 
-    /// The bundle in the named folder, else the first one found that fits.
-    fn bundle(named: Option<&PathBuf>, kind: &str, fits: fn(&Bundle) -> bool) -> anyhow::Result<Bundle> {
-        if let Some(dir) = named {
-            return Ok(Bundle::open(dir)?);
-        }
-        let found = find(&default_roots());
-        found.bundles.into_iter().find(fits).ok_or_else(|| {
-            let refused: Vec<String> =
-                found.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
-            anyhow::anyhow!("no {kind} bundle was found; name one with an option{}", refused.concat())
-        })
-    }
-
     /// The generator, loaded at the first call.
     pub(super) fn generator(&mut self) -> anyhow::Result<&mut Generator> {
         if self.generator.is_none() {
-            let bundle = Self::bundle(self.args.bundle.as_ref(), "generator", |b| b.generator().is_some())?;
+            let bundle = find_bundle(self.args.bundle.as_ref(), "generator", |b| b.generator().is_some())?;
             self.bundle_name = bundle.name().to_owned();
             self.generator = Some(Generator::open(&bundle, self.choice())?);
         }
@@ -263,7 +263,7 @@ impl Predictor {
     pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<Mask> {
         if self.mask_model.is_none() {
             let named = self.args.mask_bundle.as_ref();
-            let bundle = Self::bundle(named, "mask model", |b| b.mask_unet().is_some())?;
+            let bundle = find_bundle(named, "mask model", |b| b.mask_unet().is_some())?;
             self.mask_model = Some(MaskModel::open(&bundle, self.choice())?);
         }
         Ok(self.mask_model.as_mut().expect("it was just loaded").predict(imprint)?)

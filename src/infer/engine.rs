@@ -103,6 +103,7 @@ trait Session: Send {
 /// A loaded graph, kept and reused for every run.
 pub struct Graph {
     role: Role,
+    runs: u64,
     session: Box<dyn Session>,
 }
 
@@ -120,8 +121,13 @@ impl Graph {
     pub fn load(engine: EngineKind, role: Role, path: &Path) -> Result<Self, EngineError> {
         let bytes = std::fs::read(path).map_err(|source| EngineError::Read { path: path.to_path_buf(), source })?;
         load_session(engine, bytes)
-            .map(|session| Self { role, session })
+            .map(|session| Self { role, runs: 0, session })
             .map_err(|err| err.unwrap_or_else(|reason| EngineError::Load { engine, role, reason }))
+    }
+
+    /// How often it was run.
+    pub fn runs(&self) -> u64 {
+        self.runs
     }
 
     /// Runs the graph. The output must have the shape `expected`, batch first, and hold only finite numbers.
@@ -134,6 +140,7 @@ impl Graph {
         output: &str,
         expected: &[usize],
     ) -> Result<Tensor, ModelError> {
+        self.runs += 1;
         let graph = || self.role.key().to_owned();
         let tensor = self.session.run(inputs, output).map_err(|reason| ModelError::Run { graph: graph(), reason })?;
         if tensor.shape() != expected {

@@ -264,6 +264,11 @@ impl Generator {
         Ok(condition)
     }
 
+    /// Forgets the conditions of images seen before, as if freshly loaded: for measuring.
+    pub fn forget_conditions(&mut self) {
+        self.encoded.clear();
+    }
+
     /// The condition that says nothing.
     fn blank(&mut self, unconditional: Unconditional) -> Result<Tensor, GenerateError> {
         match unconditional {

@@ -275,8 +275,7 @@ fn parse(content: &[u8]) -> Option<Stored> {
     if header.format != FORMAT || values.len() != 4 * count || sha256(values) != header.sha256 {
         return None;
     }
-    let values: Vec<f32> =
-        values.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
+    let values: Vec<f32> = values.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
     let channels = values.chunks_exact(plane).map(|v| Grid::from_vec(header.width, header.height, v.to_vec()).ok());
     let raw = RawPrediction { channels: channels.collect::<Option<_>>()? };
     Some(Stored { recipe: header.recipe, raw, seconds: header.seconds })
@@ -407,6 +406,9 @@ mod tests {
         fs::write(&file, "in the way").unwrap();
         let store = Store::new(file, 1 << 20);
         assert!(store.put(&recipe("a", 1), &raw(0.0), 0.0).is_err());
-        assert_eq!((store.get(&recipe("a", 1)), store.of_input("a", 9), store.usage()), (None, vec![], Usage::default()));
+        assert_eq!(
+            (store.get(&recipe("a", 1)), store.of_input("a", 9), store.usage()),
+            (None, vec![], Usage::default())
+        );
     }
 }

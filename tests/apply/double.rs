@@ -17,8 +17,8 @@ use touch2touch::app::services::{DataSource, GenerateItem, Generated, Services};
 use touch2touch::app::settings::{RuntimeChoice, Settings};
 use touch2touch::app::state::State;
 use touch2touch::app::tasks::Level;
-use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::dataset::{Index, PairEntry, PairId, Problem, Split};
+use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift};
@@ -247,26 +247,16 @@ impl Services for Double {
         }
     }
 
-    fn generate(
-        &self,
-        _: &BundleInfo,
-        items: &[GenerateItem<'_>],
-        cx: &JobCx,
-    ) -> Result<Vec<Generated>, TaskError> {
+    fn generate(&self, _: &BundleInfo, items: &[GenerateItem<'_>], cx: &JobCx) -> Result<Vec<Generated>, TaskError> {
         self.batches.fetch_add(1, Ordering::Relaxed);
         items.iter().map(|item| self.generate_one(&item.recipe, item.difference, cx)).collect()
     }
 
-    fn stored(
-        &self,
-        _: &[BundleInfo],
-        _: RuntimeChoice,
-        touch: TouchKey,
-        _: &RgbGrid,
-    ) -> Vec<Prediction> {
+    fn stored(&self, _: &[BundleInfo], _: RuntimeChoice, touch: TouchKey, _: &RgbGrid) -> Vec<Prediction> {
         self.looked_up.fetch_add(1, Ordering::Relaxed);
         let kept = self.kept.lock().unwrap();
-        kept.iter().filter(|p| p.recipe.touch.pair.pair == touch.pair.pair && p.recipe.touch.finger == touch.finger)
+        kept.iter()
+            .filter(|p| p.recipe.touch.pair.pair == touch.pair.pair && p.recipe.touch.finger == touch.finger)
             .map(|p| Prediction { recipe: Recipe { touch, ..p.recipe.clone() }, ..p.clone() })
             .collect()
     }

@@ -2,16 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Condvar, Mutex};
 
 use egui_kittest::Harness;
 use touch2touch::app::command::{Command, Opened};
 use touch2touch::app::error::TaskError;
-use touch2touch::app::jobs::JobCx;
+use touch2touch::app::jobs::{JobCx, compute};
 use touch2touch::app::library::{BundleInfo, BundleKind, GeneratorInfo, Place};
+use touch2touch::app::results::Preview;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::services::{GenerateItem, Generated, Services};
 use touch2touch::app::settings::{RuntimeChoice, Settings};
+use touch2touch::app::state::State;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use touch2touch::domain::postprocess::{
@@ -26,6 +28,29 @@ use touch2touch::ui::{Options, StudioApp};
 /// The program's services with a generator that answers at once.
 struct QuickGenerator {
     live: LiveServices,
+    /// Holds every generation up after its preview of step 4, until it is opened.
+    gate: Option<Arc<Gate>>,
+}
+
+/// Closed until somebody opens it.
+#[derive(Default)]
+pub(super) struct Gate {
+    open: Mutex<bool>,
+    bell: Condvar,
+}
+
+impl Gate {
+    pub(super) fn open(&self) {
+        *self.open.lock().unwrap() = true;
+        self.bell.notify_all();
+    }
+
+    fn pass(&self) {
+        let mut open = self.open.lock().unwrap();
+        while !*open {
+            open = self.bell.wait(open).unwrap();
+        }
+    }
 }
 
 /// A picture of the decoder's kind that depends on the input and the seed: the blurred strength of the difference.
@@ -89,6 +114,16 @@ impl Services for QuickGenerator {
             .into_iter()
             .map(|mode| (mode, chain.clone().with_mode(mode, Some(stats)).map_err(|e| e.to_string())))
             .collect();
+        if let Some(gate) = &self.gate {
+            for item in items {
+                if let Some(shift) = cx.wants_preview(item.recipe.touch, 4) {
+                    let raw = RawPrediction { channels: vec![picture(item.difference, item.recipe.seed)] };
+                    let depth = compute::in_metres(chains[&shift].as_ref().unwrap(), &raw, item.size).unwrap();
+                    cx.preview(Preview { recipe: item.recipe.clone(), step: 4, of: steps, depth });
+                }
+            }
+            gate.pass();
+        }
         let one = |item: &GenerateItem<'_>| {
             let raw = RawPrediction { channels: vec![picture(item.difference, item.recipe.seed)] };
             Generated { raw, chains: chains.clone(), runtime: "double".into(), kept: None }
@@ -155,6 +190,28 @@ impl Rig {
         Some(rig)
     }
 
+    /// As [`Rig::new`] with lanes of its own, and a generator that stops after its preview until the gate is opened.
+    pub(super) fn gated(size: [f32; 2]) -> Option<(Self, Arc<Gate>)> {
+        let mut rig = Self::new(size, 1)?;
+        let gate = Arc::new(Gate::default());
+        let live = LiveServices::with_config_folder(Some(rig.config.clone()));
+        let services = Arc::new(QuickGenerator { live, gate: Some(gate.clone()) });
+        rig.harness = Self::build(size, services, Some(rig.data.clone()), false);
+        rig.until("the data set", |state| state.library.open.is_some() && state.sample().ready().is_some());
+        Some((rig, gate))
+    }
+
+    /// Frames until something is so; a failure after a minute.
+    pub(super) fn until(&mut self, what: &str, so: impl Fn(&State) -> bool) {
+        let begin = std::time::Instant::now();
+        while !so(self.harness.state().state()) {
+            assert!(begin.elapsed().as_secs() < 60, "waited for {what}: {:?}", self.harness.state().state().tasks);
+            self.harness.step();
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        self.harness.step();
+    }
+
     /// A studio with the shipped models on a place, for pictures. Panics without a graphics adapter.
     pub(super) fn live(size: [f32; 2], place: Place) -> Option<Self> {
         let folder = tempfile::tempdir().unwrap();
@@ -164,20 +221,25 @@ impl Rig {
             Place::Demo => None,
             Place::Path(path) => Some(path),
         };
-        let harness = Self::build(size, services, open);
+        let harness = Self::build(size, services, open, true);
         let mut rig = Self { harness, data, config, _folder: folder };
         rig.settle();
         Some(rig)
     }
 
     fn start(size: [f32; 2], data: &Path, config: &Path) -> Harness<'static, StudioApp> {
-        let services = Arc::new(QuickGenerator { live: LiveServices::with_config_folder(Some(config.to_owned())) });
-        Self::build(size, services, Some(data.to_owned()))
+        let live = LiveServices::with_config_folder(Some(config.to_owned()));
+        Self::build(size, Arc::new(QuickGenerator { live, gate: None }), Some(data.to_owned()), true)
     }
 
-    fn build(size: [f32; 2], services: Arc<dyn Services>, open: Option<PathBuf>) -> Harness<'static, StudioApp> {
+    fn build(
+        size: [f32; 2],
+        services: Arc<dyn Services>,
+        open: Option<PathBuf>,
+        inline: bool,
+    ) -> Harness<'static, StudioApp> {
         let mut options = Options::new(services, open);
-        options.inline = true;
+        options.inline = inline;
         options.native_dialogs = false;
         Harness::builder()
             .with_size(size)

@@ -51,19 +51,17 @@ pub(super) fn generate<'i>(
     let engine = resolve(runtime.into()).map_err(|err| fail(err.into()))?;
     // Two fingers of one sample, or many seeds of one image: each image is looked at once.
     let mut images: Vec<(&RgbGrid, String)> = Vec::new();
-    let mut image_of = |difference: &'i RgbGrid| match images.iter().position(|(known, _)| std::ptr::eq(*known, difference)) {
-        Some(at) => at,
-        None => {
-            images.push((difference, input_digest(difference)));
-            images.len() - 1
-        }
-    };
+    let mut image_of =
+        |difference: &'i RgbGrid| match images.iter().position(|(known, _)| std::ptr::eq(*known, difference)) {
+            Some(at) => at,
+            None => {
+                images.push((difference, input_digest(difference)));
+                images.len() - 1
+            }
+        };
     let image: Vec<usize> = items.iter().map(|item| image_of(item.difference)).collect();
-    let keys: Vec<recipe::Recipe> = items
-        .iter()
-        .zip(&image)
-        .map(|(item, at)| stored_recipe(item, images[*at].1.clone(), bundle, engine))
-        .collect();
+    let keys: Vec<recipe::Recipe> =
+        items.iter().zip(&image).map(|(item, at)| stored_recipe(item, images[*at].1.clone(), bundle, engine)).collect();
     let mut kept: Vec<Option<(RawPrediction, f64)>> = match &services.store {
         Some(store) => {
             let store = lock(store);
@@ -76,7 +74,12 @@ pub(super) fn generate<'i>(
     if fresh.is_empty() {
         // Nothing has to be loaded to show what is there.
         let chains = open_bundle(&what, bundle)?.generator().map(chains).unwrap_or_default();
-        let answer = |(raw, seconds)| Generated { raw, chains: chains.clone(), runtime: engine.label().into(), kept: Some(seconds) };
+        let answer = |(raw, seconds)| Generated {
+            raw,
+            chains: chains.clone(),
+            runtime: engine.label().into(),
+            kept: Some(seconds),
+        };
         return Ok(kept.into_iter().flatten().map(answer).collect());
     }
     let mut loaded = lock(&services.generator);

@@ -41,7 +41,7 @@ pub(super) fn uses_processor_time(rows: &[EngineRow]) -> bool {
     rows.iter().all(|row| row.cpu_mean_ms.is_some_and(|ms| ms > 0.0))
 }
 
-fn pareto(mut points: Vec<FrontPoint>) -> Vec<FrontPoint> {
+pub(super) fn pareto(mut points: Vec<FrontPoint>) -> Vec<FrontPoint> {
     points.sort_by(|a, b| a.ms.total_cmp(&b.ms).then(a.mean_deg.total_cmp(&b.mean_deg)));
     let mut best = f64::INFINITY;
     for point in &mut points {
@@ -93,11 +93,25 @@ impl Axes {
     }
 }
 
-/// The picture: mean error (disc) and median error (ring) over the time on a logarithmic axis named `axis`.
-pub(super) fn draw(title: &str, axis: &str, points: &[FrontPoint], default: &str) -> Canvas {
+/// What stands around the picture.
+pub(super) struct Axis<'a> {
+    pub(super) title: &'a str,
+    /// Of the axis of time.
+    pub(super) time: &'a str,
+    /// Behind the numbers of the axis of the error.
+    pub(super) unit: &'a str,
+    /// The colours in words.
+    pub(super) legend: &'a [(Colour, &'a str)],
+}
+
+/// The legend of [`draw`] where other projects' libraries are among the points.
+pub(super) const PEERS: [(Colour, &str); 2] = [(OURS, "this program"), (PEER, "peers (Python)")];
+
+/// The picture: mean error (disc) and median error (ring) over the time on a logarithmic axis.
+pub(super) fn draw(axis: &Axis<'_>, points: &[FrontPoint], default: &str) -> Canvas {
     let mut c = Canvas::new(WIDTH, HEIGHT);
     let axes = Axes::new(points);
-    grid(&mut c, title, axis, &axes);
+    grid(&mut c, axis, &axes);
 
     // The front is a staircase: what is reached when one may spend this much time.
     let steps: Vec<[f32; 2]> =
@@ -179,10 +193,10 @@ fn place(label: &str, point: [f32; 2], taken: &mut Vec<[f32; 4]>) -> [f32; 2] {
     at
 }
 
-fn grid(c: &mut Canvas, title: &str, axis: &str, axes: &Axes) {
-    c.text([LEFT, 30.0], 11.0, Anchor::Start, INK, title);
+fn grid(c: &mut Canvas, axis: &Axis<'_>, axes: &Axes) {
+    c.text([LEFT, 30.0], 11.0, Anchor::Start, INK, axis.title);
     let mut x = LEFT;
-    for (colour, text) in [(OURS, "this program"), (PEER, "peers (Python)")] {
+    for &(colour, text) in axis.legend {
         c.disc([x + 5.0, 50.0], 5.0, colour);
         c.text([x + 16.0, 54.0], LETTER, Anchor::Start, MUTED, text);
         x += 40.0 + text_width(text, LETTER);
@@ -206,13 +220,13 @@ fn grid(c: &mut Canvas, title: &str, axis: &str, axes: &Axes) {
     while deg <= axes.most {
         let y = axes.y(deg);
         c.line([LEFT, y], [RIGHT, y], 1.0, FAINT);
-        c.text([LEFT - 8.0, y + 0.5 * LETTER], LETTER, Anchor::End, INK, format!("{:.1}°", deg));
+        c.text([LEFT - 8.0, y + 0.5 * LETTER], LETTER, Anchor::End, INK, format!("{deg:.1}{}", axis.unit));
         deg += step;
     }
     c.line([LEFT, TOP], [LEFT, BOTTOM], 1.5, INK);
     c.line([LEFT, BOTTOM], [RIGHT, BOTTOM], 1.5, INK);
     let middle = 0.5 * (LEFT + RIGHT);
-    c.text([middle, BOTTOM + 50.0], 10.5, Anchor::Middle, INK, axis);
+    c.text([middle, BOTTOM + 50.0], 10.5, Anchor::Middle, INK, axis.time);
     c.text([12.0, TOP - 8.0], LETTER, Anchor::Start, INK, "error");
 }
 
@@ -244,9 +258,10 @@ mod tests {
         for (i, a) in spots.iter().enumerate() {
             assert!(spots[..i].iter().all(|b| a != b), "{spots:?}");
         }
-        let svg = draw("t", "ms", &pareto(vec![point("one", 0.1, 0.7), point("two", 200.0, 5.0)]), "one").svg();
-        assert!(svg.contains("one (default)") && svg.contains(">two<"));
+        let axis = Axis { title: "t", time: "ms", unit: " mm", legend: &PEERS };
+        let svg = draw(&axis, &pareto(vec![point("one", 0.1, 0.7), point("two", 200.0, 5.0)]), "one").svg();
+        assert!(svg.contains("one (default)") && svg.contains(">two<") && svg.contains("1.0 mm"));
         // No engine at all is a picture, too.
-        assert!(draw("t", "ms", &[], "one").svg().contains("</svg>"));
+        assert!(draw(&axis, &[], "one").svg().contains("</svg>"));
     }
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::figures::{Outcome, Summary, quantile};
-use super::front::{self, FrontPoint};
+use super::front::{self, Axis, FrontPoint};
 use super::{Machine, peers};
 use crate::domain::align::{AlignError, AlignReport, DistanceField};
 use crate::domain::frames::PlanarPose;
@@ -375,7 +375,8 @@ fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
     } else {
         "points to pose: time, median over the cases, ms"
     };
-    let picture = front::draw(&title, axis, &report.front, &report.default);
+    let axis = Axis { title: &title, time: axis, unit: "°", legend: &front::PEERS };
+    let picture = front::draw(&axis, &report.front, &report.default);
     let svg = file.with_extension("svg");
     atomic::write_bytes(&svg, picture.svg().as_bytes()).map_err(failed(&svg))?;
     crate::io::images::write_rgb8(&file.with_extension("png"), &picture.pixels(1.5))?;

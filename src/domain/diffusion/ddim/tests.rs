@@ -294,3 +294,83 @@ fn every_sampler_returns_a_perfect_prediction_and_stays_finite() {
         assert_eq!(run(&mut model, &pure, config).unwrap().non_finite(), 0, "{steps} steps");
     }
 }
+
+/// Row E22 of the list of numerical failures: every number of steps of the training, each sampler, eta from 0 to 1.
+#[test]
+fn e22_every_number_of_steps_stays_finite_with_every_sampler() {
+    for steps in 1..=1000 {
+        let sampler = [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m][steps as usize % 3];
+        let prediction = KINDS[steps as usize / 3 % 3];
+        let spacing = [Spacing::Lab, Spacing::Trailing][steps as usize / 9 % 2];
+        let eta = f64::from(steps % 11) / 10.0;
+        let mut model = Perfect { schedule: lab(), clean: vec![0.3, -2.0], prediction, calls: 0 };
+        let config = GenerateConfig { steps, eta, sampler, spacing, ..Default::default() };
+        let found = run(&mut model, &lab(), config).unwrap();
+        let worst = found.data().iter().zip([0.3f32, -2.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst < 1e-5, "{config:?}: {worst}");
+    }
+}
+
+/// Row E22: a rise in the last bit is refused, pure noise too where the model predicts noise, and no noise at all is
+/// finite; single precision has no say in how much noise the first step has.
+#[test]
+fn e22_schedules_at_the_edge_of_the_numbers() {
+    let half = 0.5f64;
+    assert!(Schedule::from_alpha_bar(vec![half, half.next_up()]).is_err());
+    let f16_would_lose = Schedule::from_alpha_bar(vec![1.0 - 1e-9, 0.5, 1e-9]).unwrap();
+    let shares = [vec![1.0], vec![1.0, 1.0, 1.0], vec![0.0], vec![1.0, 0.0], vec![1.0, 1.0 - 1e-16, 1e-308]];
+    let schedules = shares.into_iter().map(|s| Schedule::from_alpha_bar(s).unwrap()).chain([f16_would_lose]);
+    for schedule in schedules {
+        for prediction in KINDS {
+            for sampler in [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m] {
+                for steps in 1..=schedule.training_steps() as u32 {
+                    let mut model = Perfect { schedule: schedule.clone(), clean: vec![0.7; 4], prediction, calls: 0 };
+                    let config = GenerateConfig { steps, sampler, ..Default::default() };
+                    match run(&mut model, &schedule, config) {
+                        Ok(latent) => assert_eq!(latent.non_finite(), 0, "{schedule:?} {prediction:?} {config:?}"),
+                        Err(err) => {
+                            assert_eq!(prediction, Prediction::Epsilon, "{err}");
+                            assert!(err.to_string().contains("pure noise"), "{err}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn estimates_are_what_the_model_sees_and_are_made_only_where_wanted() {
+    struct Eye {
+        wanted: u32,
+        seen: Vec<(u32, Vec<f32>)>,
+    }
+    impl Watch for Eye {
+        fn progress(&mut self, _: Progress) -> ControlFlow<()> {
+            ControlFlow::Continue(())
+        }
+        fn wants_estimate(&mut self, after: Progress) -> bool {
+            assert!(after.step < after.of);
+            after.step == self.wanted
+        }
+        fn estimate(&mut self, after: Progress, clean: &Tensor) {
+            self.seen.push((after.step, clean.data().to_vec()));
+        }
+    }
+    let clean = vec![-1.5, 0.25, 0.0, 2.0];
+    for sampler in [Sampler::Ddim, Sampler::Ddpm, Sampler::DpmSolver2m] {
+        for prediction in KINDS {
+            let mut model = Perfect { schedule: lab(), clean: clean.clone(), prediction, calls: 0 };
+            let mut eye = Eye { wanted: 3, seen: Vec::new() };
+            let config = GenerateConfig { steps: 8, sampler, ..Default::default() };
+            sample_watched(&mut model, &lab(), &config, &[1], &condition(1), &mut eye).unwrap();
+            assert_eq!(eye.seen.len(), 1);
+            let (step, seen) = &eye.seen[0];
+            assert_eq!(*step, 3);
+            assert!(seen.iter().zip(&clean).all(|(a, b)| (a - b).abs() < 1e-4), "{sampler:?} {prediction:?} {seen:?}");
+        }
+    }
+    let config = GenerateConfig { guidance: f64::INFINITY, ..Default::default() };
+    let mut model = Perfect { schedule: lab(), clean, prediction: Prediction::V, calls: 0 };
+    assert!(matches!(run(&mut model, &lab(), config), Err(DiffusionError::Guidance(_))));
+}

@@ -1,0 +1,110 @@
+//! Simulated grasps, and how far a prediction of one is from the truth.
+
+use rayon::prelude::*;
+
+use crate::app::jobs::compute::LAB_PEAK_M;
+use crate::domain::frames::PlanarPose;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::metrics::{self, AngleSummary};
+use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
+use crate::domain::sample::{BubbleTouch, Sample};
+use crate::domain::sensor::Finger;
+use crate::domain::sim::{self, SimConfig};
+use crate::domain::units::angle_error;
+use crate::infer::mask::MaskModel;
+
+/// A grasp of a simulated tool.
+pub(super) struct Case {
+    pub(super) name: String,
+    pub(super) sample: Sample,
+    tool: std::sync::Arc<ToolModel>,
+    truth: PlanarPose,
+}
+
+/// What a prediction is worth.
+pub(super) struct Score {
+    /// Over all pixels of both fingers, against the noise-free imprint.
+    pub(super) mse_m2: f64,
+    /// By finger.
+    pub(super) psnr_db: [Option<f64>; 2],
+    /// `None` if there is no pose.
+    pub(super) error_deg: Option<f64>,
+}
+
+/// `count` grasps, spread over the tools of which `wanted` says whether (by "seen in training").
+///
+/// # Errors
+/// If no tool is wanted, or a CAD model cannot be used.
+pub(super) fn simulate(count: usize, seed: u64, wanted: impl Fn(bool) -> bool) -> anyhow::Result<Vec<Case>> {
+    let specs: Vec<_> = sim::tools().iter().filter(|tool| wanted(tool.seen)).collect();
+    anyhow::ensure!(!specs.is_empty(), "there are no such tools");
+    let models = specs
+        .iter()
+        .map(|spec| Ok(std::sync::Arc::new(ToolModel::new(spec.mesh())?)))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let config = SimConfig::default();
+    (0..count)
+        .into_par_iter()
+        .map(|i| {
+            let (spec, n) = (specs[i % specs.len()], i as u64 ^ seed.rotate_left(32));
+            let sample = sim::simulate(spec, sim::random_grasp(n), n, &config);
+            let truth = sample.grasp_from_object.ok_or_else(|| anyhow::anyhow!("a simulated grasp without a pose"))?;
+            let name = format!("{} {}", spec.name, i / specs.len());
+            Ok(Case { name, sample, tool: models[i % specs.len()].clone(), truth })
+        })
+        .collect()
+}
+
+fn bubble(sample: &Sample, finger: Finger) -> anyhow::Result<&BubbleTouch> {
+    let touch = sample.finger(finger).and_then(|touch| touch.bubble.as_ref());
+    touch.ok_or_else(|| anyhow::anyhow!("a simulated grasp has both bubbles"))
+}
+
+/// Finds masks and poses of imprints.
+pub(super) struct Judge {
+    masks: MaskModel,
+}
+
+impl Judge {
+    pub(super) fn new(masks: MaskModel) -> Self {
+        Self { masks }
+    }
+
+    /// The pose errors of the imprints that were measured.
+    pub(super) fn measured(&mut self, cases: &[Case]) -> anyhow::Result<AngleSummary> {
+        let mut errors = Vec::new();
+        for case in cases {
+            let imprints = [bubble(&case.sample, Finger::Right)?, bubble(&case.sample, Finger::Left)?];
+            errors.push(self.error_deg(case, &imprints.map(|b| b.imprint.clone()))?.unwrap_or(f64::NAN));
+        }
+        Ok(AngleSummary::from_errors(&errors))
+    }
+
+    /// Predicted imprints by [`Finger::index`], metres.
+    pub(super) fn score(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Score> {
+        let (mut mse, mut psnr_db) = (0.0, [None, None]);
+        for finger in Finger::BOTH {
+            let truth = bubble(&case.sample, finger)?.truth.as_ref();
+            let truth = &truth.ok_or_else(|| anyhow::anyhow!("a simulated grasp knows its truth"))?.imprint;
+            let imprint = &imprints[finger.index()];
+            mse += 0.5 * metrics::mse(imprint, truth)?;
+            psnr_db[finger.index()] = metrics::psnr(imprint, truth, LAB_PEAK_M)?.db();
+        }
+        Ok(Score { mse_m2: mse, psnr_db, error_deg: self.error_deg(case, imprints)? })
+    }
+
+    fn error_deg(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Option<f64>> {
+        let masks = [self.masks.predict(&imprints[0])?, self.masks.predict(&imprints[1])?];
+        let mut fingers: [Option<FingerInput<'_>>; 2] = [None, None];
+        for finger in Finger::BOTH {
+            let camera = bubble(&case.sample, finger)?.camera.as_ref();
+            let camera = camera.ok_or_else(|| anyhow::anyhow!("a simulated bubble has a camera"))?;
+            let mask: &Mask = &masks[finger.index()];
+            fingers[finger.index()] =
+                Some(FingerInput { imprint: &imprints[finger.index()], camera, mask: Some(mask) });
+        }
+        // Too few contact points are no pose; that is counted.
+        let report = estimate(&fingers, &case.tool, Engine::default(), false).ok();
+        Ok(report.map(|r| angle_error(r.grasp_from_object.theta_rad, case.truth.theta_rad).to_degrees()))
+    }
+}

@@ -1,0 +1,212 @@
+//! What a generation takes, and what of it is not the graphs' own work.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::cases::Case;
+use crate::domain::diffusion::{GenerateConfig, Progress, Tensor};
+use crate::domain::grid::{DepthMap, RgbGrid};
+use crate::domain::postprocess::{RawPrediction, ShiftMode};
+use crate::domain::sensor::Finger;
+use crate::headless::bench::figures::quantile;
+use crate::infer::bundle::{Bundle, TimestepType};
+use crate::infer::engine::{EngineChoice, EngineKind, Input};
+use crate::infer::generator::{Generator, Item, Observer, prepare};
+
+/// Pairs of runs for the overhead.
+const PAIRS: usize = 30;
+/// Runs for the warm time and for the price of previews.
+const WARM: usize = 7;
+
+/// The sampler against the same number of bare graph runs.
+#[derive(Debug, Serialize)]
+pub(super) struct Overhead {
+    pub(super) engine: EngineKind,
+    pub(super) pairs: usize,
+    /// Medians, milliseconds of the clock.
+    pub(super) generator_ms: f64,
+    pub(super) bare_ms: f64,
+    /// Median over the pairs of runs, each pair one after the other, in turn.
+    pub(super) percent: f64,
+    /// Of the shortest run of each: what is left when other programs are taken out.
+    pub(super) percent_of_shortest: f64,
+}
+
+/// How long one waits for the first result, milliseconds of the clock; both fingers in one batch.
+#[derive(Debug, Serialize)]
+pub(super) struct First {
+    pub(super) engine: EngineKind,
+    /// Reading and loading the checked bundle's graphs.
+    pub(super) load_ms: f64,
+    /// The first result of a freshly loaded generator, without loading.
+    pub(super) cold_ms: f64,
+    /// Median of later ones.
+    pub(super) warm_ms: f64,
+    /// From the start to the first preview; `None` with a single step.
+    pub(super) preview_ms: Option<f64>,
+    /// How much later the result comes with previews every four steps, percent.
+    pub(super) preview_percent: Option<f64>,
+}
+
+fn differences(case: &Case) -> anyhow::Result<[&RgbGrid; 2]> {
+    let of = |finger| {
+        let touch = case.sample.finger(finger).and_then(|touch| touch.gelslim.as_ref());
+        touch.map(|g| &g.difference).ok_or_else(|| anyhow::anyhow!("a simulated grasp has both GelSlim images"))
+    };
+    Ok([of(Finger::Right)?, of(Finger::Left)?])
+}
+
+fn ms_since(begin: Instant) -> f64 {
+    begin.elapsed().as_secs_f64() * 1e3
+}
+
+/// Both fingers from image to metres, with nothing remembered from runs before.
+pub(super) fn timed_run(
+    generator: &mut Generator,
+    case: &Case,
+    config: &GenerateConfig,
+) -> anyhow::Result<(f64, [DepthMap; 2])> {
+    run_observed(generator, case, config, &mut |_| ControlFlow::Continue(()))
+}
+
+fn run_observed(
+    generator: &mut Generator,
+    case: &Case,
+    config: &GenerateConfig,
+    observer: &mut dyn Observer,
+) -> anyhow::Result<(f64, [DepthMap; 2])> {
+    let images = differences(case)?;
+    generator.forget_conditions();
+    let begin = Instant::now();
+    let items = [0, 1].map(|image| Item { image, seed: config.seed });
+    let raw = generator.run(&images, &items, config, observer)?;
+    let depth = |raw: &RawPrediction| generator.depth(raw, ShiftMode::ExactInverse);
+    let imprints = [depth(&raw[0])?, depth(&raw[1])?];
+    Ok((ms_since(begin), imprints))
+}
+
+/// The graphs alone: as often, with the same shapes, on prepared input.
+fn bare(generator: &mut Generator, images: &[Tensor], config: &GenerateConfig, steps: usize) -> anyhow::Result<f64> {
+    let spec = generator.spec().clone();
+    let batch = images.len();
+    let with = |n: usize, shape: &[usize]| std::iter::once(n).chain(shape.iter().copied()).collect::<Vec<usize>>();
+    let [width, height] = spec.output.size;
+    let latent = Tensor::filled(with(batch, &spec.latent.shape), 0.1);
+    let condition = Tensor::filled(with(batch, &spec.condition.shape), 0.1);
+    let (whole, float) = (vec![500; batch], Tensor::filled(vec![batch], 500.0));
+    let timestep = match spec.timestep {
+        TimestepType::Int64 => Input::I64(&whole),
+        TimestepType::Float32 => Input::F32(&float),
+    };
+    debug_assert_eq!(config.guidance, 1.0, "guided runs have twice the batch");
+    let [encoder, denoiser, decoder] = generator.graphs();
+    let begin = Instant::now();
+    for image in images {
+        encoder.run(&[("gelslim", Input::F32(image))], "condition", &with(1, &spec.condition.shape))?;
+    }
+    for _ in 0..steps {
+        let inputs = [("latent", Input::F32(&latent)), ("timestep", timestep), ("condition", Input::F32(&condition))];
+        denoiser.run(&inputs, "prediction", latent.shape())?;
+    }
+    decoder.run(&[("latent", Input::F32(&latent))], "image", &[batch, spec.output.channels, height, width])?;
+    Ok(ms_since(begin))
+}
+
+pub(super) fn overhead(
+    generator: &mut Generator,
+    engine: EngineKind,
+    cases: &[Case],
+    config: &GenerateConfig,
+) -> anyhow::Result<Overhead> {
+    let config = GenerateConfig { guidance: 1.0, ..*config };
+    let spec = generator.spec().clone();
+    let steps = spec.schedule.steps(config.steps, config.spacing, spec.prediction)?.len();
+    let (mut generated, mut alone, mut percent) = (Vec::new(), Vec::new(), Vec::new());
+    for at in 0..PAIRS {
+        let case = &cases[at % cases.len()];
+        let images = differences(case)?
+            .iter()
+            .map(|image| Ok(Tensor::stack(&[prepare(image, &spec.input)?]).expect("one tensor can be stacked")))
+            .collect::<anyhow::Result<Vec<_>>>()?;
+        // In turn first and second: a machine that gets slower meanwhile favours neither.
+        let (with, without);
+        if at % 2 == 0 {
+            with = timed_run(generator, case, &config)?.0;
+            without = bare(generator, &images, &config, steps)?;
+        } else {
+            without = bare(generator, &images, &config, steps)?;
+            with = timed_run(generator, case, &config)?.0;
+        }
+        percent.push(100.0 * (with / without - 1.0));
+        generated.push(with);
+        alone.push(without);
+    }
+    let median = |values: &[f64]| quantile(values.iter().copied(), 0.5).unwrap_or(f64::NAN);
+    let least = |values: &[f64]| values.iter().copied().fold(f64::INFINITY, f64::min);
+    Ok(Overhead {
+        engine,
+        pairs: PAIRS,
+        generator_ms: median(&generated),
+        bare_ms: median(&alone),
+        percent: median(&percent),
+        percent_of_shortest: 100.0 * (least(&generated) / least(&alone) - 1.0),
+    })
+}
+
+/// Looks at the first picture on the way, and at every fourth.
+struct Looker {
+    begin: Instant,
+    first_ms: Option<f64>,
+}
+
+impl Observer for Looker {
+    fn progress(&mut self, _: Progress) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+
+    fn wants_preview(&mut self, after: Progress, _: usize) -> bool {
+        after.step == 1 || after.step.is_multiple_of(4)
+    }
+
+    fn preview(&mut self, _: Progress, _: usize, _: RawPrediction) {
+        self.first_ms.get_or_insert_with(|| ms_since(self.begin));
+    }
+}
+
+/// Loads the bundle afresh and waits for its first results; hands the loaded generator on.
+pub(super) fn first(
+    bundle: &Bundle,
+    engine: EngineKind,
+    case: &Case,
+    config: &GenerateConfig,
+) -> anyhow::Result<(First, Generator)> {
+    let choice = match engine {
+        EngineKind::Rten => EngineChoice::Rten,
+        EngineKind::Ort => EngineChoice::Ort,
+    };
+    let begin = Instant::now();
+    let mut generator = Generator::open(bundle, choice)?;
+    let load_ms = ms_since(begin);
+    let (cold_ms, _) = timed_run(&mut generator, case, config)?;
+    let (mut warm, mut seen, mut previews) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..WARM {
+        warm.push(timed_run(&mut generator, case, config)?.0);
+        let mut looker = Looker { begin: Instant::now(), first_ms: None };
+        seen.push(run_observed(&mut generator, case, config, &mut looker)?.0);
+        previews.extend(looker.first_ms);
+    }
+    let median = |values: &[f64]| quantile(values.iter().copied(), 0.5);
+    let ratios: Vec<f64> = seen.iter().zip(&warm).map(|(seen, plain)| 100.0 * (seen / plain - 1.0)).collect();
+    let preview_ms = median(&previews);
+    let found = First {
+        engine,
+        load_ms,
+        cold_ms,
+        warm_ms: median(&warm).unwrap_or(f64::NAN),
+        preview_ms,
+        preview_percent: preview_ms.and_then(|_| median(&ratios)),
+    };
+    Ok((found, generator))
+}

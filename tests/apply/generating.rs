@@ -1,0 +1,192 @@
+//! Which predictions are made, what is shown on the way, and what is found again.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+
+use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::jobs::{Cancel, JobCx, Lane};
+use touch2touch::app::keys::{ImprintSource, Preset, Recipe, Sampler, Spacing};
+use touch2touch::app::library::{BundleInfo, BundleKind, GeneratorInfo};
+use touch2touch::app::results::{Prediction, Preview};
+use touch2touch::app::settings::GenerateSettings;
+use touch2touch::domain::diffusion::GenerateConfig;
+use touch2touch::domain::grid::DepthMap;
+use touch2touch::domain::sensor::Finger;
+
+use super::double::{Bench, SIMULATED};
+use super::panes;
+
+const RIGHT: Finger = Finger::Right;
+const LEFT: Finger = Finger::Left;
+
+fn preview(recipe: &Recipe, step: u32) -> Arc<Preview> {
+    Arc::new(Preview { recipe: recipe.clone(), step, of: recipe.steps, depth: DepthMap::filled(4, 3, 0.001) })
+}
+
+#[test]
+fn a_finger_that_nobody_looks_at_is_not_generated() {
+    let mut bench = Bench::open_simulated();
+    bench.send(Command::Select(SIMULATED));
+    bench.send(panes(&[Pane::Predicted, Pane::Generate]));
+    bench.settle();
+    bench.send(Command::Generate);
+    bench.settle();
+    assert!(bench.state.chosen(RIGHT).is_some() && bench.state.chosen(LEFT).is_none());
+    assert_eq!(bench.services.generated(), 1);
+    // A pane that makes a pose of both wants the other one too, made like the first.
+    bench.send(Command::SetGenerate(GenerateSettings { seed: 5, ..bench.state.settings.generate.clone() }));
+    bench.send(panes(&[Pane::Predicted, Pane::ScenePredicted]));
+    bench.settle();
+    let (right, left) = (bench.state.chosen(RIGHT).unwrap().clone(), bench.state.chosen(LEFT).unwrap().clone());
+    assert_eq!(Recipe { touch: left.touch, ..right }, left);
+    assert_eq!(bench.services.generated(), 2);
+    assert!(bench.state.cloud(ImprintSource::Predicted).ready().unwrap().finger(LEFT).is_some());
+    // Both on screen are made together, in one call.
+    bench.send(panes(&[Pane::Predicted]));
+    bench.send(Command::ShowBothFingers(true));
+    let batches = bench.services.batches.load(Ordering::Relaxed);
+    bench.send(Command::GenerateNewSeed);
+    bench.settle();
+    assert_eq!((bench.services.generated(), bench.services.batches.load(Ordering::Relaxed)), (4, batches + 1));
+    // Switched off, only the active one is made.
+    let one = GenerateSettings { both_fingers: false, ..bench.state.settings.generate.clone() };
+    bench.send(Command::SetGenerate(one));
+    bench.send(Command::GenerateNewSeed);
+    bench.settle();
+    assert_eq!(bench.services.generated(), 5);
+}
+
+#[test]
+fn previews_are_wanted_where_somebody_looks_and_end_with_the_result() {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::Measured]));
+    bench.settle();
+    assert!(bench.state.preview_wish().touches.is_empty(), "no predicted imprint is on screen");
+    bench.send(panes(&[Pane::Predicted]));
+    let touch = bench.state.touch_key(RIGHT).unwrap();
+    let wish = bench.state.preview_wish();
+    assert_eq!(wish.touches, BTreeSet::from([touch]));
+    let after: Vec<u32> = (1..=10).filter(|step| wish.wants(touch, *step)).collect();
+    assert_eq!(after, [1, 4, 8]);
+    assert!(!wish.wants(touch.pair.finger(LEFT), 4));
+    let never = GenerateSettings { preview_every: 0, ..bench.state.settings.generate.clone() };
+    bench.send(Command::SetGenerate(never));
+    assert!(!bench.state.preview_wish().wants(touch, 1));
+
+    bench.send(Command::Generate);
+    let (&ticket, task) = bench.state.tasks.running.iter().next().unwrap();
+    let recipe = task.recipes[0].clone();
+    bench.send(Command::Previewed(ticket, preview(&recipe, 4)));
+    assert_eq!(bench.state.preview(RIGHT).unwrap().step, 4);
+    assert!(bench.state.preview(LEFT).is_none());
+    bench.settle();
+    assert!(bench.state.preview(RIGHT).is_none() && bench.state.chosen(RIGHT) == Some(&recipe));
+    // One that comes after its result is too late.
+    bench.send(Command::Previewed(ticket, preview(&recipe, 8)));
+    assert!(bench.state.preview(RIGHT).is_none());
+    // With Cancel it goes at once, and none comes after it.
+    bench.send(Command::GenerateNewSeed);
+    let (&ticket, task) = bench.state.tasks.running.iter().next().unwrap();
+    let recipe = task.recipes[0].clone();
+    bench.send(Command::Previewed(ticket, preview(&recipe, 1)));
+    assert!(bench.state.preview(RIGHT).is_some());
+    bench.send(Command::CancelAll);
+    bench.send(Command::Previewed(ticket, preview(&recipe, 2)));
+    bench.tick();
+    assert!(bench.state.preview(RIGHT).is_none() && bench.state.tasks.running.is_empty());
+}
+
+#[test]
+fn a_job_sees_at_once_that_nobody_looks_any_more() {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::Predicted]));
+    bench.settle();
+    let touch = bench.state.touch_key(RIGHT).unwrap();
+    let wish = Arc::new(Mutex::new(bench.state.preview_wish()));
+    let shown: Arc<Mutex<Vec<u32>>> = Arc::default();
+    let sink = shown.clone();
+    let cx = JobCx::new(Cancel::default(), Arc::new(|_| {}))
+        .with_previews(wish.clone(), Arc::new(move |p: Preview| sink.lock().unwrap().push(p.step)));
+    assert!(cx.wants_preview(touch, 1).is_some() && cx.wants_preview(touch, 2).is_none());
+    let recipe = bench.state.recipe(touch).unwrap();
+    cx.preview((*preview(&recipe, 1)).clone());
+    bench.send(panes(&[Pane::Log]));
+    *wish.lock().unwrap() = bench.state.preview_wish();
+    assert!(cx.wants_preview(touch, 4).is_none());
+    assert_eq!(*shown.lock().unwrap(), [1]);
+    assert!(JobCx::unwatched().wants_preview(touch, 1).is_none());
+}
+
+#[test]
+fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::Predicted]));
+    bench.settle();
+    bench.send(Command::Generate);
+    bench.settle();
+    let first = bench.state.chosen(RIGHT).unwrap().clone();
+    bench.send(Command::GenerateNewSeed);
+    bench.settle();
+    let made: Vec<Prediction> = bench.state.results.made[&first.touch]
+        .iter()
+        .map(|r| (**bench.state.results.predictions.get(r).unwrap()).clone())
+        .collect();
+    assert_eq!(made.len(), 2);
+
+    let mut again = Bench::open();
+    *again.services.kept.lock().unwrap() = made;
+    assert_eq!(again.services.looked_up.load(Ordering::Relaxed), 0, "no pane shows a prediction");
+    again.send(panes(&[Pane::Predicted]));
+    again.settle();
+    let touch = again.state.touch_key(RIGHT).unwrap();
+    assert_eq!(again.state.results.made[&touch].len(), 2);
+    // Shown is the one that the settings would make (seed 42), not simply the last.
+    assert_eq!(again.state.chosen(RIGHT).unwrap().seed, 42);
+    assert!(again.state.imprint(ImprintSource::Predicted, RIGHT).ready().is_some());
+    assert_eq!(again.services.generated(), 0);
+    let looked = again.services.looked_up.load(Ordering::Relaxed);
+    again.send(Command::Step(1));
+    again.settle();
+    again.send(Command::Step(-1));
+    again.settle();
+    assert_eq!(again.services.looked_up.load(Ordering::Relaxed), looked + 1, "each touch is looked up once");
+    assert!(again.runtime.waiting(Lane::Files) == 0);
+}
+
+#[test]
+fn presets_follow_the_bundle_and_own_numbers_leave_them() {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::Predicted]));
+    bench.settle();
+    let touch = bench.state.touch_key(RIGHT).unwrap();
+    assert_eq!(bench.state.settings.generate.preset, Some(Preset::Default));
+    assert_eq!(bench.state.recipe(touch).unwrap().steps, 20, "what the bundle recommends");
+    let fast = GenerateSettings { preset: Some(Preset::Fast), ..bench.state.settings.generate.clone() };
+    bench.send(Command::SetGenerate(fast));
+    assert!(bench.state.recipe(touch).unwrap().steps <= 4);
+    let own = GenerateSettings { steps: 33, ..bench.state.settings.generate.clone() };
+    bench.send(Command::SetGenerate(own));
+    assert_eq!(bench.state.settings.generate.preset, None);
+    assert_eq!(bench.state.recipe(touch).unwrap().steps, 33);
+}
+
+#[test]
+fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
+    let defaults = GenerateConfig { guidance: 2.5, spacing: Spacing::Lab, ..GenerateConfig::default() };
+    let bundle = |guided| BundleInfo {
+        id: "x".into(),
+        name: "x".into(),
+        kind: BundleKind::Generator,
+        folder: "x".into(),
+        generator: Some(GeneratorInfo { defaults, training_steps: 1000, guided }),
+    };
+    let own = GenerateSettings { preset: None, guidance: 4.0, sampler: Sampler::Ddpm, ..GenerateSettings::default() };
+    assert_eq!(own.config(&bundle(true)).guidance, 4.0);
+    assert_eq!(own.config(&bundle(false)).guidance, 1.0);
+    let preset = GenerateSettings::default();
+    assert_eq!(preset.config(&bundle(true)).guidance, 2.5);
+    assert_eq!(preset.spelt_out(Some(&bundle(true))).spacing, Spacing::Lab);
+    let wild = GenerateSettings { guidance: f32::NAN, preview_every: u32::MAX, ..own }.validated();
+    assert_eq!((wild.guidance, wild.preview_every), (1.0, 1000));
+}

@@ -1,0 +1,272 @@
+//! The generator as a whole, on the tiny bundle of `tests/data/bundles`: batches, previews, guidance, what is kept on
+//! the disk, and inputs that make no sense (row E22 of the list of numerical failures, from image to picture).
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use strum::IntoEnumIterator as _;
+use touch2touch::app::jobs::JobCx;
+use touch2touch::app::keys::{DatasetSeq, PairKey, Recipe, TouchKey};
+use touch2touch::app::library::BundleInfo;
+use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::services::{GenerateItem, Services};
+use touch2touch::app::settings::RuntimeChoice;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
+use touch2touch::domain::grid::{Grid, RgbGrid};
+use touch2touch::domain::postprocess::RawPrediction;
+use touch2touch::domain::sensor::Finger;
+use touch2touch::infer::bundle::{Bundle, MANIFEST};
+use touch2touch::infer::engine::EngineChoice;
+use touch2touch::infer::generator::{GenerateError, Generator, Item, Observer};
+
+fn fixture() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator")
+}
+
+/// The tiny bundle with another manifest.
+fn with_manifest(change: impl FnOnce(&mut serde_json::Value)) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(fixture()).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, dir.path().join(path.file_name().unwrap())).unwrap();
+    }
+    let path = dir.path().join(MANIFEST);
+    let mut manifest = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    change(&mut manifest);
+    std::fs::write(path, manifest.to_string()).unwrap();
+    dir
+}
+
+fn open(dir: &Path) -> Generator {
+    Generator::open(&Bundle::open(dir).unwrap(), EngineChoice::Rten).unwrap()
+}
+
+fn image(phase: f32) -> RgbGrid {
+    Grid::from_fn(43, 32, |x, y| {
+        let bar = if (x + y / 2) % 20 < 5 { 40.0 } else { 0.0 };
+        [bar, -bar * 0.5, (x as f32 * 0.3 + phase).sin() * 10.0]
+    })
+}
+
+fn go_on(_: Progress) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+fn config() -> GenerateConfig {
+    GenerateConfig { steps: 6, ..Default::default() }
+}
+
+fn largest_difference(a: &RawPrediction, b: &RawPrediction) -> f32 {
+    let pairs = a.channels.iter().zip(&b.channels).flat_map(|(a, b)| a.as_slice().iter().zip(b.as_slice()));
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+/// How often each graph ran: condition encoder, denoiser, decoder.
+fn runs(generator: &mut Generator) -> [u64; 3] {
+    generator.graphs().map(|graph| graph.runs())
+}
+
+#[test]
+fn each_image_is_encoded_once_however_many_seeds_it_has() {
+    let mut generator = open(&fixture());
+    let (a, b) = (image(0.0), image(1.0));
+    let items: Vec<Item> = [1, 2, 3].iter().flat_map(|&seed| [0, 1].map(|image| Item { image, seed })).collect();
+    let made = generator.run(&[&a, &b], &items, &config(), &mut go_on).unwrap();
+    assert_eq!(runs(&mut generator), [2, 6, 1], "two images, six steps, one decoding");
+    for (item, found) in items.iter().zip(&made) {
+        let alone = GenerateConfig { seed: item.seed, ..config() };
+        let expected = generator.generate([&a, &b][item.image], &alone, &mut go_on).unwrap();
+        assert!(largest_difference(found, &expected) < 1e-5);
+    }
+    // A seed more needs no more encoding, and an image without items none at all.
+    assert_eq!(runs(&mut generator)[0], 2);
+    generator.run(&[&image(2.0), &a], &[Item { image: 1, seed: 9 }], &config(), &mut go_on).unwrap();
+    assert_eq!(runs(&mut generator)[0], 2);
+    let missing = generator.run(&[&a], &[Item { image: 1, seed: 0 }], &config(), &mut go_on);
+    assert!(matches!(missing, Err(GenerateError::NoImage { image: 1, images: 1 })));
+}
+
+/// Looks at one item after every other step; breaks where told.
+struct Looker {
+    item: usize,
+    seen: Vec<(u32, RawPrediction)>,
+    stop_at: u32,
+}
+
+impl Observer for Looker {
+    fn progress(&mut self, p: Progress) -> ControlFlow<()> {
+        if p.step == self.stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn wants_preview(&mut self, after: Progress, item: usize) -> bool {
+        assert!(after.step < after.of, "the last step has a result, not a preview");
+        item == self.item && after.step == 1
+    }
+
+    fn preview(&mut self, after: Progress, item: usize, raw: RawPrediction) {
+        assert_eq!(item, self.item);
+        self.seen.push((after.step, raw));
+    }
+}
+
+#[test]
+fn previews_show_what_is_coming_and_change_nothing() {
+    let mut generator = open(&fixture());
+    let items = [0, 1].map(|image| Item { image, seed: 7 });
+    for sampler in Sampler::iter() {
+        let config = GenerateConfig { sampler, ..config() };
+        let (a, b) = (image(0.0), image(1.0));
+        let plain = generator.run(&[&a, &b], &items, &config, &mut go_on).unwrap();
+        let before = runs(&mut generator)[2];
+        let mut looker = Looker { item: 1, seen: Vec::new(), stop_at: u32::MAX };
+        let watched = generator.run(&[&a, &b], &items, &config, &mut looker).unwrap();
+        assert_eq!(plain, watched, "{sampler:?}: looking changes nothing");
+        let (step, raw) = &looker.seen[0];
+        assert_eq!((looker.seen.len(), *step, raw.channels.len()), (1, 1, 3));
+        assert_eq!(runs(&mut generator)[2], before + 2, "one preview and the result");
+        assert!(raw.channels.iter().flat_map(|c| c.as_slice()).all(|v| v.is_finite()));
+        // The estimate of the first of one step is the result of one step.
+        let one = GenerateConfig { steps: 1, ..config };
+        let result = generator.run(&[&b], &items[..1], &one, &mut go_on).unwrap();
+        assert!(largest_difference(raw, &result[0]) < 1e-4, "{sampler:?}");
+        let mut stopped = Looker { item: 0, seen: Vec::new(), stop_at: 3 };
+        let cancelled = generator.run(&[&a, &b], &items, &config, &mut stopped);
+        assert!(matches!(cancelled, Err(GenerateError::Cancelled)));
+    }
+}
+
+#[test]
+fn guidance_is_what_its_formula_says_and_only_where_declared() {
+    let refused = open(&fixture()).generate(&image(0.0), &GenerateConfig { guidance: 2.0, ..config() }, &mut go_on);
+    let text = refused.unwrap_err().to_string();
+    assert!(text.contains("was not trained for guidance") && text.contains('2'), "{text}");
+
+    let blank = Grid::filled(16, 16, [0.0; 3]);
+    let plain = open(&fixture()).generate(&image(0.0), &config(), &mut go_on).unwrap();
+    let unguided = open(&fixture()).generate(&blank, &config(), &mut go_on).unwrap();
+    let dir = with_manifest(|m| m["guidance"] = serde_json::json!({"unconditional": "zero_difference", "scale": 3.0}));
+    let mut generator = open(dir.path());
+    assert_eq!(generator.spec().defaults.guidance, 3.0, "the declared scale is the default");
+    let mut guided = |guidance| generator.generate(&image(0.0), &GenerateConfig { guidance, ..config() }, &mut go_on);
+    assert_eq!(guided(1.0).unwrap(), plain, "a scale of 1 is the model alone");
+    // A scale of 0 leaves only what a GelSlim that feels nothing gives.
+    assert!(largest_difference(&guided(0.0).unwrap(), &unguided) < 1e-5);
+    assert!(largest_difference(&guided(3.0).unwrap(), &plain) > 1e-3);
+    assert!(matches!(guided(21.0), Err(GenerateError::Diffusion(_))));
+    assert!(matches!(guided(f64::NAN), Err(GenerateError::Diffusion(_))));
+    // Both halves are one call a step: 6 steps for each of 0, 1 and 3.
+    assert_eq!(runs(&mut generator)[1], 18);
+    let other = with_manifest(|m| m["guidance"] = serde_json::json!({"unconditional": "zero_condition", "scale": 1.0}));
+    let config = GenerateConfig { guidance: 3.0, ..config() };
+    let zeros = open(other.path()).generate(&image(0.0), &config, &mut go_on).unwrap();
+    let difference = generator.generate(&image(0.0), &config, &mut go_on).unwrap();
+    assert!(largest_difference(&zeros, &difference) > 1e-4, "no condition is not the condition of nothing");
+    for (guidance, problem) in [
+        (serde_json::json!({"unconditional": "zero_condition", "scale": 99}), "guidance.scale: out of range"),
+        (serde_json::json!({"unconditional": "noise", "scale": 2}), "guidance: unknown variant"),
+        (serde_json::json!({"scale": 2}), "guidance: missing field"),
+    ] {
+        let dir = with_manifest(|m| m["guidance"] = guidance);
+        let text = Bundle::open(dir.path()).unwrap_err().to_string();
+        assert!(text.contains(problem), "{text}");
+    }
+}
+
+/// Row E22: alpha bar of 0 and 1, few and many steps, every eta; and images that no camera takes.
+#[test]
+fn e22_every_input_gives_finite_pictures_or_a_clear_error() {
+    let mut generator = open(&fixture());
+    let huge = |v: f32| Grid::filled(43, 32, [v, -v, v]);
+    let images = [huge(0.0), huge(255.0), huge(-255.0), huge(1e-30), huge(1e30), huge(f32::MAX), image(0.0)];
+    for image in &images {
+        for sampler in Sampler::iter() {
+            for (steps, eta) in [(1, 0.0), (1, 1.0), (2, 0.3), (7, 1.0), (40, 0.0)] {
+                for spacing in [Spacing::Lab, Spacing::Trailing] {
+                    let config = GenerateConfig { steps, eta, sampler, spacing, ..Default::default() };
+                    match generator.generate(image, &config, &mut go_on) {
+                        Ok(raw) => assert!(raw.channels.iter().flat_map(|c| c.as_slice()).all(|v| v.is_finite())),
+                        Err(GenerateError::Model(err)) => {
+                            assert!(err.to_string().contains("not numbers"), "{err}");
+                            assert!(image[(0, 0)][0].abs() >= 1e30, "an ordinary image must give a picture");
+                        }
+                        Err(err) => panic!("{err}"),
+                    }
+                }
+            }
+        }
+    }
+    // All the steps of the training, once: the longest run there is.
+    let all = GenerateConfig { steps: 1000, eta: 1.0, ..Default::default() };
+    let raw = generator.generate(&image(0.0), &all, &mut go_on).unwrap();
+    assert!(raw.channels.iter().flat_map(|c| c.as_slice()).all(|v| v.is_finite()));
+    for (bad, at) in [(f32::NAN, (0, 0)), (f32::INFINITY, (42, 31)), (f32::NEG_INFINITY, (7, 7))] {
+        let mut holes = image(0.0);
+        holes[at][1] = bad;
+        let text = generator.generate(&holes, &config(), &mut go_on).unwrap_err().to_string();
+        assert!(text.contains("43 x 32") && text.contains("1 values that are not numbers"), "{text}");
+    }
+    for size in [[1, 1], [1, 500], [3000, 2]] {
+        let odd = Grid::from_fn(size[0], size[1], |x, y| [x as f32 % 9.0, y as f32 % 5.0, 1.0]);
+        assert!(generator.generate(&odd, &config(), &mut go_on).is_ok(), "{size:?}");
+    }
+}
+
+fn bundle(services: &LiveServices) -> BundleInfo {
+    let (bundles, _) = services.find_bundles(&[fixture()]);
+    bundles.into_iter().find(|b| b.name == "Tiny generator of the tests").expect("the fixture is a generator")
+}
+
+fn touch(finger: Finger) -> TouchKey {
+    PairKey { dataset: DatasetSeq(1), pair: PairId(0) }.finger(finger)
+}
+
+#[test]
+fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let start = || LiveServices::with_config_folder(Some(folder.path().to_owned()));
+    let cx = JobCx::unwatched();
+    let (a, b) = (image(0.0), image(1.0));
+    let services = start();
+    let info = bundle(&services);
+    let recipe = |finger, seed| {
+        Recipe::new(touch(finger), info.id.clone(), RuntimeChoice::Rten, &GenerateConfig { seed, ..config() })
+    };
+    let item = |finger, seed, difference| GenerateItem { recipe: recipe(finger, seed), difference, size: [0, 0] };
+    assert!(services.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty());
+    let both = [item(Finger::Right, 1, &a), item(Finger::Left, 1, &b)];
+    let made = services.generate(&info, &both, &cx).unwrap();
+    assert!(made.iter().all(|m| m.kept.is_none()));
+
+    let again = start();
+    let found = again.generate(&info, &both, &cx).unwrap();
+    assert!(found.iter().all(|m| m.kept.is_some()), "read, not made");
+    for (made, found) in made.iter().zip(&found) {
+        assert_eq!(made.raw, found.raw);
+        assert_eq!(made.chains.keys().collect::<Vec<_>>(), found.chains.keys().collect::<Vec<_>>());
+    }
+    let listed = again.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &a);
+    assert_eq!(listed.iter().map(|p| p.recipe.clone()).collect::<Vec<_>>(), [recipe(Finger::Right, 1)]);
+    // The same pair and finger with another image (another data set of the same names) is another touch.
+    assert!(again.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &image(2.0)).is_empty());
+    let another = image(2.0);
+    let other = again.generate(&info, &[item(Finger::Right, 1, &another)], &cx).unwrap();
+    assert!(other[0].kept.is_none() && other[0].raw != made[0].raw);
+    // Half known, half new: only the new one is made. Another engine's results are not taken for this one's.
+    let half = again.generate(&info, &[item(Finger::Right, 2, &a), item(Finger::Left, 1, &b)], &cx).unwrap();
+    assert!(half[0].kept.is_none() && half[1].kept.is_some());
+    assert_eq!(again.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &a).len(), 2);
+    assert!(again.stored(&[], RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty(), "its bundle is gone");
+
+    // Damaged files are not there; a budget of nothing keeps nothing.
+    for entry in std::fs::read_dir(folder.path().join("predictions")).unwrap() {
+        std::fs::write(entry.unwrap().path(), "not a prediction").unwrap();
+    }
+    let services = start();
+    let mut settings = services.load_settings().0;
+    settings.cache_mib = 0;
+    services.save_settings(&settings).unwrap();
+    let made_again = services.generate(&info, &both, &cx).unwrap();
+    assert!(made_again.iter().all(|m| m.kept.is_none()) && made_again[0].raw == made[0].raw);
+    assert!(services.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty());
+}

@@ -1,0 +1,55 @@
+//! Generating as a person sees it: the picture on the way, the presets, the result that is there again after a restart.
+
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::command::Command;
+use touch2touch::app::keys::{ImprintSource, Preset};
+use touch2touch::domain::sensor::Finger;
+
+use super::rig::Rig;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+
+#[test]
+fn the_picture_on_the_way_is_shown_until_the_result_lands() {
+    let Some((mut rig, gate)) = Rig::gated(SIZE) else { return };
+    rig.harness.state_mut().push(Command::DismissHint);
+    rig.harness.state_mut().push(Command::Generate);
+    rig.until("a preview", |state| state.preview(Finger::Right).is_some());
+    for _ in 0..3 {
+        rig.harness.step();
+    }
+    assert!(rig.harness.query_by_label("Predicted imprint right, preview").is_some());
+    assert!(rig.harness.query_by_label("Predicted imprint right").is_none(), "it is not taken for the result");
+    rig.shoot("generate-preview");
+    let state = rig.harness.state().state();
+    assert!(state.imprint(ImprintSource::Predicted, Finger::Right).ready().is_none());
+    assert_eq!(state.preview(Finger::Right).unwrap().step, 4);
+    gate.open();
+    rig.until("the result", |state| state.imprint(ImprintSource::Predicted, Finger::Right).ready().is_some());
+    for _ in 0..3 {
+        rig.harness.step();
+    }
+    assert!(rig.harness.query_by_label("Predicted imprint right, preview").is_none());
+    assert!(rig.harness.query_by_label("Predicted imprint right").is_some());
+    assert!(rig.harness.state().state().preview(Finger::Right).is_none());
+}
+
+#[test]
+fn presets_are_one_click_and_show_their_numbers() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    let steps = |rig: &Rig| {
+        let state = rig.harness.state().state();
+        state.recipe(state.touch_key(Finger::Right).unwrap()).unwrap().steps
+    };
+    assert_eq!(steps(&rig), 4, "what the bundle recommends");
+    for (label, preset) in [("Fast", Preset::Fast), ("Best", Preset::Best), ("Default", Preset::Default)] {
+        let node = rig.harness.get_all_by_label(label).next().unwrap_or_else(|| panic!("no {label}"));
+        node.click();
+        rig.harness.step();
+        rig.settle();
+        assert_eq!(rig.harness.state().state().settings.generate.preset, Some(preset));
+        rig.shoot(&format!("generate-{}", label.to_lowercase()));
+    }
+    assert_eq!(steps(&rig), 4);
+    assert!(rig.harness.query_by_label("Guidance").is_none(), "this bundle was not trained for it");
+}
