@@ -233,7 +233,7 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
         Recipe::new(touch(finger), info.id.clone(), RuntimeChoice::Rten, &GenerateConfig { seed, ..config() })
     };
     let item = |finger, seed, difference| GenerateItem { recipe: recipe(finger, seed), difference, size: [0, 0] };
-    assert!(services.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty());
+    assert!(services.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty());
     let both = [item(Finger::Right, 1, &a), item(Finger::Left, 1, &b)];
     let made = services.generate(&info, &both, &cx).unwrap();
     assert!(made.iter().all(|m| m.kept.is_none()));
@@ -245,17 +245,19 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
         assert_eq!(made.raw, found.raw);
         assert_eq!(made.chains.keys().collect::<Vec<_>>(), found.chains.keys().collect::<Vec<_>>());
     }
-    let listed = again.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &a);
+    let listed = again.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &a);
     assert_eq!(listed.iter().map(|p| p.recipe.clone()).collect::<Vec<_>>(), [recipe(Finger::Right, 1)]);
     // The same pair and finger with another image (another data set of the same names) is another touch.
-    assert!(again.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &image(2.0)).is_empty());
+    assert!(
+        again.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &image(2.0)).is_empty()
+    );
     let another = image(2.0);
     let other = again.generate(&info, &[item(Finger::Right, 1, &another)], &cx).unwrap();
     assert!(other[0].kept.is_none() && other[0].raw != made[0].raw);
     // Half known, half new: only the new one is made. Another engine's results are not taken for this one's.
     let half = again.generate(&info, &[item(Finger::Right, 2, &a), item(Finger::Left, 1, &b)], &cx).unwrap();
     assert!(half[0].kept.is_none() && half[1].kept.is_some());
-    assert_eq!(again.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &a).len(), 2);
+    assert_eq!(again.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &a).len(), 2);
     assert!(again.stored(&[], RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty(), "its bundle is gone");
 
     // Damaged files are not there; a budget of nothing keeps nothing.
@@ -268,5 +270,5 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     services.save_settings(&settings).unwrap();
     let made_again = services.generate(&info, &both, &cx).unwrap();
     assert!(made_again.iter().all(|m| m.kept.is_none()) && made_again[0].raw == made[0].raw);
-    assert!(services.stored(&[info.clone()], RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty());
+    assert!(services.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty());
 }

@@ -18,11 +18,15 @@ use super::state::State;
 use super::tasks::{Progress, Ticket};
 use lanes::{Event, Lanes};
 
+/// The latest picture on the way of each touch, with the job that made it.
+type LatestPreviews = BTreeMap<TouchKey, (Ticket, Arc<Preview>)>;
+
 /// Called from any thread when there is something for [`Runtime::tick`] to do.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// The name of a job: a newer one of the same name replaces one that waits.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[allow(clippy::large_enum_variant, reason = "a few hundred at most, and most are requests")]
 pub(super) enum JobId {
     /// Started by a person.
     Task(Ticket),
@@ -45,7 +49,7 @@ pub struct Runtime {
     /// Progress by ticket, only the latest.
     progress: Arc<std::sync::Mutex<BTreeMap<Ticket, Progress>>>,
     /// Pictures on the way, only the latest of each touch.
-    previews: Arc<std::sync::Mutex<BTreeMap<TouchKey, (Ticket, Arc<Preview>)>>>,
+    previews: Arc<std::sync::Mutex<LatestPreviews>>,
     /// What of them would be looked at.
     preview_wish: Arc<std::sync::Mutex<PreviewWish>>,
     wake: Wake,

@@ -63,11 +63,11 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
                 generated(state, prediction);
             }
         }
-        Command::Previewed(ticket, preview) => {
-            // One that comes after its result, or after Cancel, is too late.
-            if state.tasks.running.get(&ticket).is_some_and(|task| !task.cancelling) {
-                state.results.previews.insert(preview.recipe.touch, preview);
-            }
+        // One that comes after its result, or after Cancel, is too late.
+        Command::Previewed(ticket, preview)
+            if state.tasks.running.get(&ticket).is_some_and(|task| !task.cancelling) =>
+        {
+            state.results.previews.insert(preview.recipe.touch, preview);
         }
         Command::Progressed(ticket, progress) => {
             if let Some(task) = state.tasks.running.get_mut(&ticket) {
