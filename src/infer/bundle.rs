@@ -104,8 +104,8 @@ use crate::domain::dataset::Problem;
 pub use find::{Found, default_roots, find};
 pub use manifest::{
     BubbleSensor, BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, FileEntry, GelslimSensor,
-    GeneratorInput, GeneratorSpec, GuidanceSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind,
-    ScheduleSpec, TensorSpec, TimestepType, Unconditional,
+    GeneratorInput, GeneratorSpec, GuidanceSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec,
+    ScheduleKind, ScheduleSpec, TensorSpec, TimestepType, Unconditional,
 };
 
 /// The manifest's file name.

@@ -22,7 +22,7 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
             }
             let (Some(setup), Some(open)) = (state.evaluation_setup(), &state.library.open) else { return };
             let source = open.source.clone();
-            let ticket = state.tasks.start(format!("Evaluate {}", source.title()), None);
+            let ticket = state.tasks.start(format!("Evaluate {}", source.title()), Vec::new());
             state.table.running = Some(ticket);
             effects.push(Effect::Evaluate { ticket, source, setup: Box::new(setup) });
         }
@@ -43,7 +43,7 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
         }
         EvaluateCommand::Export(folder) => {
             let Some(evaluation) = state.table.result.clone() else { return };
-            let ticket = state.tasks.start("Export the table".into(), None);
+            let ticket = state.tasks.start("Export the table".into(), Vec::new());
             effects.push(Effect::ExportTable { ticket, evaluation, published: state.table.published, folder });
         }
     }
