@@ -14,8 +14,12 @@ use crate::domain::evaluation::{Column, Figures, Group, Row, columns};
 
 /// Height of a row, points.
 const ROW: f32 = 20.0;
-/// Share of the width that the method's name takes, in widths of a number.
-const NAME: f32 = 3.4;
+/// Share of the width that the method's name takes, in letters.
+const NAME: f32 = 30.0;
+/// A narrower pane leaves out the columns that can be missed, points; the tooltip of a row has them all.
+const NARROW: f32 = 900.0;
+/// The columns that can be missed.
+const MINOR: [&str; 2] = ["SSIM 22.5", "FID"];
 
 /// The pane.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -105,7 +109,9 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// The column groups, one below the other.
 fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
     let Some(result) = &cx.state.table.result else { return };
-    let shown = columns(rows);
+    let all = columns(rows);
+    let narrow = ui.available_width() < NARROW;
+    let shown: Vec<&Column> = all.iter().copied().filter(|c| !narrow || !MINOR.contains(&c.heading)).collect();
     ScrollArea::vertical().auto_shrink(false).id_salt("results").show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
         let mut groups: Vec<Group> = result.groups.clone();
@@ -116,7 +122,7 @@ fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
             heading(cx, ui, group, &shown);
             let best = Best::of(&shown, &figures);
             for (row, figures) in figures {
-                line(cx, ui, row, figures, &shown, &best);
+                line(cx, ui, row, figures, (&shown, &all), &best);
             }
             ui.add_space(10.0);
         }
@@ -133,19 +139,26 @@ fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
     });
 }
 
-/// Left end and width of the method's name and of each number.
-fn cells(rect: Rect, count: usize) -> (Rect, Vec<Rect>) {
-    let w = rect.width() / (NAME + count as f32);
-    let name = Rect::from_min_size(rect.min, vec2(w * NAME, rect.height()));
-    let number = |i: usize| Rect::from_min_size(pos2(name.right() + w * i as f32, rect.top()), vec2(w, rect.height()));
-    (name, (0..count).map(number).collect())
+/// Where the method's name, the number of grasps and each figure stand: as wide as their headings ask for.
+fn cells(rect: Rect, shown: &[&Column]) -> (Rect, Vec<Rect>) {
+    let letters = |text: &str| text.chars().count().max(6) as f32 + 1.0;
+    let shares: Vec<f32> = std::iter::once("grasps").chain(shown.iter().map(|c| c.heading)).map(letters).collect();
+    let unit = rect.width() / (NAME + shares.iter().sum::<f32>());
+    let name = Rect::from_min_size(rect.min, vec2(unit * NAME, rect.height()));
+    let mut left = name.right();
+    let mut number = |share: f32| {
+        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(unit * share, rect.height()));
+        left = cell.right();
+        cell
+    };
+    (name, shares.into_iter().map(&mut number).collect())
 }
 
 fn heading(cx: &Cx<'_>, ui: &mut Ui, group: Group, shown: &[&Column]) {
     ui.label(section(group.label(), cx.p));
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
     ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, cx.p.line));
-    let (name, numbers) = cells(rect, shown.len() + 1);
+    let (name, numbers) = cells(rect, shown);
     let font = FontId::new(SMALL, medium());
     let left = pos2(name.left() + 4.0, name.center().y);
     ui.painter_at(name).text(left, Align2::LEFT_CENTER, "Method", font.clone(), cx.p.weak);
@@ -180,12 +193,12 @@ fn competes(row: &Row) -> bool {
     !row.published && !row.upper_bound
 }
 
-fn line(cx: &Cx<'_>, ui: &mut Ui, row: &Row, figures: &Figures, shown: &[&Column], best: &Best) {
+fn line(cx: &Cx<'_>, ui: &mut Ui, row: &Row, figures: &Figures, (shown, all): (&[&Column], &[&Column]), best: &Best) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
     if response.hovered() {
         ui.painter().rect_filled(rect, 3.0, cx.p.control[0]);
     }
-    let (name, numbers) = cells(rect, shown.len() + 1);
+    let (name, numbers) = cells(rect, shown);
     let color = match (row.upper_bound, row.published) {
         (true, _) => cx.p.truth,
         (_, true) => cx.p.weak,
@@ -193,29 +206,33 @@ fn line(cx: &Cx<'_>, ui: &mut Ui, row: &Row, figures: &Figures, shown: &[&Column
     };
     let font = FontId::proportional(12.0);
     let left = pos2(name.left() + 4.0, name.center().y);
-    ui.painter_at(name.shrink2(vec2(4.0, 0.0))).text(left, Align2::LEFT_CENTER, &row.method, font.clone(), color);
+    let galley = ui.painter().layout_job(egui::text::LayoutJob {
+        wrap: egui::text::TextWrapping::truncate_at_width(name.width() - 8.0),
+        ..egui::text::LayoutJob::single_section(row.method.clone(), egui::TextFormat::simple(font.clone(), color))
+    });
+    let top = left - vec2(0.0, 0.5 * galley.size().y);
+    ui.painter().galley(top, galley, color);
     let put = |cell: Rect, text: &str, color: Color32| {
         let right = pos2(cell.right() - 6.0, cell.center().y);
         ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), color);
     };
     put(numbers[0], &figures.grasps.to_string(), cx.p.weak);
-    let mut said = format!("{}: {} grasps, {} images", row.method, figures.grasps, figures.images);
     for ((column, cell), best) in shown.iter().zip(&numbers[1..]).zip(&best.0) {
-        let found = (column.get)(figures);
-        let Some(e) = found else {
+        let Some(e) = (column.get)(figures) else {
             put(*cell, "–", cx.p.weak);
             continue;
         };
         let is_best = competes(row) && best.is_some_and(|b| b == e.value);
-        let color = if row.published {
-            cx.p.weak
-        } else if is_best {
-            cx.p.good
-        } else {
-            cx.p.strong
+        let color = match (row.published, is_best) {
+            (true, _) => cx.p.weak,
+            (false, true) => cx.p.good,
+            (false, false) => cx.p.strong,
         };
+        put(*cell, &format!("{:.1$}", e.value, column.decimals), color);
+    }
+    let mut said = format!("{}: {} grasps, {} images", row.method, figures.grasps, figures.images);
+    for (column, e) in all.iter().filter_map(|c| Some((c, (c.get)(figures)?))) {
         let decimals = column.decimals;
-        put(*cell, &format!("{:.decimals$}", e.value), color);
         said += &format!("\n{} {:.decimals$}", column.heading, e.value);
         if let Some([low, high]) = e.interval {
             said += &format!("   ({low:.decimals$} to {high:.decimals$} with 95 %)");

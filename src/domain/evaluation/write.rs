@@ -81,7 +81,7 @@ const COLUMNS: [Column; 12] = [
 
 /// What the columns mean, a line each.
 pub const NOTES: [&str; 6] = [
-    "each figure per tool, then the mean over the tools; square brackets: 95 % bootstrap interval over the grasps",
+    "each figure per tool, then the mean over the tools; intervals: 95 %, bootstrap over the grasps",
     "clean: against the simulator's imprint before camera noise, which no generator can know; the row of the measured \
      imprints says how much that noise costs",
     "FD: Fréchet distance in the features of the tool classifier, predicted against measured imprints of the group; it \

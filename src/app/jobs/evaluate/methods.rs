@@ -8,6 +8,7 @@ use super::super::super::error::TaskError;
 use super::super::JobCx;
 use super::load::Case;
 use super::{MaskBy, Setup, WHAT};
+use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{RawPrediction, ShiftMode};
@@ -19,6 +20,9 @@ use crate::infer::classifier::ToolClassifier;
 use crate::infer::generator::{GenerateError, Generator};
 use crate::infer::mask::MaskModel;
 use crate::io::dataset::{Dataset, SourceKind};
+
+/// Pictures that are looked at for stored predictions: a folder has them from the start, or not at all.
+const LOOKED_AT: u32 = 16;
 
 /// What stands for one row of the table.
 pub(super) enum Method {
@@ -90,7 +94,8 @@ impl Models {
             names.push(name.clone());
             methods.push(Method::Generator(Box::new(GeneratorMethod { name, generator, config })));
         }
-        if pictures {
+        let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id)), Ok(Some(_)));
+        if pictures && (0..LOOKED_AT).any(stored) {
             methods.push(Method::Stored);
         }
         let mask = match (&setup.mask_bundle, setup.mask) {
