@@ -7,6 +7,8 @@ mod support;
 
 mod apply;
 mod cli;
+#[cfg(feature = "onnx")]
+mod cli_generate;
 mod io;
 mod layers;
 mod models;

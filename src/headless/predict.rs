@@ -185,20 +185,24 @@ impl Predictor {
     /// The bundle's defaults with what the command line says instead.
     pub(super) fn config(&mut self) -> anyhow::Result<GenerateConfig> {
         let args = self.args.clone();
-        let spec = self.generator()?.spec();
+        let generator = self.generator()?;
+        let spec = generator.spec();
         let preset = args.preset.config(spec.defaults, spec.schedule.training_steps());
         let spacing = args.spacing.map(|spacing| match spacing {
             SpacingArg::Trailing => Spacing::Trailing,
             SpacingArg::Lab => Spacing::Lab,
         });
-        Ok(GenerateConfig {
+        let config = GenerateConfig {
             steps: args.steps.unwrap_or(preset.steps),
             seed: args.seed.unwrap_or(preset.seed),
             eta: args.eta.unwrap_or(preset.eta),
             sampler: args.sampler.unwrap_or(preset.sampler),
             spacing: spacing.unwrap_or(preset.spacing),
             guidance: args.guidance.unwrap_or(preset.guidance),
-        })
+        };
+        // Said once, before the first pair, rather than for every pair.
+        generator.check_guidance(&config)?;
+        Ok(config)
     }
 
     /// Predictions of GelSlim difference images, all in one batch, in their order. What was made before is not made

@@ -199,9 +199,7 @@ impl Generator {
         if items.is_empty() {
             return Ok(Vec::new());
         }
-        if config.guidance != 1.0 && self.spec.guidance.is_none() {
-            return Err(GenerateError::NoGuidance { bundle: self.name.clone(), scale: config.guidance });
-        }
+        self.check_guidance(config)?;
         let conditions: Vec<Option<Tensor>> = (0..images.len())
             .map(|at| {
                 // An image that no item is of is not encoded.
@@ -262,6 +260,17 @@ impl Generator {
         }
         self.encoded.push((prepared, condition.clone()));
         Ok(condition)
+    }
+
+    /// Whether the bundle can be guided as asked.
+    ///
+    /// # Errors
+    /// [`GenerateError::NoGuidance`] for a scale other than 1 and a bundle that was not trained for it.
+    pub fn check_guidance(&self, config: &GenerateConfig) -> Result<(), GenerateError> {
+        if config.guidance != 1.0 && self.spec.guidance.is_none() {
+            return Err(GenerateError::NoGuidance { bundle: self.name.clone(), scale: config.guidance });
+        }
+        Ok(())
     }
 
     /// Forgets the conditions of images seen before, as if freshly loaded: for measuring.

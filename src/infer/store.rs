@@ -17,7 +17,6 @@ use super::bundle::sha256;
 use super::recipe::Recipe;
 use crate::domain::grid::Grid;
 use crate::domain::postprocess::RawPrediction;
-use crate::io::atomic;
 
 /// The format and its version, in every file.
 const FORMAT: &str = "touch2touch-prediction-1";
@@ -156,10 +155,12 @@ impl Store {
         fs::create_dir_all(&self.folder)?;
         let file = self.file(recipe);
         let before = fs::metadata(&file).map_or(0, |m| m.len());
-        atomic::write(&file, |out| {
-            out.write_all(&line)?;
-            out.write_all(&values)
-        })?;
+        // Renamed into place, but not forced to the disk: after a power cut the checksum tells half a file, and no
+        // result has to wait for a disk.
+        let mut out = tempfile::Builder::new().prefix(".tmp-").suffix(".part").tempfile_in(&self.folder)?;
+        out.write_all(&line)?;
+        out.write_all(&values)?;
+        out.persist(&file).map_err(|err| err.error)?;
         let mut bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
         let total = match *bytes {
             Some(known) => (known + size).saturating_sub(before),

@@ -274,7 +274,7 @@ fn measure(
     let rows = configs.iter().zip(times.iter().zip(&scores)).map(|(config, (ms, scores))| {
         let squares: f64 = scores.iter().map(|s| s.mse_m2).sum::<f64>() / scores.len().max(1) as f64;
         let psnr: Vec<f64> = scores.iter().flat_map(|s| s.psnr_db).flatten().collect();
-        let errors: Vec<f64> = scores.iter().filter_map(|s| s.error_deg).collect();
+        let errors: Vec<f64> = scores.iter().filter_map(|s| s.error_rad).collect();
         let shares = ms.iter().zip(&times[0]).map(|(ms, reference)| ms / reference);
         Row {
             name: name(config, engine, false),
@@ -290,7 +290,7 @@ fn measure(
             no_pose: scores.len() - errors.len(),
             ms: ms.clone(),
             rmse_of_grasp_mm: scores.iter().map(|s| s.mse_m2.sqrt() * 1e3).collect(),
-            error_deg: scores.iter().map(|s| s.error_deg).collect(),
+            error_deg: scores.iter().map(|s| Some(s.error_rad?.to_degrees())).collect(),
         }
     });
     Ok(rows.collect())
@@ -421,17 +421,20 @@ fn text(report: &Report) -> String {
     }
     for o in &report.overhead {
         text += &format!(
-            "{}: overhead of the sampler over the bare graphs {:.2} % (median of {} pairs of runs; {:.1} against {:.1} ms)\n",
+            "{}: overhead of the sampler over the bare graphs {:.2} % (median of {} pairs of runs; shortest runs {:.2} %; \
+             medians {:.1} against {:.1} ms)\n",
             o.engine.label(),
             o.percent,
             o.pairs,
+            o.percent_of_shortest,
             o.generator_ms,
             o.bare_ms
         );
     }
     for f in &report.first {
         text += &format!(
-            "{}: loading {:.0} ms, first result cold {:.0} ms, warm {:.0} ms, first preview {} ms, previews cost {} %\n",
+            "{}: loading {:.0} ms, first result cold {:.0} ms, warm {:.0} ms, first preview {} ms, previews of one finger \
+             cost {} %\n",
             f.engine.label(),
             f.load_ms,
             f.cold_ms,

@@ -27,8 +27,8 @@ pub(super) struct Score {
     pub(super) mse_m2: f64,
     /// By finger.
     pub(super) psnr_db: [Option<f64>; 2],
-    /// `None` if there is no pose.
-    pub(super) error_deg: Option<f64>,
+    /// Of the angle; `None` if there is no pose.
+    pub(super) error_rad: Option<f64>,
 }
 
 /// `count` grasps, spread over the tools of which `wanted` says whether (by "seen in training").
@@ -75,7 +75,7 @@ impl Judge {
         let mut errors = Vec::new();
         for case in cases {
             let imprints = [bubble(&case.sample, Finger::Right)?, bubble(&case.sample, Finger::Left)?];
-            errors.push(self.error_deg(case, &imprints.map(|b| b.imprint.clone()))?.unwrap_or(f64::NAN));
+            errors.push(self.error_rad(case, &imprints.map(|b| b.imprint.clone()))?.unwrap_or(f64::NAN));
         }
         Ok(AngleSummary::from_errors(&errors))
     }
@@ -90,10 +90,10 @@ impl Judge {
             mse += 0.5 * metrics::mse(imprint, truth)?;
             psnr_db[finger.index()] = metrics::psnr(imprint, truth, LAB_PEAK_M)?.db();
         }
-        Ok(Score { mse_m2: mse, psnr_db, error_deg: self.error_deg(case, imprints)? })
+        Ok(Score { mse_m2: mse, psnr_db, error_rad: self.error_rad(case, imprints)? })
     }
 
-    fn error_deg(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Option<f64>> {
+    fn error_rad(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Option<f64>> {
         let masks = [self.masks.predict(&imprints[0])?, self.masks.predict(&imprints[1])?];
         let mut fingers: [Option<FingerInput<'_>>; 2] = [None, None];
         for finger in Finger::BOTH {
@@ -105,6 +105,6 @@ impl Judge {
         }
         // Too few contact points are no pose; that is counted.
         let report = estimate(&fingers, &case.tool, Engine::default(), false).ok();
-        Ok(report.map(|r| angle_error(r.grasp_from_object.theta_rad, case.truth.theta_rad).to_degrees()))
+        Ok(report.map(|r| angle_error(r.grasp_from_object.theta_rad, case.truth.theta_rad)))
     }
 }

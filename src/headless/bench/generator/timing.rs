@@ -6,7 +6,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::cases::Case;
-use crate::domain::diffusion::{GenerateConfig, Progress, Tensor};
+use crate::domain::diffusion::{GaussianNoise, GenerateConfig, Progress, Tensor};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{RawPrediction, ShiftMode};
 use crate::domain::sensor::Finger;
@@ -46,7 +46,7 @@ pub(super) struct First {
     pub(super) warm_ms: f64,
     /// From the start to the first preview; `None` with a single step.
     pub(super) preview_ms: Option<f64>,
-    /// How much later the result comes with previews every four steps, percent.
+    /// How much later the result comes with previews of one finger every four steps, percent.
     pub(super) preview_percent: Option<f64>,
 }
 
@@ -93,8 +93,15 @@ fn bare(generator: &mut Generator, images: &[Tensor], config: &GenerateConfig, s
     let batch = images.len();
     let with = |n: usize, shape: &[usize]| std::iter::once(n).chain(shape.iter().copied()).collect::<Vec<usize>>();
     let [width, height] = spec.output.size;
-    let latent = Tensor::filled(with(batch, &spec.latent.shape), 0.1);
-    let condition = Tensor::filled(with(batch, &spec.condition.shape), 0.1);
+    // Noise, as the sampler has it: some kernels are faster on constants.
+    let mut noise = GaussianNoise::new(1);
+    let mut filled = |shape: Vec<usize>| {
+        let mut tensor = Tensor::filled(shape, 0.0);
+        tensor.data_mut().iter_mut().for_each(|v| *v = noise.draw() as f32);
+        tensor
+    };
+    let latent = filled(with(batch, &spec.latent.shape));
+    let condition = filled(with(batch, &spec.condition.shape));
     let (whole, float) = (vec![500; batch], Tensor::filled(vec![batch], 500.0));
     let timestep = match spec.timestep {
         TimestepType::Int64 => Input::I64(&whole),
@@ -166,8 +173,9 @@ impl Observer for Looker {
         ControlFlow::Continue(())
     }
 
-    fn wants_preview(&mut self, after: Progress, _: usize) -> bool {
-        after.step == 1 || after.step.is_multiple_of(4)
+    fn wants_preview(&mut self, after: Progress, item: usize) -> bool {
+        // As the studio does with one finger on screen.
+        item == 0 && (after.step == 1 || after.step.is_multiple_of(4))
     }
 
     fn preview(&mut self, _: Progress, _: usize, _: RawPrediction) {

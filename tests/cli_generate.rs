@@ -1,0 +1,65 @@
+//! `generate` and `cache` as a user runs them, with the tiny bundle of the tests.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn run(args: &[&str], home: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_touch2touch"))
+        .args(args)
+        // Nothing of the user's may be read or written by a test.
+        .env("TOUCH2TOUCH_DATA", home)
+        .env("XDG_DATA_HOME", home)
+        .env("XDG_CONFIG_HOME", home)
+        .env("TOUCH2TOUCH_CACHE", home)
+        .output()
+        .unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    serde_json::from_slice(&output.stdout).unwrap_or_else(|err| panic!("{err}: {error}"))
+}
+
+#[test]
+fn predictions_are_kept_found_again_and_cleared() {
+    let dir = tempfile::tempdir().unwrap();
+    let (home, set, out) = (dir.path().join("home"), dir.path().join("set"), dir.path().join("out"));
+    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator");
+    let [set, out, bundle] = [&set, &out, &bundle].map(|p| p.to_str().unwrap());
+    let made = run(&["simulate", "--out", set, "--tools", "pattern_36", "--grasps", "1", "--seed", "3"], &home);
+    assert!(made.status.success());
+    let generate = |more: &[&str]| {
+        let fixed = ["generate", "--input", set, "--out", out, "--finger", "both", "--bundle", bundle];
+        run(&[&fixed[..], &["--runtime", "rten", "--json"], more].concat(), &home)
+    };
+    let kept = |report: &Value| -> Vec<bool> {
+        report["pairs"].as_array().unwrap().iter().map(|p| p["kept"].as_bool().unwrap()).collect()
+    };
+    let cache = |args: &[&str]| json(&run(&[&["cache", "--json"][..], args].concat(), &home));
+    assert_eq!(cache(&[])["predictions"], 0);
+    let first = json(&generate(&[]));
+    assert_eq!(kept(&first), [false, false]);
+    let usage = cache(&[]);
+    assert_eq!(usage["predictions"], 2);
+    assert!(usage["bytes"].as_u64().unwrap() > 2000 && usage["folder"].as_str().unwrap().contains("home"));
+    let again = json(&generate(&[]));
+    assert_eq!(kept(&again), [true, true]);
+    assert_eq!(again["pairs"][0]["psnr_db"], first["pairs"][0]["psnr_db"], "the same to the last bit");
+    assert_eq!(kept(&json(&generate(&["--no-cache"]))), [false, false]);
+    // Another recipe is another prediction.
+    let fast = json(&generate(&["--preset", "fast"]));
+    assert_eq!((kept(&fast), &fast["steps"]), (vec![false, false], &Value::from(2)));
+    let steps = json(&generate(&["--preset", "fast", "--steps", "3", "--sampler", "ddpm"]));
+    assert_eq!((&steps["steps"], &steps["sampler"]), (&Value::from(3), &Value::from("ddpm")));
+    assert_eq!(cache(&["--clear"])["removed"], 6);
+    assert_eq!(cache(&[])["predictions"], 0);
+    // Guidance is refused once, before anything is made.
+    let refused = generate(&["--guidance", "2"]);
+    let text = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(2), "{text}");
+    assert_eq!(text.matches("was not trained for guidance").count(), 1, "{text}");
+    assert_eq!(generate(&["--guidance", "-1"]).status.code(), Some(2));
+}
