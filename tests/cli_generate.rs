@@ -1,6 +1,6 @@
 //! `generate` and `cache` as a user runs them, with the tiny bundle of the tests.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use serde_json::Value;
@@ -23,11 +23,26 @@ fn json(output: &Output) -> Value {
     serde_json::from_slice(&output.stdout).unwrap_or_else(|err| panic!("{err}: {error}"))
 }
 
+/// The tiny bundle, with imprints as large as the simulated ones: they are compared.
+fn full_size_bundle(dir: &Path) -> PathBuf {
+    let (from, to) = (Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator"), dir.join("bundle"));
+    std::fs::create_dir(&to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, to.join(path.file_name().unwrap())).unwrap();
+    }
+    let manifest = to.join("manifest.json");
+    let mut value: Value = serde_json::from_slice(&std::fs::read(&manifest).unwrap()).unwrap();
+    value["output"]["imprint_size"] = serde_json::json!([175, 140]);
+    std::fs::write(manifest, value.to_string()).unwrap();
+    to
+}
+
 #[test]
 fn predictions_are_kept_found_again_and_cleared() {
     let dir = tempfile::tempdir().unwrap();
     let (home, set, out) = (dir.path().join("home"), dir.path().join("set"), dir.path().join("out"));
-    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator");
+    let bundle = full_size_bundle(dir.path());
     let [set, out, bundle] = [&set, &out, &bundle].map(|p| p.to_str().unwrap());
     let made = run(&["simulate", "--out", set, "--tools", "pattern_36", "--grasps", "1", "--seed", "3"], &home);
     assert!(made.status.success());

@@ -201,11 +201,11 @@ impl Rig {
         Some((rig, gate))
     }
 
-    /// Frames until something is so; a failure after a minute.
+    /// Frames until something is so; a failure after five minutes.
     pub(super) fn until(&mut self, what: &str, so: impl Fn(&State) -> bool) {
         let begin = std::time::Instant::now();
         while !so(self.harness.state().state()) {
-            assert!(begin.elapsed().as_secs() < 60, "waited for {what}: {:?}", self.harness.state().state().tasks);
+            assert!(begin.elapsed().as_secs() < 300, "waited for {what}: {:?}", self.harness.state().state().tasks);
             self.harness.step();
             std::thread::sleep(std::time::Duration::from_millis(5));
         }
