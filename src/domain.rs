@@ -4,6 +4,7 @@
 //! a thread or a clock. Values come in as arguments and go out as results, in metres and radians.
 
 pub mod align;
+pub mod ambiguity;
 pub mod cloud;
 pub mod colormap;
 pub mod contact;
@@ -17,6 +18,7 @@ pub mod inspect;
 pub mod label;
 pub mod mesh;
 pub mod metrics;
+pub mod moments;
 pub mod pose;
 pub mod postprocess;
 pub mod resample;

@@ -67,6 +67,7 @@ pub fn shift_tooltip(mode: ShiftMode) -> &'static str {
         ShiftMode::Raw => "As the lab's generator stores it: the range is mapped twice, so depths are too large",
         ShiftMode::PaperShift => "Mean and spread matched to the training statistics, as the paper's pixel shift does",
         ShiftMode::ExactInverse => "The doubled range mapping undone exactly: metres",
+        ShiftMode::Refit(_) => "Mean and spread matched to statistics of this data set's own predictions",
     }
 }
 

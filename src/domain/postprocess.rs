@@ -8,8 +8,19 @@
 
 use serde::{Deserialize, Serialize};
 
+mod flags;
+mod ledger;
+mod refit;
+
+pub use flags::{Flag, FlagKind, Severity};
+pub use ledger::{
+    Against, ChainReading, Histogram, Ledger, Orientation, Stage, StageRecord, Stats, correlation, ledger, readings,
+};
+pub use refit::{BundleTag, RefitShift, ShiftFit};
+
 use super::grid::{DepthMap, Grid};
 use super::resample::Resampling;
+use super::units::{fixed, mm};
 
 /// Weights of red, green and blue in the lab's grey value (torchvision's `rgb_to_grayscale`; their sum is 0.9999).
 const LUMA: [f64; 3] = [0.2989, 0.587, 0.114];
@@ -76,10 +87,15 @@ pub enum ShiftMode {
     /// [`ShiftMode::Raw`] with its mapping undone: the depth itself.
     #[default]
     ExactInverse,
+    /// [`ShiftMode::Raw`] with the paper's shift by statistics of a data set's own predictions. The statistics are part
+    /// of the choice, so that results made with different ones never stand for each other. Not among the modes that
+    /// can be listed without a data set.
+    #[strum(disabled)]
+    Refit(RefitShift),
 }
 
 impl ShiftMode {
-    /// All modes, in the order shown.
+    /// All modes that need no data set, in the order shown.
     pub const ALL: [ShiftMode; 3] = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse];
 
     /// What the user reads.
@@ -88,6 +104,7 @@ impl ShiftMode {
             ShiftMode::Raw => "Raw (released script)",
             ShiftMode::PaperShift => "Paper shift",
             ShiftMode::ExactInverse => "Exact inverse",
+            ShiftMode::Refit(_) => "Refit on this dataset",
         }
     }
 }
@@ -174,56 +191,8 @@ pub struct DepthChain {
     pub rotation_deg: u32,
 }
 
-/// Numbers about the finite pixels of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Stats {
-    /// Smallest value; NaN if there is no finite pixel (so for the next three).
-    pub min: f64,
-    /// Largest value.
-    pub max: f64,
-    /// Mean.
-    pub mean: f64,
-    /// Population deviation.
-    pub std: f64,
-    /// Finite pixels.
-    pub count: usize,
-}
-
-impl Stats {
-    /// Two passes in f64, so that a large mean does not swallow a small spread.
-    pub fn of(image: &Grid<f32>) -> Self {
-        let values = || image.as_slice().iter().filter(|v| v.is_finite()).map(|&v| f64::from(v));
-        let count = values().count();
-        if count == 0 {
-            return Self { min: f64::NAN, max: f64::NAN, mean: f64::NAN, std: f64::NAN, count };
-        }
-        let mean = values().sum::<f64>() / count as f64;
-        let variance = values().map(|v| (v - mean).powi(2)).sum::<f64>() / count as f64;
-        Self {
-            min: values().fold(f64::INFINITY, f64::min),
-            max: values().fold(f64::NEG_INFINITY, f64::max),
-            mean,
-            std: variance.sqrt(),
-            count,
-        }
-    }
-}
-
-/// What one step of the chain left behind.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StageRecord {
-    /// The step, for people.
-    pub name: &'static str,
-    /// The image after it. In metres from the mapping on.
-    pub image: Grid<f32>,
-    /// Its numbers.
-    pub stats: Stats,
-    /// Something the user should know, e.g. that a spread of zero was not divided by.
-    pub note: Option<String>,
-}
-
-/// Is told of each stage: its name, the image after it, and a note.
-type Recorder<'a> = dyn FnMut(&'static str, &Grid<f32>, Option<String>) + 'a;
+/// Is told of each stage: which, what it does, the image after it, and a note.
+type Recorder<'a> = dyn FnMut(Stage, &dyn Fn() -> String, &Grid<f32>, Option<String>) + 'a;
 
 impl DepthChain {
     /// The chain with the shift of `mode`.
@@ -236,6 +205,7 @@ impl DepthChain {
             ShiftMode::Raw => Shift::None,
             ShiftMode::PaperShift => Shift::PaperMeanStd(stats.ok_or(PostprocessError::NoStatistics)?),
             ShiftMode::ExactInverse => Shift::ExactInverse,
+            ShiftMode::Refit(refit) => Shift::PaperMeanStd(refit.stats()),
         };
         Ok(self)
     }
@@ -245,22 +215,31 @@ impl DepthChain {
     /// # Errors
     /// See [`PostprocessError`].
     pub fn run(&self, raw: &RawPrediction) -> Result<DepthMap, PostprocessError> {
-        self.walk(raw, &mut |_, _, _| {})
+        self.walk(raw, &mut |_, _, _, _| {})
     }
 
-    /// Runs the chain and keeps the image and its numbers after every step.
+    /// Runs the chain and keeps the image and its figures after every step.
     ///
     /// # Errors
     /// See [`PostprocessError`].
     pub fn run_with_ledger(&self, raw: &RawPrediction) -> Result<(DepthMap, Vec<StageRecord>), PostprocessError> {
         let mut ledger = Vec::new();
-        let depth = self.walk(raw, &mut |name, image, note| {
-            ledger.push(StageRecord { name, image: image.clone(), stats: Stats::of(image), note });
+        let depth = self.walk(raw, &mut |stage, how, image, note| {
+            ledger.push(StageRecord::new(stage, how(), image.clone(), note));
         })?;
         Ok((depth, ledger))
     }
 
-    fn walk(&self, raw: &RawPrediction, record: &mut Recorder<'_>) -> Result<DepthMap, PostprocessError> {
+    /// The picture in metres before any shift, at the decoder's size: what statistics for a shift are taken of.
+    ///
+    /// # Errors
+    /// See [`PostprocessError`].
+    pub fn metres(&self, raw: &RawPrediction) -> Result<DepthMap, PostprocessError> {
+        self.check()?;
+        Ok(self.denormalised(raw, &self.weights(raw)?))
+    }
+
+    fn check(&self) -> Result<(), PostprocessError> {
         let DepthRange { min_m, max_m } = self.range;
         if !self.range.is_valid() {
             return Err(PostprocessError::Range { min_m, max_m });
@@ -268,27 +247,68 @@ impl DepthChain {
         if !matches!(self.rotation_deg, 0 | 180) {
             return Err(PostprocessError::Rotation(self.rotation_deg));
         }
-        let weights = self.weights(raw)?;
-        record("Decoder", &combine(&raw.channels, &weights, f64::from), None);
+        Ok(())
+    }
 
-        // The lab clamps and maps each channel before it makes them one.
-        let metres = combine(&raw.channels, &weights, |v| {
+    /// The lab clamps and maps each channel before it makes them one.
+    fn denormalised(&self, raw: &RawPrediction, weights: &[f64]) -> Grid<f32> {
+        let DepthRange { min_m, max_m } = self.range;
+        combine(&raw.channels, weights, |v| {
             let unit = (f64::from(v).clamp(-1.0, 1.0) + 1.0) / 2.0;
             let unit = if self.mapping == Mapping::Doubled { (unit + 1.0) / 2.0 } else { unit };
             unit * (max_m - min_m) + min_m
-        });
+        })
+    }
+
+    fn walk(&self, raw: &RawPrediction, record: &mut Recorder<'_>) -> Result<DepthMap, PostprocessError> {
+        self.check()?;
+        let weights = self.weights(raw)?;
+        let DepthRange { min_m, max_m } = self.range;
+        for (i, channel) in raw.channels.iter().enumerate() {
+            record(Stage::Channel(i as u8 + 1), &|| "as the decoder gives it".into(), channel, None);
+        }
+        let how = || match (weights.len(), self.reduction) {
+            (1, _) => "one channel: nothing to do".into(),
+            (n, Reduction::Mean) => format!("mean of {n} channels"),
+            (_, Reduction::Luma) => "luma: 0.2989 R + 0.587 G + 0.114 B".into(),
+        };
+        record(Stage::Reduced, &how, &combine(&raw.channels, &weights, f64::from), None);
+
+        let metres = self.denormalised(raw, &weights);
         let clamped = raw.channels.iter().flat_map(|c| c.as_slice()).filter(|v| v.abs() > 1.0).count();
         let note = (clamped > 0).then(|| format!("{clamped} values outside -1 to 1 were clamped"));
-        record("Metres", &metres, note);
+        let how = || {
+            let range = format!("-1 to 1 is {} to {} mm", fixed(mm(min_m), 2), fixed(mm(max_m), 2));
+            match self.mapping {
+                Mapping::Correct => range,
+                Mapping::Doubled => format!("{range}, mapped twice: (depth + max) / 2"),
+            }
+        };
+        record(Stage::Metres, &how, &metres, note);
 
         let (shifted, note) = self.shift.apply(metres, max_m);
-        record("Shift", &shifted, note);
+        record(Stage::Shifted, &|| self.shift_text(), &shifted, note);
 
         let [width, height] = self.size;
+        let [from_width, from_height] = shifted.size();
         let resized = self.resampling.resize(&shifted, width, height);
+        let how = || format!("{from_width} x {from_height} to {width} x {height}, {}", self.resampling);
+        record(Stage::Resized, &how, &resized, None);
+
         let turned = if self.rotation_deg == 180 { resized.rotated_180() } else { resized };
-        record("Raw orientation", &turned, None);
+        record(Stage::Turned, &|| format!("by {}°, to the raw orientation", self.rotation_deg), &turned, None);
         Ok(turned)
+    }
+
+    fn shift_text(&self) -> String {
+        match self.shift {
+            Shift::None => "none".into(),
+            Shift::ExactInverse => format!("exact inverse: 2 · d - {} mm", fixed(mm(self.range.max_m), 2)),
+            Shift::PaperMeanStd(stats) => {
+                let [gain, offset_m] = stats.affine(self.range.max_m);
+                format!("mean and deviation: {gain:.3} · d {} mm", signed(mm(offset_m)))
+            }
+        }
     }
 
     fn weights(&self, raw: &RawPrediction) -> Result<Vec<f64>, PostprocessError> {
@@ -311,6 +331,25 @@ fn combine(channels: &[Grid<f32>], weights: &[f64], map: impl Fn(f32) -> f64) ->
     })
 }
 
+/// A number with two decimals after its sign, for a sum.
+fn signed(value: f64) -> String {
+    if value < 0.0 { format!("- {:.2}", -value) } else { format!("+ {value:.2}") }
+}
+
+impl ShiftStats {
+    /// Whether the predictions' deviation is as good as zero beside their mean and the range that ends at `max_m`.
+    pub fn has_no_spread(&self, max_m: f64) -> bool {
+        let size = self.pred_mean.abs().max(max_m.abs());
+        self.pred_std.is_nan() || self.pred_std <= RELATIVE_NO_SPREAD * size
+    }
+
+    /// Gain and offset (metres) of the shift: `gain · d + offset`.
+    pub fn affine(&self, max_m: f64) -> [f64; 2] {
+        let gain = if self.has_no_spread(max_m) { 1.0 } else { self.gt_std / self.pred_std };
+        [gain, self.gt_mean - gain * self.pred_mean]
+    }
+}
+
 impl Shift {
     /// The shifted image and a note if the shift could not be applied as asked.
     fn apply(self, metres: Grid<f32>, max_m: f64) -> (Grid<f32>, Option<String>) {
@@ -318,15 +357,13 @@ impl Shift {
             Shift::None => (metres, None),
             Shift::ExactInverse => (metres.map(|&d| (2.0 * f64::from(d) - max_m) as f32), None),
             Shift::PaperMeanStd(s) => {
-                let size = s.pred_mean.abs().max(max_m.abs());
-                let no_spread = s.pred_std.is_nan() || s.pred_std <= RELATIVE_NO_SPREAD * size;
-                let gain = if no_spread { 1.0 } else { s.gt_std / s.pred_std };
-                let note = no_spread.then(|| {
+                let note = s.has_no_spread(max_m).then(|| {
                     format!(
                         "the predictions' deviation ({:e} m) is as good as zero: only the mean was shifted",
                         s.pred_std
                     )
                 });
+                let [gain, _] = s.affine(max_m);
                 (metres.map(|&d| ((f64::from(d) - s.pred_mean) * gain + s.gt_mean) as f32), note)
             }
         }

@@ -14,8 +14,9 @@ use super::grid::{Grid, RgbGrid};
 const BICUBIC_A: f64 = -0.75;
 
 /// How an image is resized.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Resampling {
     /// Two taps per axis, see [`bilinear`].
     Bilinear,

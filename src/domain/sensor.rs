@@ -71,6 +71,15 @@ pub fn gelslim_footprint_in_bubble(finger: Finger) -> [f64; 4] {
     }
 }
 
+/// Whether the GelSlim of a finger sees a pixel of a bubble image of `size` (`[width, height]`, raw orientation; other
+/// sizes than the bubble's stand for the same area). `at_px` counts from the centre of the first pixel.
+pub fn seen_by_gelslim(finger: Finger, at_px: [f64; 2], size: [usize; 2]) -> bool {
+    let [cx, cy, width, height] = gelslim_footprint_in_bubble(finger);
+    let full = |at: f64, from: usize, to: usize| (at + 0.5) * to as f64 / from.max(1) as f64 - 0.5;
+    let (x, y) = (full(at_px[0], size[0], bubble::WIDTH), full(at_px[1], size[1], bubble::HEIGHT));
+    (x - cx).abs() <= width / 2.0 && (y - cy).abs() <= height / 2.0
+}
+
 /// Pinhole intrinsics of the *full* 224 x 171 depth image, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Intrinsics {

@@ -24,6 +24,11 @@ pub fn text_deg(radians: f64) -> String {
     format!("{}°", fixed(radians.to_degrees(), 1))
 }
 
+/// `1.3 %`: shares are shown with one decimal; one that is not zero never reads `0.0 %`.
+pub fn text_percent(share: f64) -> String {
+    if share > 0.0 && share < 0.0005 { "< 0.1 %".into() } else { format!("{} %", fixed(100.0 * share, 1)) }
+}
+
 /// The factor to metres for a tool whose longest side is `size` in an unknown unit: 1 if it may be metres, else that
 /// of mm, cm, inch, µm or of a mesh scaled twice, whichever makes it as large as a hand-held tool first.
 /// `None` if none does.

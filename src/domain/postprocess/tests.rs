@@ -83,12 +83,16 @@ fn the_ledger_tells_every_step_and_its_numbers() {
     let raw = RawPrediction { channels: vec![Grid::from_vec(2, 1, vec![-2.0, 1.0]).unwrap()] };
     let chain = DepthChain { size: [2, 1], ..chain() }.with_mode(ShiftMode::ExactInverse, None).unwrap();
     let (depth, ledger) = chain.run_with_ledger(&raw).unwrap();
-    assert_eq!(ledger.iter().map(|s| s.name).collect::<Vec<_>>(), ["Decoder", "Metres", "Shift", "Raw orientation"]);
+    use Stage::*;
+    let stages = ledger.iter().map(|s| s.stage).collect::<Vec<_>>();
+    assert_eq!(stages, [Channel(1), Reduced, Metres, Shifted, Resized, Turned]);
     assert_eq!((ledger[0].stats.min, ledger[0].stats.max, ledger[0].stats.count), (-2.0, 1.0, 2));
-    assert!(ledger[1].note.as_deref().unwrap().starts_with("1 values outside"));
-    assert!((ledger[3].stats.mean - (MIN + MAX) / 2.0).abs() < 1e-8);
-    assert!((ledger[3].stats.std - (MAX - MIN) / 2.0).abs() < 1e-8);
-    assert_eq!(ledger[3].image, depth);
+    assert!(ledger[2].note.as_deref().unwrap().starts_with("1 values outside"));
+    assert!((ledger[5].stats.mean - (MIN + MAX) / 2.0).abs() < 1e-8);
+    assert!((ledger[5].stats.std - (MAX - MIN) / 2.0).abs() < 1e-8);
+    assert_eq!(ledger[5].image, depth);
+    assert!(ledger.iter().all(|s| s.histogram.counts.iter().sum::<u32>() == 2 && s.invalid == 0));
+    assert_eq!(chain.metres(&raw).unwrap(), ledger[2].image);
 }
 
 #[test]
@@ -112,4 +116,162 @@ fn statistics_survive_a_large_mean() {
         let stats = Stats::of(&image);
         assert!((stats.std - 0.5).abs() < 1e-9 * 0.5, "{mean}: {}", stats.std);
     }
+}
+
+/// A bar on a background, as a decoder means it.
+fn imprint() -> Grid<f32> {
+    Grid::from_fn(60, 48, |x, y| {
+        let bar = (10..30).contains(&x) && y < 40;
+        1e-5 * ((x * 7 + y * 3) % 11) as f32 + if bar { 0.008 + 1e-4 * x as f32 } else { 0.0 }
+    })
+}
+
+/// The decoder's picture of a depth, `n` channels.
+fn decoded(depth: &Grid<f32>, n: usize) -> RawPrediction {
+    let unit = depth.map(|&d| (2.0 * (f64::from(d) - MIN) / (MAX - MIN) - 1.0) as f32);
+    RawPrediction { channels: vec![unit; n] }
+}
+
+fn whole(mode: ShiftMode) -> DepthChain {
+    DepthChain { size: [60, 48], ..chain() }.with_mode(mode, Some(stats())).unwrap()
+}
+
+fn kinds(ledger: &Ledger) -> Vec<FlagKind> {
+    ledger.flags.iter().map(|f| f.kind).collect()
+}
+
+#[test]
+fn a_sound_chain_has_no_flag_and_lies_on_the_diagonal() {
+    let ledger = ledger(&whole(ShiftMode::ExactInverse), &decoded(&imprint(), 3), Some(&imprint())).unwrap();
+    assert_eq!(ledger.flags, [], "{:?}", ledger.flags);
+    assert_eq!(ledger.stages.len(), 8);
+    let against = ledger.against.unwrap();
+    let line = against.joint.line.unwrap();
+    assert!((line.slope - 1.0).abs() < 1e-4 && line.offset.abs() < 1e-6, "{line:?}");
+    assert!(against.orientation.as_is.unwrap() > 0.999);
+}
+
+#[test]
+fn the_doubled_mapping_is_flagged_with_and_without_a_truth() {
+    let raw = decoded(&imprint(), 3);
+    let alone = ledger(&whole(ShiftMode::Raw), &raw, None).unwrap();
+    assert_eq!(kinds(&alone), [FlagKind::DoubledMapping]);
+    assert!(alone.flags[0].action.contains("exact inverse"), "{:?}", alone.flags);
+    let truth = ledger(&whole(ShiftMode::Raw), &raw, Some(&imprint())).unwrap();
+    assert_eq!(kinds(&truth), [FlagKind::DoubledMapping, FlagKind::Calibration]);
+    let line = truth.against.unwrap().joint.line.unwrap();
+    assert!((line.slope - 0.5).abs() < 1e-3 && (line.offset - MAX / 2.0).abs() < 1e-5, "{line:?}");
+    // A decoder that ends in 0 to 1 looks the same, but its cure is another.
+    let unit = RawPrediction { channels: vec![raw.channels[0].map(|v| (v + 1.0) / 2.0)] };
+    let mapped = ledger(&DepthChain { size: [60, 48], ..chain() }, &unit, None).unwrap();
+    assert_eq!(kinds(&mapped), [FlagKind::DoubledMapping]);
+    assert!(mapped.flags[0].action.contains("output range"));
+}
+
+#[test]
+fn a_turn_too_many_and_a_mirror_image_are_told_apart() {
+    let truth = imprint();
+    for (raw, expected) in [
+        (decoded(&truth.rotated_180(), 1), FlagKind::TurnedBy180),
+        (decoded(&truth.rows_reversed(), 1), FlagKind::Mirrored),
+    ] {
+        let found = ledger(&whole(ShiftMode::ExactInverse), &raw, Some(&truth)).unwrap();
+        assert_eq!(found.flags[0].kind, expected, "{:?}", found.flags);
+        assert_eq!(found.flags[0].severity, Severity::Wrong);
+        assert!(found.flags[0].text().contains("with the truth"));
+    }
+    let other = Grid::from_fn(60, 48, |x, y| if (x / 3 + y / 3) % 2 == 0 { 0.004f32 } else { 0.0 });
+    let found = ledger(&whole(ShiftMode::ExactInverse), &decoded(&other, 1), Some(&truth)).unwrap();
+    assert_eq!(kinds(&found), [FlagKind::Unlike]);
+}
+
+#[test]
+fn holes_constants_clamps_and_disagreeing_channels_are_flagged() {
+    let exact = whole(ShiftMode::ExactInverse);
+    let of = |raw: &RawPrediction| kinds(&ledger(&exact, raw, Some(&imprint())).unwrap());
+    let mut raw = decoded(&imprint(), 3);
+    raw.channels[1].as_mut_slice()[7] = f32::NAN;
+    raw.channels[2].as_mut_slice()[9] = f32::INFINITY;
+    assert!(of(&raw).starts_with(&[FlagKind::NotFinite]));
+    let nothing = RawPrediction { channels: vec![Grid::filled(60, 48, f32::NAN); 3] };
+    let all = ledger(&exact, &nothing, Some(&imprint())).unwrap();
+    assert!(all.against.is_none() && kinds(&all) == [FlagKind::NotFinite]);
+    let flat = RawPrediction { channels: vec![Grid::filled(60, 48, -0.3); 3] };
+    assert!(of(&flat).contains(&FlagKind::Constant));
+    let mut raw = decoded(&imprint(), 1);
+    raw.channels[0].as_mut_slice()[..600].fill(1.5);
+    let found = ledger(&exact, &raw, None).unwrap();
+    assert_eq!((found.flags[0].kind, found.flags[0].severity), (FlagKind::Clamped, Severity::Caution));
+    assert!(found.flags[0].what.starts_with("600 of 2880"), "{}", found.flags[0].what);
+    let mut raw = decoded(&imprint(), 3);
+    raw.channels[1] = raw.channels[1].map(|v| v + 0.2);
+    assert!(of(&raw).contains(&FlagKind::ChannelsApart));
+}
+
+#[test]
+fn the_published_shift_is_said_to_be_too_steep() {
+    let found = ledger(&whole(ShiftMode::PaperShift), &decoded(&imprint(), 1), None).unwrap();
+    let flag = found.flags.iter().find(|f| f.kind == FlagKind::ShiftGain).unwrap();
+    // 2.2 against 2; 10 mm become 10.73 mm.
+    assert!(flag.what.contains("10.0 % too steep") && flag.why.contains("10.73 mm"), "{}", flag.text());
+}
+
+#[test]
+fn every_reading_of_a_picture_is_there_to_be_compared() {
+    let modes = ShiftMode::ALL.map(|mode| (mode, whole(mode)));
+    let found = readings(&whole(ShiftMode::Raw), &modes, &decoded(&imprint(), 3), Some(&imprint()), 0.0225);
+    let of = |name: &str| found.iter().find(|r| r.name == name).unwrap();
+    assert_eq!(found.len(), 4);
+    assert!(of("Correct mapping").psnr_db.unwrap() > 100.0 && of("Exact inverse").psnr_db.unwrap() > 100.0);
+    assert!(of("Raw (released script)").psnr_db.unwrap() < 10.0);
+    assert!((of("Paper shift").line.unwrap().slope - 1.1).abs() < 1e-3);
+    assert_eq!(of("Exact inverse").shift, [2.0, -MAX]);
+}
+
+#[test]
+fn a_refit_brings_mean_and_deviation_of_its_dataset() {
+    let raw_chain = whole(ShiftMode::Raw);
+    let pairs: Vec<(RawPrediction, Grid<f32>)> = (0..6)
+        .map(|k| {
+            let depth = imprint().map(|d| d * (1.0 + 0.1 * k as f32));
+            (decoded(&depth.map(|d| 0.7 * d - 0.001), 3), depth)
+        })
+        .collect();
+    let mut fit = ShiftFit::default();
+    for (raw, truth) in &pairs {
+        fit.add(&raw_chain, raw, truth).unwrap();
+    }
+    // In parts and backwards: the same to the last bit.
+    let mut parts = ShiftFit::default();
+    for (raw, truth) in pairs.iter().rev() {
+        let mut part = ShiftFit::default();
+        part.add(&raw_chain, raw, truth).unwrap();
+        parts.merge(&part);
+    }
+    let stats = fit.stats().unwrap();
+    assert_eq!(parts.stats(), Some(stats));
+    assert_eq!((fit.touches, fit.measured.count()), (6, 6 * 60 * 48));
+    let refit = ShiftMode::Refit(RefitShift::new(stats, "0123456789abcdef0123"));
+    let mut after = ShiftFit::default();
+    for (raw, truth) in &pairs {
+        let depth = whole(refit).run(raw).unwrap();
+        after.predicted.extend(depth.as_slice().iter().map(|&v| f64::from(v)));
+        after.measured.extend(truth.as_slice().iter().map(|&v| f64::from(v)));
+    }
+    let after = after.stats().unwrap();
+    assert!((after.pred_mean - after.gt_mean).abs() < 1e-8 && (after.pred_std - after.gt_std).abs() < 1e-8);
+    assert_eq!(ShiftFit::default().stats(), None);
+}
+
+#[test]
+fn statistics_serve_only_the_bundle_they_are_of() {
+    let refit = RefitShift::new(stats(), "0123456789abcdef0123456789abcdef");
+    assert_eq!(refit.check("0123456789abcdef0123456789abcdef"), Ok(()));
+    let err = refit.check("fedcba9876543210").unwrap_err();
+    assert!(err.contains("0123456789abcdef") && err.contains("fedcba9876543210"), "{err}");
+    let text = serde_json::to_string(&ShiftMode::Refit(refit)).unwrap();
+    assert_eq!(serde_json::from_str::<ShiftMode>(&text).unwrap(), ShiftMode::Refit(refit));
+    assert_eq!(refit.stats(), stats());
+    use strum::IntoEnumIterator as _;
+    assert_eq!(ShiftMode::iter().collect::<Vec<_>>(), ShiftMode::ALL, "a refit needs a dataset");
 }
