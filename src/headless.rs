@@ -10,12 +10,14 @@ mod contact_mask;
 mod doctor;
 mod evaluate;
 mod generate;
+mod ledger;
 mod masks;
 mod models;
 mod output;
 mod pose;
 mod predict;
 mod simulate;
+mod stats;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -47,6 +49,10 @@ enum Verb {
     Simulate(simulate::SimulateArgs),
     /// Predict Soft Bubble imprints from GelSlim images and compare them with the measured ones.
     Generate(generate::GenerateArgs),
+    /// Everything between the decoder and the metres, for one pair: stages, histograms, line against truth, what is odd.
+    Ledger(Box<ledger::LedgerArgs>),
+    /// Statistics of a dataset's predictions and measurements, for the shift `--shift refit`.
+    Stats(stats::StatsArgs),
     /// Estimate in-hand poses from measured or predicted imprints.
     Pose(pose::PoseArgs),
     /// The paper's results table of a dataset: generators side by side, with the measured imprints as the upper bound.
@@ -98,6 +104,8 @@ pub fn main() -> ExitCode {
         None => studio(cli.path, cli.reset_ui),
         Some(Verb::Simulate(args)) => simulate::run(&args),
         Some(Verb::Generate(args)) => generate::run(&args),
+        Some(Verb::Ledger(args)) => ledger::run(&args),
+        Some(Verb::Stats(args)) => stats::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
         Some(Verb::Basin(args)) => basin::run(&args),
@@ -132,6 +140,31 @@ fn studio(_path: Option<PathBuf>, _reset_ui: bool) -> VerbResult {
 /// The dataset named on the command line: a folder, or the name of one that is built in (`demo`, `test-set`).
 fn open(path: &std::path::Path) -> anyhow::Result<crate::io::dataset::Dataset> {
     Ok(crate::io::dataset::Dataset::open(path)?)
+}
+
+/// The pair called `name`, or the only one whose name has that in it.
+fn find_pair(dataset: &crate::io::dataset::Dataset, name: &str) -> anyhow::Result<crate::domain::dataset::PairId> {
+    let pairs = &dataset.index.pairs;
+    let exact = pairs.iter().position(|p| p.name == name);
+    let similar: Vec<usize> = (0..pairs.len()).filter(|&i| pairs[i].name.contains(name)).collect();
+    let at = match (exact, similar.as_slice()) {
+        (Some(id), _) => id,
+        (None, [id]) => *id,
+        (None, []) => anyhow::bail!("no pair is called {name:?}; `doctor` lists what is there"),
+        (None, [first, second, ..]) => {
+            let (a, b) = (&pairs[*first].name, &pairs[*second].name);
+            anyhow::bail!("{} pairs are called like {name:?}, such as {a} and {b}: say more of the name", similar.len())
+        }
+    };
+    Ok(crate::domain::dataset::PairId(at as u32))
+}
+
+/// Where lengths come from, in JSON.
+fn scale_name(scale: crate::domain::sample::Scale) -> &'static str {
+    match scale {
+        crate::domain::sample::Scale::Measured => "measured",
+        crate::domain::sample::Scale::Assumed => "assumed",
+    }
 }
 
 /// At most `limit` of `len` positions, spread evenly.

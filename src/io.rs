@@ -12,4 +12,5 @@ pub mod masks;
 pub mod npz;
 pub mod pt;
 pub mod simulated;
+pub mod statistics;
 pub mod stl;

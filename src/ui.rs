@@ -18,6 +18,7 @@ mod generate;
 mod images;
 mod layers;
 mod layout;
+mod ledger;
 mod log;
 mod masks;
 mod metrics;

@@ -249,7 +249,8 @@ actions! {
     EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [];
     ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
-    NextShift, Generate, "Next range mapping", "Goes through raw, paper shift and exact inverse", [shift(K::P)];
+    NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)];
+    Refit, Generate, "Refit on this dataset", "Computes shift statistics of this data set's predictions and measurements, and uses them", [];
 
     Brush, Mask, "Brush", "Adds to the mask while the button is down", [plain(K::Num1), plain(K::B)];
     Eraser, Mask, "Eraser", "Removes from the mask while the button is down", [plain(K::Num2), plain(K::E)];
@@ -312,6 +313,7 @@ actions! {
     LinkCameras, View, "Link cameras", "Moves both 3D views together", [];
     Footprint, View, "GelSlim window", "Draws the GelSlim's window on bubble images", [];
     SwitchTheme, View, "Dark or light", "Switches between the dark and the light theme", [];
+    DepthChain, View, "Depth chain", "Shows everything between the decoder and the metres, stage by stage", [];
     InspectWorkspace, View, "Inspect", "Truth and prediction side by side", [];
     AlignWorkspace, View, "Align", "The cloud on the CAD model", [];
     LabelWorkspace, View, "Label", "Correcting masks", [];
@@ -421,7 +423,16 @@ impl Action {
                     when(!state.tasks.running.is_empty(), Command::CancelAll)
                 }
             }
-            Self::NextShift => next_of::<ShiftMode>(&settings.shift).map(Command::SetShift),
+            Self::NextShift => {
+                // The refit, where there is one, comes after the last of the others.
+                let next = match (settings.shift, settings.refit) {
+                    (ShiftMode::Refit(_), _) => Some(ShiftMode::Raw),
+                    (ShiftMode::ExactInverse, Some(refit)) => Some(ShiftMode::Refit(refit)),
+                    (shift, _) => next_of::<ShiftMode>(&shift),
+                };
+                next.map(Command::SetShift)
+            }
+            Self::Refit => when(state.can_generate().is_ok(), Command::Refit),
 
             Self::Brush => Some(Command::SetMaskTool(MaskTool::Brush)),
             Self::Eraser => Some(Command::SetMaskTool(MaskTool::Eraser)),
@@ -493,6 +504,7 @@ impl Action {
             Self::LinkCameras => Some(Command::SetCamerasLinked(!settings.cameras_linked)),
             Self::Footprint => Some(Command::SetFootprintVisible(!settings.footprint_visible)),
             Self::SwitchTheme => next_of::<Theme>(&settings.theme).map(Command::SetTheme),
+            Self::DepthChain => ui(UiRequest::ShowPane(Pane::Ledger)),
             Self::InspectWorkspace => Some(Command::SetWorkspace(Workspace::Inspect)),
             Self::AlignWorkspace => Some(Command::SetWorkspace(Workspace::Align)),
             Self::LabelWorkspace => Some(Command::SetWorkspace(Workspace::Label)),

@@ -6,6 +6,7 @@ mod generate;
 mod inspect;
 mod masks;
 mod preferences;
+mod refit;
 mod workbench;
 
 use super::command::{Command, Hover};
@@ -78,6 +79,7 @@ fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
 
         Command::Generate => generate::generate(state, false, effects),
         Command::GenerateNewSeed => generate::generate(state, true, effects),
+        Command::Refit => refit::start(state, effects),
         Command::Choose(recipe) => {
             if state.results.predictions.contains(&recipe) {
                 state.results.chosen.insert(recipe.touch, recipe);

@@ -13,7 +13,7 @@ use super::evaluation::EvaluateCommand;
 use super::inspect::{InspectCommand, Inspection};
 use super::keys::{DatasetSeq, ImprintSource, PoseEngine, Recipe, Request, ShiftMode};
 use super::library::{BundleInfo, Place, Sort};
-use super::results::{Clouds, Comparison, LayerResult, PoseResult, Prediction, Preview};
+use super::results::{Clouds, Comparison, LayerResult, LedgerResult, PoseResult, Prediction, Preview};
 use super::services::{DataSource, NamedTool};
 use super::settings::{
     ColourMap, ColourRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, RuntimeChoice, Settings, Theme,
@@ -22,10 +22,12 @@ use super::settings::{
 use super::tasks::{Progress, Ticket};
 use super::workbench::WorkbenchCommand;
 use crate::domain::align::basin::Basin;
+use crate::domain::ambiguity::Ambiguity;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
+use crate::io::statistics::ShiftStatistics;
 
 /// A pane of the window. What is visible decides what is computed.
 #[derive(
@@ -63,6 +65,8 @@ pub enum Pane {
     Layers,
     /// Poses of truth, measurement and prediction, per finger and joint.
     Poses,
+    /// The depth chain: from the decoder to metres, stage by stage.
+    Ledger,
     /// The figures of the selected pair.
     Metrics,
     /// The figures of all pairs so far.
@@ -112,6 +116,8 @@ pub enum UiRequest {
     Camera(CameraPreset),
     /// Fit images and 3D views to their panes.
     Fit,
+    /// Bring a pane of the workspace to the front.
+    ShowPane(Pane),
     /// Save a picture of the window.
     Screenshot,
     /// Fill the screen, or stop it.
@@ -180,6 +186,8 @@ pub enum Command {
     Generate,
     /// Draws a new seed, then generates.
     GenerateNewSeed,
+    /// Computes shift statistics of the open data set with the generator and its settings, then uses them.
+    Refit,
     /// Shows another prediction of the same touch.
     Choose(Recipe),
     /// Tells a job to stop.
@@ -308,6 +316,8 @@ pub enum Command {
     Generated(Ticket, Vec<Arc<Prediction>>),
     /// A prediction as it looks on the way.
     Previewed(Ticket, Arc<Preview>),
+    /// Shift statistics are there.
+    Refitted(Ticket, Box<ShiftStatistics>, Option<String>),
     /// A job is under way.
     Progressed(Ticket, Progress),
     /// A job without a result is done, with a line for the log.
@@ -354,6 +364,10 @@ pub enum Computed {
     Depth(Arc<DepthMap>),
     /// Of [`Request::Comparison`].
     Comparison(Arc<Comparison>),
+    /// Of [`Request::Ledger`].
+    Ledger(Arc<LedgerResult>),
+    /// Of [`Request::Ambiguity`]; `None` for an image without a finite pixel.
+    Ambiguity(Option<Ambiguity>),
     /// Of [`Request::Mask`].
     Mask(Arc<Mask>),
     /// Of [`Request::Cloud`].

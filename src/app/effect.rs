@@ -41,6 +41,17 @@ pub enum Effect {
         /// The pair, if it is loaded.
         sample: Option<Arc<Sample>>,
     },
+    /// Make shift statistics of a data set.
+    Refit {
+        /// The job.
+        ticket: Ticket,
+        /// How its touches are predicted; the touch itself is replaced.
+        recipe: Recipe,
+        /// The bundle.
+        bundle: BundleInfo,
+        /// The data.
+        source: Arc<dyn DataSource>,
+    },
     /// Tell a job to stop.
     Cancel(Ticket),
     /// Write the labels of a pair; a newer request for the same pair replaces a waiting one.
@@ -88,6 +99,7 @@ impl std::fmt::Debug for Effect {
             Self::Open { place, .. } => write!(f, "Open({place})"),
             Self::FindBundles(folders) => write!(f, "FindBundles({folders:?})"),
             Self::Generate { ticket, recipes, .. } => write!(f, "Generate({ticket:?}, {recipes:?})"),
+            Self::Refit { ticket, recipe, .. } => write!(f, "Refit({ticket:?}, {recipe:?})"),
             Self::Cancel(ticket) => write!(f, "Cancel({ticket:?})"),
             Self::SaveLabels(_, save) => write!(f, "SaveLabels({})", save.name),
             Self::SaveSettings(_) => write!(f, "SaveSettings"),

@@ -4,7 +4,9 @@ pub mod compute;
 pub mod evaluate;
 pub mod generate;
 pub mod inspect;
+pub mod ledger;
 pub mod prepare;
+pub mod statistics;
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};

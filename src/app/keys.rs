@@ -272,6 +272,10 @@ pub enum Request {
     Imprint(Recipe, ShiftMode),
     /// A prediction against the measurement.
     Comparison(Recipe, ShiftMode),
+    /// The depth chain of a prediction, stage by stage.
+    Ledger(Recipe, ShiftMode),
+    /// What a GelSlim image leaves open.
+    Ambiguity(TouchKey),
     /// An automatic mask.
     Mask(MaskKey),
     /// A cloud.
@@ -296,10 +300,11 @@ impl Request {
         match self {
             Self::Sample(pair) | Self::Labels(pair) | Self::Thumbnail(pair) => Some(pair.dataset),
             Self::Tool(dataset, _) => Some(*dataset),
-            Self::Stored(touch) => Some(touch.pair.dataset),
-            Self::Prediction(recipe) | Self::Imprint(recipe, _) | Self::Comparison(recipe, _) => {
-                Some(recipe.touch.pair.dataset)
-            }
+            Self::Stored(touch) | Self::Ambiguity(touch) => Some(touch.pair.dataset),
+            Self::Prediction(recipe)
+            | Self::Imprint(recipe, _)
+            | Self::Comparison(recipe, _)
+            | Self::Ledger(recipe, _) => Some(recipe.touch.pair.dataset),
             Self::Mask(key) => Some(key.imprint.touch().pair.dataset),
             Self::Cloud(key)
             | Self::Pose(PoseKey { cloud: key, .. })

@@ -12,8 +12,11 @@ use super::services::{Generated, NamedTool};
 use crate::domain::align::basin::Basin;
 use crate::domain::align::reason::{Reason, ReasonCounts};
 use crate::domain::align::{AlignReport, Directions, PointFit, TraceStep};
+use crate::domain::ambiguity::Ambiguity;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::metrics::Split;
+use crate::domain::postprocess::{ChainReading, Ledger};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::sensor::Finger;
 
@@ -144,6 +147,17 @@ pub struct Comparison {
     pub mae_m: f64,
     /// Whether PSNR and SSIM are of metres, or (assumed scale) of images stretched to 0..1 each.
     pub scale: Scale,
+    /// The same figures inside and outside the GelSlim's footprint, errors in metres; `None` where nobody asked.
+    pub split: Option<Split>,
+}
+
+/// The depth chain of a prediction.
+#[derive(Clone, Debug)]
+pub struct LedgerResult {
+    /// Every stage, the result against the truth, and what is implausible.
+    pub ledger: Ledger,
+    /// The same picture in every way to metres.
+    pub readings: Vec<ChainReading>,
 }
 
 /// The surface points of both fingers in the grasp frame.
@@ -280,6 +294,10 @@ pub struct Results {
     pub imprints: Cache<(Recipe, ShiftMode), DepthMap>,
     /// Predictions against measurements.
     pub comparisons: Cache<(Recipe, ShiftMode), Comparison>,
+    /// Depth chains.
+    pub ledgers: Cache<(Recipe, ShiftMode), LedgerResult>,
+    /// What GelSlim images leave open.
+    pub ambiguities: Cache<TouchKey, Option<Ambiguity>>,
     /// Automatic masks.
     pub masks: Cache<MaskKey, Mask>,
     /// Clouds.
@@ -323,6 +341,8 @@ impl Default for Results {
             predictions: Cache::new(256 * MIB),
             imprints: Cache::new(64 * MIB),
             comparisons: Cache::new(32 * MIB),
+            ledgers: Cache::new(24 * MIB),
+            ambiguities: Cache::new(MIB),
             masks: Cache::new(32 * MIB),
             clouds: Cache::new(128 * MIB),
             poses: Cache::new(32 * MIB),
@@ -350,6 +370,8 @@ impl Results {
         self.predictions.clear();
         self.imprints.clear();
         self.comparisons.clear();
+        self.ledgers.clear();
+        self.ambiguities.clear();
         self.masks.clear();
         self.clouds.clear();
         self.poses.clear();

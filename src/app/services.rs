@@ -24,6 +24,7 @@ use crate::domain::pose::ToolModel;
 use crate::domain::postprocess::{DepthChain, RawPrediction};
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
+use crate::io::statistics::ShiftStatistics;
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
@@ -154,6 +155,14 @@ pub trait Services: Send + Sync {
 
     /// The stored settings (defaults where there are none), and what was wrong if they were set aside.
     fn load_settings(&self) -> (Settings, Option<TaskError>);
+
+    /// Keeps shift statistics with the program's own files; says where, or `None` where nothing is kept.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    fn save_statistics(&self, _statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {
+        Ok(None)
+    }
 
     /// Writes the settings.
     ///

@@ -8,6 +8,7 @@ use strum::EnumIter;
 use super::keys::{PoseEngine, Preset, Sampler, ShiftMode, Spacing};
 use super::library::{BundleInfo, Place};
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
+use crate::domain::postprocess::RefitShift;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
 pub const SETTINGS_VERSION: u32 = 1;
@@ -37,6 +38,8 @@ pub struct Settings {
     pub colour_map: ColourMap,
     /// How predictions become metres.
     pub shift: ShiftMode,
+    /// The last statistics made for a refit shift, to be chosen again.
+    pub refit: Option<RefitShift>,
     /// The generator.
     pub generate: GenerateSettings,
     /// The mask tools.
@@ -78,6 +81,7 @@ impl Default for Settings {
             range: ColourRange::default(),
             colour_map: ColourMap::Viridis,
             shift: ShiftMode::default(),
+            refit: None,
             generate: GenerateSettings::default(),
             mask: MaskSettings::default(),
             pose_engine: PoseEngine::default(),

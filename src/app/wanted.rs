@@ -1,5 +1,7 @@
 //! Views ask for what they show: the recipes behind the selection, what is there of it, and what is missing.
 
+mod chain;
+
 use std::sync::Arc;
 
 use super::command::Pane;
@@ -407,7 +409,7 @@ impl State {
 }
 
 /// Panes that show something of the selected pair.
-const PAIR_PANES: [Pane; 15] = [
+const PAIR_PANES: [Pane; 16] = [
     Pane::GelRaw,
     Pane::GelReference,
     Pane::GelDifference,
@@ -422,6 +424,7 @@ const PAIR_PANES: [Pane; 15] = [
     Pane::Masks,
     Pane::Layers,
     Pane::Poses,
+    Pane::Ledger,
     Pane::Metrics,
 ];
 
@@ -470,6 +473,9 @@ impl Wanted<'_> {
             if compared {
                 self.comparison(finger, pair.finger(finger));
             }
+            if image || (on_screen && metrics) {
+                self.ambiguity(finger, pair.finger(finger));
+            }
             let drawn = on_screen && (state.settings.mask_visible || state.is_visible(&[Pane::Masks]));
             if cloud_measured || (drawn && state.is_visible(&[Pane::Measured])) {
                 self.mask(measured, finger);
@@ -489,6 +495,9 @@ impl Wanted<'_> {
                 }
             }
             self.inspection();
+        }
+        if metrics || state.is_visible(&[Pane::Ledger]) {
+            self.ledger(pair.finger(state.selection.finger));
         }
     }
 

@@ -13,7 +13,6 @@ use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult, pose};
 use crate::domain::align::Run;
 use crate::domain::align::basin::{Basin, BasinConfig, Plane};
-use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
 use crate::domain::inspect::basin_map;
 use crate::domain::pose::{Engine, FingerInput, contact_cloud, register};
@@ -94,25 +93,10 @@ struct Report {
 
 pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let dataset = super::open(&args.path)?;
-    let pairs = &dataset.index.pairs;
-    let exact = pairs.iter().position(|p| p.name == args.pair);
-    let similar: Vec<usize> = (0..pairs.len()).filter(|&i| pairs[i].name.contains(&args.pair)).collect();
-    let id = match (exact, similar.as_slice()) {
-        (Some(id), _) => id,
-        (None, [id]) => *id,
-        (None, []) => anyhow::bail!("no pair is called {:?}; `doctor` lists what is there", args.pair),
-        (None, [first, second, ..]) => {
-            let (a, b) = (&pairs[*first].name, &pairs[*second].name);
-            anyhow::bail!(
-                "{} pairs are called like {:?}, such as {a} and {b}: say more of the name",
-                similar.len(),
-                args.pair
-            )
-        }
-    };
-    let entry = &pairs[id];
+    let id = super::find_pair(&dataset, &args.pair)?;
+    let entry = &dataset.index.pairs[id.0 as usize];
     let output = Output::new(Common { json: false }, "trying starts", 1);
-    let sample = dataset.load(PairId(id as u32))?;
+    let sample = dataset.load(id)?;
     let name = entry.tool.as_deref();
     let name = name.ok_or_else(|| anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name))?;
     let tool = pose::tool_model(&dataset, name)?;

@@ -9,11 +9,13 @@ use serde::Serialize;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::app::jobs::compute;
+use crate::app::results::Comparison;
+use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
-use crate::domain::grid::DepthMap;
-use crate::domain::resample;
-use crate::domain::sample::Scale;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::sample::{Sample, Scale};
 use crate::domain::sensor::Finger;
+use crate::domain::{metrics, resample};
 use crate::io::{dataset::Dataset, images};
 
 /// Arguments of `generate`.
@@ -37,11 +39,23 @@ pub(super) struct GenerateArgs {
     common: Common,
 }
 
+/// Which finger's image.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum FingerArg {
+pub(super) enum FingerArg {
     Right,
     Left,
     Both,
+}
+
+impl FingerArg {
+    /// The fingers it stands for.
+    pub(super) fn fingers(self) -> &'static [Finger] {
+        match self {
+            FingerArg::Right => &[Finger::Right],
+            FingerArg::Left => &[Finger::Left],
+            FingerArg::Both => &Finger::BOTH,
+        }
+    }
 }
 
 /// Figures of one prediction. PSNR and SSIM are those of `convention`.
@@ -55,6 +69,14 @@ struct Pair {
     vqvae_psnr_db: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     vqvae_ssim: Option<f64>,
+    /// The figures apart for what the GelSlim saw and for what lies outside its footprint; errors in metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seen: Option<metrics::Figures>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    invented: Option<metrics::Figures>,
+    /// Whether the GelSlim image tells where on the tool it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ambiguity: Option<Ambiguity>,
     /// Of the prediction; where both fingers were predicted in one go, half of it.
     seconds: f64,
     /// Whether it was made before and only read now.
@@ -69,7 +91,41 @@ struct Mean {
     vqvae_psnr_db: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     vqvae_ssim: Option<f64>,
+    /// Means over the pairs: inside the GelSlim's footprint, and outside.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    seen: Option<PartMean>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    invented: Option<PartMean>,
+    /// Pairs whose GelSlim image leaves the place along a bare shaft open.
+    ambiguous: usize,
     seconds: Option<f64>,
+}
+
+/// Means of the figures of one part.
+#[derive(Debug, Serialize)]
+struct PartMean {
+    psnr_db: Option<f64>,
+    ssim: Option<f64>,
+    mae_m: Option<f64>,
+    bias_m: Option<f64>,
+}
+
+impl PartMean {
+    fn of(pairs: &[Pair], part: fn(&Pair) -> Option<metrics::Figures>) -> Option<Self> {
+        let all: Vec<metrics::Figures> = pairs.iter().filter_map(part).collect();
+        let of = |get: fn(&metrics::Figures) -> Option<f64>| average(all.iter().filter_map(get));
+        (!all.is_empty()).then(|| Self {
+            psnr_db: of(|f| f.psnr_db),
+            ssim: of(|f| f.ssim),
+            mae_m: of(|f| f.mae),
+            bias_m: of(|f| f.bias),
+        })
+    }
+}
+
+fn average(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 #[derive(Debug, Serialize)]
@@ -98,11 +154,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     std::fs::create_dir_all(&args.out)
         .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", args.out.display()))?;
     let ids = super::spread(dataset.index.pairs.len(), args.limit);
-    let fingers: &[Finger] = match args.finger {
-        FingerArg::Right => &[Finger::Right],
-        FingerArg::Left => &[Finger::Left],
-        FingerArg::Both => &Finger::BOTH,
-    };
+    let fingers = args.finger.fingers();
     let output = Output::new(args.common, "generating", ids.len());
     let mut predictor = Predictor::new(&args.model);
     let config = predictor.config()?;
@@ -135,8 +187,10 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                 let imprint = predictor.generator()?.depth(&predicted.raw, shift)?;
                 write(&args.out, &name, finger, &imprint)?;
                 let kept = predicted.kept;
-                let mut pair = Pair { name: name.clone(), finger: finger.name(), seconds, kept, ..Pair::default() };
-                score(&dataset, id, sample.scale, &imprint, touch.bubble.as_ref().map(|b| &b.imprint), &mut pair)?;
+                let ambiguity = touch.gelslim.as_ref().and_then(|g| ambiguity(&g.difference));
+                let name = name.clone();
+                let mut pair = Pair { name, finger: finger.name(), ambiguity, seconds, kept, ..Pair::default() };
+                score(&dataset, id, (finger, &sample), &imprint, &mut pair)?;
                 made.push(pair);
             }
             Ok(made)
@@ -171,24 +225,27 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
 fn score(
     dataset: &Dataset,
     id: PairId,
-    scale: Scale,
+    (finger, sample): (Finger, &Sample),
     imprint: &DepthMap,
-    measured: Option<&DepthMap>,
     pair: &mut Pair,
 ) -> anyhow::Result<()> {
+    let scale = sample.scale;
     match scale {
         Scale::Measured => {
-            if let Some(measured) = measured {
-                (pair.psnr_db, pair.ssim) = scores(imprint, measured, scale)?;
+            if let Some(bubble) = sample.finger(finger).and_then(|t| t.bubble.as_ref()) {
+                let seen = metrics::footprint_mask(finger, bubble.imprint.size());
+                take(pair, &compared(imprint, &bubble.imprint, scale, &seen)?);
             }
         }
         Scale::Assumed => {
             // Compared on the tile's own pixels and in its orientation, so that the lab's prediction is not resampled.
             if let Some(tile) = dataset.bubble_tile(id)? {
                 let ours = resample::bilinear(&imprint.rotated_180(), tile.width(), tile.height());
-                (pair.psnr_db, pair.ssim) = scores(&ours, &tile, scale)?;
+                let seen = metrics::footprint_mask(finger, tile.size()).rotated_180();
+                take(pair, &compared(&ours, &tile, scale, &seen)?);
                 if let Some(vqvae) = dataset.vqvae_tile(id)? {
-                    (pair.vqvae_psnr_db, pair.vqvae_ssim) = scores(&vqvae, &tile, scale)?;
+                    let theirs = compared(&vqvae, &tile, scale, &seen)?;
+                    (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
                 }
             }
         }
@@ -196,10 +253,15 @@ fn score(
     Ok(())
 }
 
-/// PSNR and SSIM as the studio computes them.
-fn scores(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> anyhow::Result<(Option<f64>, Option<f64>)> {
-    let found = compute::compare(predicted, measured, scale).map_err(|err| anyhow::anyhow!("{err}"))?;
-    Ok((found.psnr_db, found.ssim))
+/// The figures as the studio computes them.
+fn compared(predicted: &DepthMap, measured: &DepthMap, scale: Scale, seen: &Mask) -> anyhow::Result<Comparison> {
+    compute::compare_parts(predicted, measured, scale, seen).map_err(|err| anyhow::anyhow!("{err}"))
+}
+
+fn take(pair: &mut Pair, found: &Comparison) {
+    (pair.psnr_db, pair.ssim) = (found.psnr_db, found.ssim);
+    pair.seen = found.split.map(|s| s.seen);
+    pair.invented = found.split.map(|s| s.invented);
 }
 
 /// Writes `NAME_FINGER.npy` (metres, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
@@ -213,15 +275,15 @@ fn write(out: &Path, name: &str, finger: Finger, imprint: &DepthMap) -> anyhow::
 }
 
 fn mean(pairs: &[Pair]) -> Mean {
-    let of = |get: fn(&Pair) -> Option<f64>| {
-        let values: Vec<f64> = pairs.iter().filter_map(get).collect();
-        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-    };
+    let of = |get: fn(&Pair) -> Option<f64>| average(pairs.iter().filter_map(get));
     Mean {
         psnr_db: of(|p| p.psnr_db),
         ssim: of(|p| p.ssim),
         vqvae_psnr_db: of(|p| p.vqvae_psnr_db),
         vqvae_ssim: of(|p| p.vqvae_ssim),
+        seen: PartMean::of(pairs, |p| p.seen),
+        invented: PartMean::of(pairs, |p| p.invented),
+        ambiguous: pairs.iter().filter(|p| p.ambiguity.is_some_and(|a| a.kind == Touch::BareShaft)).count(),
         seconds: of(|p| Some(p.seconds)),
     }
 }
@@ -229,14 +291,17 @@ fn mean(pairs: &[Pair]) -> Mean {
 fn text(report: &Report) -> String {
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
     let mut text = format!(
-        "{:<44} {:>8} {:>6} {:>12} {:>10} {:>8}\n",
-        "pair", "PSNR dB", "SSIM", "VQ-VAE dB", "VQ-VAE SSIM", "seconds"
+        "{:<44} {:>8} {:>6} {:>8} {:>8} {:>12} {:>10} {:>8}\n",
+        "pair", "PSNR dB", "SSIM", "seen dB", "inv. dB", "VQ-VAE dB", "VQ-VAE SSIM", "seconds"
     );
-    let mut line = |name: &str, p: &Mean| {
+    let mut line = |name: &str, p: &Mean, note: &str| {
+        let part = |part: &Option<PartMean>| number(part.as_ref().and_then(|p| p.psnr_db), 1);
         text += &format!(
-            "{name:<44} {:>8} {:>6} {:>12} {:>10} {:>8}\n",
+            "{name:<44} {:>8} {:>6} {:>8} {:>8} {:>12} {:>10} {:>8}{note}\n",
             number(p.psnr_db, 1),
             number(p.ssim, 3),
+            part(&p.seen),
+            part(&p.invented),
             number(p.vqvae_psnr_db, 1),
             number(p.vqvae_ssim, 3),
             number(p.seconds, 2)
@@ -244,11 +309,19 @@ fn text(report: &Report) -> String {
     };
     for p in &report.pairs {
         let name = format!("{} {}", p.name, p.finger);
-        line(&name, &mean(std::slice::from_ref(p)));
+        let note = p.ambiguity.and_then(|a| a.caption()).map_or(String::new(), |c| format!("  {c}"));
+        line(&name, &mean(std::slice::from_ref(p)), &note);
     }
-    line("mean", &report.mean);
+    line("mean", &report.mean, "");
     text + &format!(
-        "\n{}; {} steps, seed {}, {} on {}\n",
-        report.convention, report.steps, report.seed, report.bundle, report.runtime
+        "\n{}; seen = inside the GelSlim's footprint, inv. = invented outside it\n{} of {} GelSlim images are ambiguous \
+         (bare shaft); {} steps, seed {}, {} on {}\n",
+        report.convention,
+        report.mean.ambiguous,
+        report.pairs.len(),
+        report.steps,
+        report.seed,
+        report.bundle,
+        report.runtime
     )
 }

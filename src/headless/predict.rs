@@ -10,7 +10,7 @@ use strum::IntoEnumIterator as _;
 
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
-use crate::domain::postprocess::{RawPrediction, ShiftMode};
+use crate::domain::postprocess::{RawPrediction, RefitShift, ShiftMode};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::infer::bundle::{Bundle, default_roots, find};
@@ -19,6 +19,7 @@ use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
 use crate::infer::recipe::{Recipe, input_digest};
 use crate::infer::store::Store;
+use crate::io::statistics::ShiftStatistics;
 
 /// Which models, and how they are run.
 #[derive(Debug, Clone, Args)]
@@ -53,8 +54,11 @@ pub(super) struct ModelArgs {
     #[arg(long, value_parser = PossibleValuesParser::new(Sampler::iter().map(Sampler::key)).map(sampler))]
     sampler: Option<Sampler>,
     /// How the decoder's output becomes metres.
-    #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]
-    shift: ShiftArg,
+    #[arg(long, value_enum, default_value_t = AnyShiftArg::Exact)]
+    shift: AnyShiftArg,
+    /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
     /// The engine that runs the models.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
@@ -94,6 +98,19 @@ pub(super) enum ShiftArg {
     Paper,
     /// The doubled mapping undone exactly.
     Exact,
+}
+
+/// [`ShiftArg`] where statistics of a dataset can be named.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum AnyShiftArg {
+    /// What the lab's released script saves: its range is mapped twice.
+    Raw,
+    /// The paper's mean-and-deviation shift of that.
+    Paper,
+    /// The doubled mapping undone exactly.
+    Exact,
+    /// The paper's shift by the statistics of a dataset (see --stats).
+    Refit,
 }
 
 impl ShiftArg {
@@ -145,6 +162,8 @@ pub(super) fn find_bundle(named: Option<&PathBuf>, kind: &str, fits: fn(&Bundle)
 pub(super) struct Predictor {
     args: ModelArgs,
     bundle_name: String,
+    bundle_hash: String,
+    refit: Option<RefitShift>,
     generator: Option<Generator>,
     mask_model: Option<MaskModel>,
     store: Option<Store>,
@@ -160,7 +179,15 @@ impl Predictor {
     /// Nothing is loaded yet.
     pub(super) fn new(args: &ModelArgs) -> Self {
         let store = if args.no_cache { None } else { super::cache::store() };
-        Self { args: args.clone(), bundle_name: String::new(), generator: None, mask_model: None, store }
+        Self {
+            args: args.clone(),
+            bundle_name: String::new(),
+            bundle_hash: String::new(),
+            refit: None,
+            generator: None,
+            mask_model: None,
+            store,
+        }
     }
 
     fn choice(&self) -> EngineChoice {
@@ -171,10 +198,31 @@ impl Predictor {
     pub(super) fn generator(&mut self) -> anyhow::Result<&mut Generator> {
         if self.generator.is_none() {
             let bundle = find_bundle(self.args.bundle.as_ref(), "generator", |b| b.generator().is_some())?;
+            self.refit = self.read_refit(&bundle)?;
             self.bundle_name = bundle.name().to_owned();
+            self.bundle_hash = bundle.hash().to_owned();
             self.generator = Some(Generator::open(&bundle, self.choice())?);
         }
         Ok(self.generator.as_mut().expect("it was just loaded"))
+    }
+
+    /// The statistics for the refit shift, which must be of this bundle.
+    fn read_refit(&self, bundle: &Bundle) -> anyhow::Result<Option<RefitShift>> {
+        match (&self.args.stats, self.args.shift) {
+            (Some(file), AnyShiftArg::Refit) => {
+                Ok(Some(ShiftStatistics::read(file)?.shift_for(bundle.name(), bundle.hash())?))
+            }
+            (None, AnyShiftArg::Refit) => {
+                anyhow::bail!("--shift refit needs --stats FILE; make the file with `touch2touch stats`")
+            }
+            (Some(_), _) => anyhow::bail!("--stats is for --shift refit; add that, or leave the statistics out"),
+            (None, _) => Ok(None),
+        }
+    }
+
+    /// The hash of the generator's bundle; empty before it is loaded.
+    pub(super) fn bundle_hash(&self) -> &str {
+        &self.bundle_hash
     }
 
     /// The name of the generator's bundle; empty before it is loaded.
@@ -244,9 +292,14 @@ impl Predictor {
         Ok(found.into_iter().flatten().collect())
     }
 
-    /// The reading of the decoder's output.
+    /// The reading of the decoder's output; call it after [`Self::generator`].
     pub(super) fn shift(&self) -> ShiftMode {
-        self.args.shift.mode()
+        match self.args.shift {
+            AnyShiftArg::Refit => ShiftMode::Refit(self.refit.expect("read with the bundle")),
+            AnyShiftArg::Raw => ShiftMode::Raw,
+            AnyShiftArg::Paper => ShiftMode::PaperShift,
+            AnyShiftArg::Exact => ShiftMode::ExactInverse,
+        }
     }
 
     /// Predicted imprints (metres, raw orientation) of the fingers that have a GelSlim image.

@@ -290,6 +290,7 @@ impl StudioApp {
                     }
                 }
             },
+            UiRequest::ShowPane(pane) => self.show_pane(pane),
             UiRequest::Screenshot => {
                 let (sender, wake) = (self.shot_sender.clone(), ctx.clone());
                 ctx.request_screenshot(move |image| {
@@ -323,6 +324,24 @@ impl StudioApp {
             UiRequest::FocusFilter => self.local.focus_filter = true,
         }
         ctx.request_repaint();
+    }
+
+    /// Brings a pane to the front, in the workspace in front if it is there, else in the first that has it.
+    fn show_pane(&mut self, pane: Pane) {
+        let own = self.state.settings.workspace;
+        let all = std::iter::once(own).chain(Workspace::iter());
+        let Some(workspace) = all.into_iter().find(|w| layout::panes_of(*w).contains(&pane)) else { return };
+        if workspace != own {
+            self.inbox.push(Command::SetWorkspace(workspace));
+        }
+        self.local.maximised = None;
+        if let Some(tree) = self.trees.get_mut(&workspace)
+            && let Some(id) = tree.tiles.find_pane(&pane)
+        {
+            tree.set_visible(id, true);
+            tree.make_active(|tile, _| tile == id);
+        }
+        self.store_layout(workspace);
     }
 
     fn store_layout(&mut self, workspace: Workspace) {

@@ -84,7 +84,9 @@ fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
         ui.separator();
-        for action in [Action::BothFingers, Action::Footprint, Action::MaskVisible, Action::LinkCameras] {
+        for action in
+            [Action::DepthChain, Action::BothFingers, Action::Footprint, Action::MaskVisible, Action::LinkCameras]
+        {
             cx.action_button(ui, action, action.name());
         }
         ui.separator();

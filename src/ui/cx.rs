@@ -109,8 +109,6 @@ pub(super) struct Local {
     pub textures: Textures,
     /// Outlines of masks.
     pub outlines: Memo<Vec<[[f32; 2]; 2]>>,
-    /// The stages of the depth chain with their figures.
-    pub ledgers: Memo<Vec<(&'static str, Stats)>>,
     /// Figures of images.
     pub stats: Memo<Stats>,
     /// What part of GelSlim images is seen.
@@ -186,7 +184,6 @@ impl Local {
             textures: Textures::default(),
             outlines: Memo::default(),
             stats: Memo::default(),
-            ledgers: Memo::default(),
             gel_view: ViewTransform::default(),
             bubble_view: ViewTransform::default(),
             scenes: [SceneView::default(), SceneView::default()],

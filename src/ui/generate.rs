@@ -234,6 +234,9 @@ fn shift_tooltip(mode: ShiftMode) -> &'static str {
             "The raw values with mean and deviation matched to the training statistics, as in the paper"
         }
         ShiftMode::ExactInverse => "The raw values with the doubled mapping undone: 2 * value - max, the depth itself",
+        ShiftMode::Refit(_) => {
+            "The raw values with mean and deviation matched to this data set's own predictions and measurements"
+        }
     }
 }
 
@@ -242,11 +245,15 @@ fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
     let current = cx.state.settings.shift;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
-        for mode in ShiftMode::iter() {
+        // The refit is there once its statistics are; until then the button brings them.
+        for mode in ShiftMode::iter().chain(cx.state.settings.refit.map(ShiftMode::Refit)) {
             let radio = ui.radio(mode == current, mode.label());
             if radio.on_hover_text(shift_tooltip(mode)).clicked() {
                 cx.push(Command::SetShift(mode));
             }
+        }
+        if cx.state.settings.refit.is_none() {
+            cx.action_button(ui, Action::Refit, "Refit…");
         }
     });
 }

@@ -461,12 +461,18 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
         Pane::Predicted => state.chosen(finger).map_or(String::new(), |recipe| {
             format!("seed {} · {} steps · {}", recipe.seed, recipe.steps, state.settings.shift.label().to_lowercase())
         }),
-        Pane::Error => state
-            .comparison(finger)
-            .ready()
-            .map_or(String::new(), |c| format!("mean |error| {}", units::text_mm(c.mae_m))),
+        Pane::Error => state.comparison(finger).ready().map_or(String::new(), |c| {
+            let part = |mae: Option<f64>| mae.map_or("–".to_owned(), |v| units::fixed(units::mm(v), 2));
+            let whole = format!("mean |error| {}", units::text_mm(c.mae_m));
+            c.split.map_or(whole.clone(), |s| {
+                format!("{whole} · seen {} · invented {}", part(s.seen.mae), part(s.invented.mae))
+            })
+        }),
         _ => String::new(),
     };
+    if let Some(warning) = state.ambiguity(finger).and_then(|a| a.caption()).filter(|_| pane == Pane::Predicted) {
+        output.caption(Align2::RIGHT_BOTTOM, warning, super::theme::DARK.caution);
+    }
     let color = match (pane, state.settings.shift) {
         (Pane::Predicted, ShiftMode::Raw) => super::theme::DARK.caution,
         _ => cx.p.strong_on_image(),

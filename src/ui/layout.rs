@@ -26,6 +26,7 @@ pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
             Measured,
             Predicted,
             Error,
+            Ledger,
             ScenePredicted,
             SceneMeasured,
             Generate,
@@ -51,7 +52,7 @@ pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
             &[Browser, Masks, Measured, Predicted, SceneMeasured, ScenePredicted, GelDifference, Metrics, Log]
         }
         Workspace::Evaluate => {
-            &[Browser, Results, Table, Measured, Predicted, Error, SceneMeasured, Metrics, Generate, Log]
+            &[Browser, Results, Table, Measured, Predicted, Error, Ledger, SceneMeasured, Metrics, Generate, Log]
         }
     }
 }
@@ -90,7 +91,7 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let browser = b.tabs(&[Browser]);
             let gel = b.tabs(&[GelDifference, GelRaw, GelReference]);
             let (measured, predicted) = (b.tabs(&[Measured]), b.tabs(&[Predicted]));
-            let error = b.tabs(&[Error]);
+            let error = b.tabs(&[Error, Ledger]);
             let (scene_p, scene_m) = (b.tabs(&[ScenePredicted]), b.tabs(&[SceneMeasured]));
             let generate = b.tabs(&[Generate, Settings]);
             let metrics = b.tabs(&[Metrics, Log]);
@@ -126,7 +127,7 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
         Workspace::Evaluate => {
             let left = b.tabs(&[Browser]);
             let table = b.tabs(&[Results, Table]);
-            let (measured, predicted, error) = (b.tabs(&[Measured]), b.tabs(&[Predicted]), b.tabs(&[Error]));
+            let (measured, predicted, error) = (b.tabs(&[Measured]), b.tabs(&[Predicted]), b.tabs(&[Error, Ledger]));
             let right = b.tabs(&[Metrics, Generate, SceneMeasured, Log]);
             let images = b.row(&[(measured, 1.0), (predicted, 1.0), (error, 1.0)]);
             let centre = b.column(&[(table, 1.2), (images, 0.9)]);

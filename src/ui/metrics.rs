@@ -11,9 +11,10 @@ use super::theme::{SMALL, caption, section, value};
 use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::keys::{ImprintSource, PoseEngine};
+use crate::app::results::Comparison;
 use crate::app::state::{Absent, Lookup};
 use crate::domain::hand::{HandPose, PoseDifference};
-use crate::domain::postprocess::Stats;
+use crate::domain::postprocess::{Severity, Stage, Stats};
 use crate::domain::sample::Scale;
 use crate::domain::sensor::Finger;
 use crate::domain::units;
@@ -160,6 +161,10 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
                 ] {
                     line(ui, (name, cx.p.weak), &[(number, cx.p.strong)], 0.0);
                 }
+                parts(cx, ui, c);
+                if let Some(warning) = cx.state.ambiguity(finger).and_then(|a| a.warning()) {
+                    ui.add(eframe::egui::Label::new(RichText::new(warning).size(SMALL).color(cx.p.caution)).wrap());
+                }
             }
             Lookup::Waiting => {
                 ui.label(caption("…", cx.p));
@@ -172,6 +177,31 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
     }
+}
+
+/// The same figures apart for what the GelSlim saw and for what the model made up.
+fn parts(cx: &Cx<'_>, ui: &mut Ui, c: &Comparison) {
+    let Some(split) = c.split else { return };
+    let number = |v: Option<f64>, digits: usize| v.map_or("–".to_owned(), |v| units::fixed(v, digits));
+    let spacing = std::mem::replace(&mut ui.spacing_mut().item_spacing.y, 0.0);
+    let width = ((ui.available_width() - 60.0) / 4.0).clamp(34.0, 64.0);
+    let heads = ["dB", "SSIM", "|err| mm", "bias mm"].map(|h| (h.to_owned(), cx.p.weak));
+    line(ui, ("", cx.p.weak), &heads, width);
+    for (name, f, tip) in [
+        ("Seen", split.seen, "Inside the dashed window: the GelSlim saw this part"),
+        ("Invented", split.invented, "Outside the dashed window: the model made this part up"),
+    ] {
+        let numbers = [
+            number(f.psnr_db, 1),
+            number(f.ssim, 3),
+            number(f.mae.map(units::mm), 2),
+            number(f.bias.map(units::mm), 2),
+        ]
+        .map(|text| (text, cx.p.strong));
+        let row = ui.scope(|ui| line(ui, (name, cx.p.text), &numbers, width));
+        row.response.on_hover_text(format!("{tip}. {} pixels; bias is predicted minus measured", f.pixels));
+    }
+    ui.spacing_mut().item_spacing.y = spacing;
 }
 
 /// A name at the left, numbers at the right, in columns that never move.
@@ -195,17 +225,18 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
     let shift = cx.state.settings.shift;
     let mut rows: Vec<(&str, Option<Color32>, Stats, bool)> = Vec::new();
     if let Some(recipe) = cx.state.chosen(finger).cloned() {
-        if let Some(prediction) = cx.state.results.predictions.get(&recipe) {
-            // The chain is walked once per prediction and mapping, a few milliseconds, and only when this is shown.
-            let stages = cx.local.ledgers.get("ledger", (&recipe, shift), || {
-                let chain = prediction.output.chains.get(&shift).and_then(|c| c.as_ref().ok());
-                let records = chain.and_then(|c| c.run_with_ledger(&prediction.output.raw).ok());
-                records.map_or(Vec::new(), |(_, l)| l.into_iter().map(|r| (r.name, r.stats)).collect())
-            });
-            for (name, stats) in stages {
-                let last = *name == "Raw orientation";
-                let color = last.then(|| side_color(cx.p, ImprintSource::Predicted));
-                rows.push((if last { "Predicted" } else { name }, color, *stats, *name != "Decoder"));
+        if let Some(found) = cx.state.ledger(finger).shown() {
+            // The channels are of the pane "Depth chain"; here it is the way to metres.
+            for record in found.ledger.stages.iter().filter(|r| !matches!(r.stage, Stage::Channel(_) | Stage::Resized))
+            {
+                let name = match record.stage {
+                    Stage::Reduced => "Decoder",
+                    Stage::Metres => "Metres",
+                    Stage::Turned => "Predicted",
+                    _ => "Shift",
+                };
+                let color = (record.stage == Stage::Turned).then(|| side_color(cx.p, ImprintSource::Predicted));
+                rows.push((name, color, record.stats, record.stage.is_metres()));
             }
         }
         if let Lookup::Ready(c) = cx.state.comparison(finger) {
@@ -226,6 +257,18 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(4.0);
     ui.label(section(&format!("Ledger, {} finger", finger.name()), cx.p))
         .on_hover_text("What each stage of the depth chain left behind: smallest, mean, deviation, largest");
+    if let Some(found) = cx.state.ledger(finger).shown() {
+        let serious = found.ledger.flags.iter().filter(|f| f.severity < Severity::Info).count();
+        if let Some(first) = found.ledger.flags.first().filter(|_| serious > 0) {
+            let color = if first.severity == Severity::Wrong { cx.p.wrong } else { cx.p.caution };
+            let more = if serious > 1 { format!(" (and {} more)", serious - 1) } else { String::new() };
+            let text = RichText::new(format!("{}{more}", first.what)).size(SMALL).color(color);
+            let link = ui.add(eframe::egui::Label::new(text).wrap().sense(Sense::click()));
+            if link.on_hover_text(format!("{} {} Click for the depth chain", first.why, first.action)).clicked() {
+                cx.act(Action::DepthChain);
+            }
+        }
+    }
     ui.spacing_mut().item_spacing.y = 0.0;
     let width = ((ui.available_width() - 76.0) / 4.0).clamp(34.0, 64.0);
     let heads = ["min", "mean", "std", "max"].map(|h| (h.to_owned(), cx.p.weak));

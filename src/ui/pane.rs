@@ -8,7 +8,7 @@ use super::theme::{SMALL, medium};
 use super::timemachine;
 use super::widget::help;
 use super::{
-    basin, browser, generate, images, layers, log, masks, metrics, poses, results, scene, settings_pane, table,
+    basin, browser, generate, images, layers, ledger, log, masks, metrics, poses, results, scene, settings_pane, table,
 };
 use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
@@ -31,6 +31,7 @@ pub(super) fn title(pane: Pane) -> &'static str {
         Pane::Masks => "Mask",
         Pane::Layers => "Layers",
         Pane::Poses => "Poses",
+        Pane::Ledger => "Depth chain",
         Pane::Metrics => "Figures",
         Pane::Table => "All figures",
         Pane::Results => "Results",
@@ -57,6 +58,7 @@ fn tooltip(pane: Pane) -> &'static str {
         Pane::Masks => "Corrects the contact mask",
         Pane::Layers => "Residuals, drop reasons, distances both ways and the weak direction of a registration",
         Pane::Poses => "Truth, measurement and prediction against each other, per finger and joint",
+        Pane::Ledger => "Everything between the decoder and the metres, stage by stage",
         Pane::Metrics => "The figures of this pair",
         Pane::Table => "The figures of all pairs so far",
         Pane::Results => "The paper's results table of the open data set",
@@ -92,6 +94,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         Pane::Masks => masks::show(cx, ui),
         Pane::Layers => layers::show(cx, ui),
         Pane::Poses => poses::show(cx, ui),
+        Pane::Ledger => ledger::show(cx, ui),
         Pane::Metrics => metrics::show(cx, ui),
         Pane::Table => table::show(cx, ui),
         Pane::Results => results::show(cx, ui),

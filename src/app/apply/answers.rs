@@ -12,7 +12,7 @@ use super::super::library::{BundleKind, OpenDataset, Place};
 use super::super::results::Prediction;
 use super::super::state::State;
 use super::super::tasks::{Level, Task, Ticket};
-use super::{cancel_all, inspect, is_selected, masks, preferences, remember, reorder, workbench};
+use super::{cancel_all, inspect, is_selected, masks, preferences, refit, remember, reorder, workbench};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
 
@@ -68,6 +68,10 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
             if state.tasks.running.get(&ticket).is_some_and(|task| !task.cancelling) =>
         {
             state.results.previews.insert(preview.recipe.touch, preview);
+        }
+        Command::Refitted(ticket, statistics, saved) => {
+            state.tasks.running.remove(&ticket);
+            refit::arrived(state, &statistics, saved, effects);
         }
         Command::Progressed(ticket, progress) => {
             if let Some(task) = state.tasks.running.get_mut(&ticket) {
@@ -171,6 +175,13 @@ fn store(state: &mut State, request: Request, computed: Computed) {
         (Request::Comparison(recipe, shift), Computed::Comparison(comparison)) => {
             let size = bytes(&comparison.error);
             results.comparisons.insert((recipe, shift), comparison, size);
+        }
+        (Request::Ledger(recipe, shift), Computed::Ledger(ledger)) => {
+            let size = ledger.ledger.bytes();
+            results.ledgers.insert((recipe, shift), ledger, size);
+        }
+        (Request::Ambiguity(touch), Computed::Ambiguity(found)) => {
+            results.ambiguities.insert(touch, Arc::new(found), size_of_val(&found));
         }
         (Request::Mask(key), Computed::Mask(mask)) => {
             let size = mask.len();

@@ -31,14 +31,8 @@ const THUMBNAIL_PX: usize = 44;
 /// If the bundle has no such range mapping, or its steps do not fit its output.
 pub fn imprint(prediction: &Prediction, shift: ShiftMode, size: [usize; 2]) -> Result<DepthMap, TaskError> {
     let what = format!("Range mapping \"{}\"", shift.label());
-    let chain = match prediction.output.chains.get(&shift) {
-        Some(Ok(chain)) => chain,
-        Some(Err(why)) => {
-            return Err(TaskError::new(what, why).with_hint("Choose another range mapping, or another bundle."));
-        }
-        None => return Err(TaskError::new(what, "the bundle does not offer it")),
-    };
-    in_metres(chain, &prediction.output.raw, size).map_err(|err| TaskError::from_error(&what, &err))
+    let chain = chain(prediction, shift)?;
+    in_metres(&chain, &prediction.output.raw, size).map_err(|err| TaskError::from_error(&what, &err))
 }
 
 /// A decoder's picture in metres, as large as the bubble image `size` (`[width, height]`; with a zero in it the chain's
@@ -49,6 +43,29 @@ pub fn imprint(prediction: &Prediction, shift: ShiftMode, size: [usize; 2]) -> R
 pub fn in_metres(chain: &DepthChain, raw: &RawPrediction, size: [usize; 2]) -> Result<DepthMap, PostprocessError> {
     let depth = chain.run(raw)?;
     if depth.size() == size || size.contains(&0) { Ok(depth) } else { Ok(bilinear(&depth, size[0], size[1])) }
+}
+
+/// The steps from a prediction to metres.
+///
+/// # Errors
+/// If the bundle has no such range mapping, or the statistics of a refit are of another bundle.
+pub fn chain(prediction: &Prediction, shift: ShiftMode) -> Result<DepthChain, TaskError> {
+    let fail = |why: &str| {
+        TaskError::new(format!("Range mapping \"{}\"", shift.label()), why)
+            .with_hint("Choose another range mapping, or another bundle.")
+    };
+    let of = |mode: ShiftMode| match prediction.output.chains.get(&mode) {
+        Some(Ok(chain)) => Ok(chain.clone()),
+        Some(Err(why)) => Err(fail(why)),
+        None => Err(fail("the bundle does not offer it")),
+    };
+    match shift {
+        ShiftMode::Refit(refit) => {
+            refit.check(&prediction.recipe.bundle).map_err(|why| fail(&why))?;
+            of(ShiftMode::Raw)?.with_mode(shift, None).map_err(|err| fail(&err.to_string()))
+        }
+        mode => of(mode),
+    }
 }
 
 /// A prediction against the measurement. With an assumed scale both are stretched to 0..1 first.
@@ -84,7 +101,34 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
         ssim: ssim.ok().map(|s| s.mean),
         mae_m: if count == 0 { f64::NAN } else { sum / count as f64 },
         scale,
+        split: None,
     })
+}
+
+/// [`compare`] with the figures apart for what the GelSlim saw (`seen`) and for what the model made up.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_parts(
+    predicted: &DepthMap,
+    measured: &DepthMap,
+    scale: Scale,
+    seen: &Mask,
+) -> Result<Comparison, TaskError> {
+    let fail = |err: metrics::MetricError| TaskError::from_error("Compare prediction and measurement", &err);
+    let whole = compare(predicted, measured, scale)?;
+    let mut split = metrics::split(predicted, measured, seen, LAB_PEAK_M).map_err(fail)?;
+    if scale == Scale::Assumed {
+        // Lengths stay in the assumed metres; PSNR and SSIM are of the stretched images, as those of the whole are.
+        let (p, m) = (metrics::unit_range(predicted), metrics::unit_range(measured));
+        let unit = metrics::split(&p, &m, seen, 1.0).map_err(fail)?;
+        for (part, unit) in
+            [(&mut split.whole, unit.whole), (&mut split.seen, unit.seen), (&mut split.invented, unit.invented)]
+        {
+            (part.psnr_db, part.ssim) = (unit.psnr_db, unit.ssim);
+        }
+    }
+    Ok(Comparison { split: Some(split), ..whole })
 }
 
 /// An automatic mask that needs no model.

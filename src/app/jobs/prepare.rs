@@ -8,8 +8,9 @@ use super::super::inspect::Inspection;
 use super::super::keys::{CloudKey, ImprintKey, MaskRecipe, MaskVersion, PairKey, Request, RunKey, TouchKey};
 use super::super::services::SharedServices;
 use super::super::state::State;
-use super::{JobCx, Lane, compute, generate, inspect};
+use super::{JobCx, Lane, compute, generate, inspect, ledger};
 use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::metrics::footprint_mask;
 use crate::domain::sample::Sample;
 
 /// The body of a job.
@@ -146,12 +147,41 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             let predicted = results.imprints.get(&(recipe.clone(), *shift))?.clone();
             let sample = results.samples.get(&recipe.touch.pair)?.clone();
             let measured = Imprint::Measured(sample.clone(), recipe.touch);
+            let finger = recipe.touch.finger;
             job(
                 Lane::Compute,
                 "Compare prediction and measurement".into(),
                 Box::new(move |_| {
                     let measured = measured.get().ok_or_else(gone)?;
-                    Ok(Computed::Comparison(Arc::new(compute::compare(&predicted, measured, sample.scale)?)))
+                    let seen = footprint_mask(finger, measured.size());
+                    let found = compute::compare_parts(&predicted, measured, sample.scale, &seen)?;
+                    Ok(Computed::Comparison(Arc::new(found)))
+                }),
+            )
+        }
+        Request::Ledger(recipe, shift) => {
+            let prediction = results.predictions.get(recipe)?.clone();
+            let sample = results.samples.get(&recipe.touch.pair)?.clone();
+            let (finger, shift) = (recipe.touch.finger, *shift);
+            job(
+                Lane::Compute,
+                "Depth chain".into(),
+                Box::new(move |_| {
+                    let measured = sample.finger(finger).and_then(|t| t.bubble.as_ref()).map(|b| &b.imprint);
+                    Ok(Computed::Ledger(Arc::new(ledger::of_prediction(&prediction, shift, measured)?)))
+                }),
+            )
+        }
+        Request::Ambiguity(touch) => {
+            let sample = results.samples.get(&touch.pair)?.clone();
+            let finger = touch.finger;
+            job(
+                Lane::Compute,
+                "What the GelSlim image leaves open".into(),
+                Box::new(move |_| {
+                    let gelslim = sample.finger(finger).and_then(|t| t.gelslim.as_ref());
+                    let difference = &gelslim.ok_or_else(gone)?.difference;
+                    Ok(Computed::Ambiguity(crate::domain::ambiguity::ambiguity(difference)))
                 }),
             )
         }

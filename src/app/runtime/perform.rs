@@ -9,7 +9,7 @@ use super::super::evaluation::EvaluateCommand;
 use super::super::jobs::evaluate;
 use super::super::jobs::generate::generate;
 use super::super::jobs::prepare::Body;
-use super::super::jobs::{Cancel, JobCx, Lane, PreviewSink};
+use super::super::jobs::{Cancel, JobCx, Lane, PreviewSink, statistics};
 use super::super::results::Preview;
 use super::super::tasks::Ticket;
 use super::lanes::{Event, Job};
@@ -53,6 +53,15 @@ impl Runtime {
                     Ok(Command::Generated(ticket, made))
                 });
                 self.task(Lane::Models, ticket, what, body);
+            }
+            Effect::Refit { ticket, recipe, bundle, source } => {
+                let services = self.services.clone();
+                let body: Body<Command> = Box::new(move |cx| {
+                    let found = statistics::of_data_set(&*services, &*source, &recipe, &bundle, cx)?;
+                    let saved = services.save_statistics(&found)?;
+                    Ok(Command::Refitted(ticket, Box::new(found), saved.map(|file| file.display().to_string())))
+                });
+                self.task(Lane::Models, ticket, "Shift statistics".into(), body);
             }
             Effect::Cancel(ticket) => {
                 if let Some(cancel) = self.cancels.get(&ticket) {

@@ -28,6 +28,7 @@ use crate::io::atomic;
 use crate::io::dataset::Dataset;
 use crate::io::export_unet::{self, ExportConfig, ExportEntry};
 use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
+use crate::io::statistics::ShiftStatistics;
 
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";
@@ -355,6 +356,18 @@ impl Services for LiveServices {
         }
         let Some((_, model)) = loaded.as_mut() else { return Err(TaskError::new(what, "no model is loaded")) };
         model.predict(imprint).map_err(|err| TaskError::from_error(what, &err))
+    }
+
+    fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {
+        let Some(folder) = self.config_folder.as_ref().map(|folder| folder.join("statistics")) else { return Ok(None) };
+        let p = &statistics.provenance;
+        let hash = p.bundle_hash.get(..12).unwrap_or(&p.bundle_hash);
+        let dataset: String = p.dataset.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+        let file = folder.join(format!("{hash}-{dataset}.json"));
+        std::fs::create_dir_all(&folder)
+            .map_err(|err| TaskError::new("Keep the statistics", format!("{err} ({})", folder.display())))?;
+        statistics.write(&file).map_err(|err| TaskError::from_error("Keep the statistics", &err))?;
+        Ok(Some(file))
     }
 
     fn load_settings(&self) -> (Settings, Option<TaskError>) {

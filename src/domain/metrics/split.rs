@@ -110,7 +110,8 @@ mod tests {
         assert!(found.seen.ssim.unwrap() > found.invented.ssim.unwrap());
         assert_eq!(found.seen.pixels + found.invented.pixels, found.whole.pixels);
         let n = |f: Figures| f.pixels as f64;
-        let mean = (n(found.seen) * found.seen.mae.unwrap() + n(found.invented) * found.invented.mae.unwrap()) / n(found.whole);
+        let mean = (n(found.seen) * found.seen.mae.unwrap() + n(found.invented) * found.invented.mae.unwrap())
+            / n(found.whole);
         assert!((found.whole.mae.unwrap() - mean).abs() < 1e-12);
     }
 

@@ -158,7 +158,10 @@ impl List {
             FlagKind::Clamped,
             Stage::Metres,
             [
-                format!("{clamped} of {count} decoder values ({}) were outside -1 to 1 and were clamped.", text_percent(share)),
+                format!(
+                    "{clamped} of {count} decoder values ({}) were outside -1 to 1 and were clamped.",
+                    text_percent(share)
+                ),
                 "Beyond its range the model cannot say how deep: those pixels read the end of the range.".into(),
                 match severity {
                     Severity::Info => "A few are ordinary overshoot; nothing needs doing.".into(),
@@ -364,7 +367,11 @@ impl List {
             FlagKind::Calibration,
             Stage::Turned,
             [
-                format!("The line through prediction against truth has slope {:.2}, offset {}.", line.slope, text_mm(line.offset)),
+                format!(
+                    "The line through prediction against truth has slope {:.2}, offset {}.",
+                    line.slope,
+                    text_mm(line.offset)
+                ),
                 why.into(),
                 action.into(),
             ],

@@ -10,9 +10,9 @@ use crate::domain::metrics::{Joint, Line, mse, psnr};
 use crate::domain::resample::bilinear;
 
 /// Bars of a stage's histogram.
-pub const BARS: usize = 48;
+pub(super) const BARS: usize = 48;
 /// Bins per axis of the joint histogram.
-pub const JOINT_BINS: usize = 48;
+pub(super) const JOINT_BINS: usize = 48;
 /// A spread below this share of the values' size is rounding.
 const RELATIVE_NO_SPREAD: f64 = 1e-6;
 
@@ -107,7 +107,13 @@ impl Histogram {
     /// Of the finite pixels from the smallest to the largest; no bars without a pixel, one bar for equal ones.
     pub fn of(image: &Grid<f32>, stats: &Stats) -> Self {
         let (lo, hi) = (stats.min, stats.max);
-        let bars = if stats.count == 0 { 0 } else if stats.is_flat() { 1 } else { BARS };
+        let bars = if stats.count == 0 {
+            0
+        } else if stats.is_flat() {
+            1
+        } else {
+            BARS
+        };
         let mut counts = vec![0; bars];
         for v in image.as_slice().iter().filter(|v| v.is_finite()) {
             let at = (f64::from(*v) - lo) / (hi - lo) * bars as f64;
@@ -188,11 +194,7 @@ impl Ledger {
 ///
 /// # Errors
 /// See [`PostprocessError`].
-pub fn ledger(
-    chain: &DepthChain,
-    raw: &RawPrediction,
-    truth: Option<&DepthMap>,
-) -> Result<Ledger, PostprocessError> {
+pub fn ledger(chain: &DepthChain, raw: &RawPrediction, truth: Option<&DepthMap>) -> Result<Ledger, PostprocessError> {
     let (result, stages) = chain.run_with_ledger(raw)?;
     let against = truth.and_then(|truth| {
         let result = fitted(&result, truth);

@@ -1,0 +1,274 @@
+//! `touch2touch ledger`: everything between a decoder's picture and metres, for one touch.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+
+use super::predict::{ModelArgs, Predictor};
+use super::{Common, Output, VerbResult};
+use crate::app::jobs::compute::LAB_PEAK_M;
+use crate::app::jobs::ledger::reading_chains;
+use crate::domain::ambiguity::{Ambiguity, ambiguity};
+use crate::domain::colormap::{ColorMap, NAN_COLOR, Range};
+use crate::domain::grid::{DepthMap, Grid, RgbGrid};
+use crate::domain::metrics::Line;
+use crate::domain::postprocess::{
+    ChainReading, Flag, Histogram, Ledger, Mapping, Orientation, Shift, Stats, ledger, readings,
+};
+use crate::domain::sensor::Finger;
+use crate::domain::units::{fixed, mm};
+use crate::io::images;
+
+/// Arguments of `ledger`.
+#[derive(Debug, Args)]
+pub(super) struct LedgerArgs {
+    /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.
+    #[arg(long)]
+    input: PathBuf,
+    /// The pair, by its name or a part of it that no other has.
+    #[arg(long)]
+    pair: String,
+    /// Which finger (an image folder has only one).
+    #[arg(long, value_enum, default_value_t = OneFinger::Right)]
+    finger: OneFinger,
+    /// Read the decoder's range as it is meant instead of twice; leaves no shift to be done.
+    #[arg(long, value_enum, conflicts_with = "shift")]
+    mapping: Option<MappingArg>,
+    /// A folder for a picture of every stage (16-bit PNG, stretched to its own range) and of the joint histogram;
+    /// created if missing.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum OneFinger {
+    Right,
+    Left,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum MappingArg {
+    /// As the model means it, without a shift.
+    Correct,
+    /// Twice, as the released script does; the shift (see --shift) follows.
+    Doubled,
+}
+
+#[derive(Debug, Serialize)]
+struct StageReport {
+    name: String,
+    how: String,
+    /// `m` or `1` (the decoder's -1 to 1).
+    unit: &'static str,
+    size: [usize; 2],
+    stats: Stats,
+    /// Pixels that are no numbers.
+    invalid: usize,
+    histogram: Histogram,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    note: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct AgainstReport {
+    /// Pixels compared.
+    pixels: usize,
+    /// `prediction = slope · truth + offset` (offset and deviation in metres).
+    line: Option<Line>,
+    correlation: Orientation,
+    joint: JointReport,
+}
+
+#[derive(Debug, Serialize)]
+struct JointReport {
+    /// Ends of both axes, metres.
+    range_m: [f64; 2],
+    bins: usize,
+    /// Row by row: one row per prediction bin (smallest first), one number per truth bin.
+    counts: Vec<Vec<u32>>,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    pair: String,
+    finger: &'static str,
+    bundle: String,
+    bundle_hash: String,
+    shift: &'static str,
+    steps: u32,
+    seed: u64,
+    scale: &'static str,
+    stages: Vec<StageReport>,
+    against_truth: Option<AgainstReport>,
+    /// The same picture in every other way to metres.
+    readings: Vec<ChainReading>,
+    ambiguity: Option<Ambiguity>,
+    flags: Vec<Flag>,
+}
+
+pub(super) fn run(args: &LedgerArgs) -> VerbResult {
+    let dataset = super::open(&args.input)?;
+    let id = super::find_pair(&dataset, &args.pair)?;
+    let name = dataset.index.pairs[id.0 as usize].name.clone();
+    let sample = dataset.load(id)?;
+    let asked = match args.finger {
+        OneFinger::Right => Finger::Right,
+        OneFinger::Left => Finger::Left,
+    };
+    // An image folder has one finger, whichever it was.
+    let there: Vec<Finger> = Finger::BOTH.into_iter().filter(|f| sample.finger(*f).is_some()).collect();
+    let finger = if let [only] = there[..] { only } else { asked };
+    let touch = sample.finger(finger).ok_or_else(|| anyhow::anyhow!("{name}: there is no {} finger", finger.name()))?;
+    let gelslim = touch.gelslim.as_ref().ok_or_else(|| anyhow::anyhow!("{name}: no GelSlim image"))?;
+    let truth = touch.bubble.as_ref().map(|b| &b.imprint);
+
+    let output = Output::new(args.common, "generating", 1);
+    let mut predictor = Predictor::new(&args.model);
+    let config = predictor.config()?;
+    let shift = predictor.shift();
+    let generator = predictor.generator()?;
+    let raw = generator.generate(&gelslim.difference, &config, &mut |_| ControlFlow::Continue(()))?;
+    let spec = generator.spec();
+    let mut chain = spec.depth_chain(shift)?;
+    let mut shift_name = shift.label();
+    if let Some(MappingArg::Correct) = args.mapping {
+        (chain.mapping, chain.shift, shift_name) = (Mapping::Correct, Shift::None, "Correct mapping");
+    }
+    let modes = reading_chains(shift, |mode| spec.depth_chain(mode).ok());
+    let found = ledger(&chain, &raw, truth)?;
+    let readings = readings(&chain, &modes, &raw, truth, LAB_PEAK_M);
+    if let Some(out) = &args.out {
+        std::fs::create_dir_all(out)
+            .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;
+        pictures(out, &found)?;
+    }
+    let report = Report {
+        pair: name,
+        finger: finger.name(),
+        bundle: predictor.bundle_name().to_owned(),
+        bundle_hash: predictor.bundle_hash().to_owned(),
+        shift: shift_name,
+        steps: config.steps,
+        seed: config.seed,
+        scale: super::scale_name(sample.scale),
+        against_truth: found.against.as_ref().map(|a| AgainstReport {
+            pixels: a.joint.pixels,
+            line: a.joint.line,
+            correlation: a.orientation,
+            joint: JointReport {
+                range_m: [a.joint.lo, a.joint.hi],
+                bins: a.joint.counts.width(),
+                counts: (0..a.joint.counts.height()).map(|y| a.joint.counts.row(y).to_vec()).collect(),
+            },
+        }),
+        stages: found.stages.iter().map(stage).collect(),
+        readings,
+        ambiguity: ambiguity(&gelslim.difference),
+        flags: found.flags,
+    };
+    output.finish(&report, || text(&report))?;
+    Ok(true)
+}
+
+fn stage(record: &crate::domain::postprocess::StageRecord) -> StageReport {
+    StageReport {
+        name: record.stage.name(),
+        how: record.how.clone(),
+        unit: if record.stage.is_metres() { "m" } else { "1" },
+        size: record.image.size(),
+        stats: record.stats,
+        invalid: record.invalid,
+        histogram: record.histogram.clone(),
+        note: record.note.clone(),
+    }
+}
+
+/// `01-decoder-channel-1.png` and so on: colours over the stage's own range; NaN is grey.
+fn pictures(out: &std::path::Path, ledger: &Ledger) -> anyhow::Result<()> {
+    for (i, record) in ledger.stages.iter().enumerate() {
+        let range = Range { lo: record.stats.min as f32, hi: record.stats.max as f32 };
+        let name = record.stage.name().to_lowercase().replace(' ', "-");
+        images::write_rgb8(&out.join(format!("{:02}-{name}.png", i + 1)), &coloured(&record.image, range))?;
+    }
+    if let Some(against) = &ledger.against {
+        let counts = &against.joint.counts;
+        let most = counts.as_slice().iter().copied().max().unwrap_or(1).max(1);
+        // Roots, so that the few deep pixels are seen beside the many shallow ones; prediction upwards.
+        let shares: DepthMap = counts.map(|&c| (f64::from(c) / f64::from(most)).powf(0.25) as f32).rows_reversed();
+        images::write_rgb8(&out.join("joint-histogram.png"), &coloured(&shares, Range { lo: 0.0, hi: 1.0 }))?;
+    }
+    Ok(())
+}
+
+fn coloured(image: &DepthMap, range: Range) -> RgbGrid {
+    Grid::from_fn(image.width(), image.height(), |x, y| {
+        let v = image[(x, y)];
+        if v.is_finite() { ColorMap::Viridis.rgb8(range.unit(v)).map(f32::from) } else { NAN_COLOR.map(|c| 255.0 * c) }
+    })
+}
+
+fn text(report: &Report) -> String {
+    let mut text = format!(
+        "{} {}, {}, {}, {} steps, seed {}\n\n{:<20} {:>9} {:>9} {:>9} {:>9}  {}\n",
+        report.pair,
+        report.finger,
+        report.bundle,
+        report.shift,
+        report.steps,
+        report.seed,
+        "stage",
+        "min",
+        "mean",
+        "std",
+        "max",
+        ""
+    );
+    for s in &report.stages {
+        let numbers = [s.stats.min, s.stats.mean, s.stats.std, s.stats.max]
+            .map(|v| if s.unit == "m" { format!("{} mm", fixed(mm(v), 2)) } else { fixed(v, 3) });
+        let [min, mean, std, max] = numbers;
+        text += &format!("{:<20} {min:>9} {mean:>9} {std:>9} {max:>9}  {}\n", s.name, s.how);
+    }
+    if let Some(line) = report.against_truth.as_ref().and_then(|a| a.line) {
+        text += &format!(
+            "\nprediction = {:.3} · truth {} {} mm (robust; deviation {} mm)\n",
+            line.slope,
+            if line.offset < 0.0 { "-" } else { "+" },
+            fixed(mm(line.offset.abs()), 2),
+            fixed(mm(line.deviation), 2)
+        );
+    }
+    text += &format!(
+        "\n{:<24} {:>9} {:>9} {:>9} {:>9} {:>9}\n",
+        "reading", "mean mm", "std mm", "slope", "offset mm", "PSNR dB"
+    );
+    for r in &report.readings {
+        let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| fixed(v, digits));
+        text += &format!(
+            "{:<24} {:>9} {:>9} {:>9} {:>9} {:>9}\n",
+            r.name,
+            fixed(mm(r.stats.mean), 2),
+            fixed(mm(r.stats.std), 2),
+            number(r.line.map(|l| l.slope), 3),
+            number(r.line.map(|l| mm(l.offset)), 2),
+            number(r.psnr_db, 1)
+        );
+    }
+    if let Some(warning) = report.ambiguity.and_then(|a| a.warning()) {
+        text += &format!("\n{warning}\n");
+    }
+    if report.flags.is_empty() {
+        text += "\nnothing implausible\n";
+    }
+    for flag in &report.flags {
+        let severity = format!("{:?}", flag.severity).to_lowercase();
+        text += &format!("\n{severity}, {}: {}", flag.stage.to_lowercase(), flag.text());
+    }
+    text
+}
