@@ -1,5 +1,8 @@
 //! The program as a user runs it: one JSON object on standard output, exit codes that mean what they say.
 
+#[cfg(feature = "onnx")]
+mod chain;
+
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -362,7 +362,7 @@ mod running {
         }
         assert_ne!(depth(ShiftMode::PaperShift), exact);
         let (_, ledger) = generator.spec().depth_chain(ShiftMode::PaperShift).unwrap().run_with_ledger(&raw).unwrap();
-        assert_eq!(ledger.len(), 4);
+        assert_eq!(ledger.len(), raw.channels.len() + 5);
     }
 
     #[test]

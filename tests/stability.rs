@@ -2,6 +2,8 @@
 //!
 //! The numbers are those of the list of failures that the product is held to (E1 to E12, E24).
 
+mod chain;
+
 use std::sync::LazyLock;
 use std::time::Duration;
 

@@ -7,6 +7,7 @@ mod layout;
 mod look;
 mod rig;
 
+mod chain;
 mod generate;
 mod inspect;
 mod job;

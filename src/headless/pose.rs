@@ -13,6 +13,7 @@ use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::align::{AlignReport, Ask, LabIcpConfig, PaperTrap, Register, lab_starts};
+use crate::domain::ambiguity::{Ambiguity, ambiguity};
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
@@ -143,6 +144,9 @@ struct Case {
     accepted: Option<Accepted>,
     #[serde(skip_serializing_if = "Option::is_none")]
     report: Option<AlignReport>,
+    /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ambiguity: Option<[Option<Ambiguity>; 2]>,
 }
 
 /// An accepted pose in the sense of the other numbers of a [`Case`].
@@ -295,6 +299,8 @@ fn pose_cases(
         Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
     });
     let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
+    // What was measured is as it is; what was predicted may have had nothing to go by.
+    let left_open = predicted.then(|| Finger::BOTH.map(|f| ambiguity(&sample.finger(f)?.gelslim.as_ref()?.difference)));
     Ok(engines
         .iter()
         .map(|&engine| {
@@ -321,6 +327,7 @@ fn pose_cases(
                 },
                 accepted: accepted.map(|a| Accepted::new(a, truth)),
                 report: result.ok().map(|r| r.report).filter(|_| args.trace),
+                ambiguity: left_open,
             }
         })
         .collect())

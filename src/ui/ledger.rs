@@ -92,7 +92,10 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger) {
         }
         ui.label(caption("Shift", cx.p));
         let current = cx.state.settings.shift;
-        let combo = egui::ComboBox::from_id_salt("chain shift").width(150.0).truncate().selected_text(current.label());
+        let combo = egui::ComboBox::from_id_salt("chain shift")
+            .width((ui.available_width() - 12.0).clamp(60.0, 170.0))
+            .truncate()
+            .selected_text(current.label());
         let response = combo.show_ui(ui, |ui| {
             let own = cx.state.settings.refit.map(ShiftMode::Refit);
             for mode in ShiftMode::iter().chain(own) {
@@ -198,9 +201,10 @@ fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: Finger) {
     let color = if record.stage == Stage::Turned { side_color(cx.p, ImprintSource::Predicted) } else { cx.p.strong };
     text.text(pos2(x, rect.top() + 1.0), Align2::LEFT_TOP, &name, FontId::new(12.0, medium()), color);
     text.text(pos2(x, rect.top() + 15.0), Align2::LEFT_TOP, &record.how, FontId::proportional(10.0), cx.p.weak);
-    let column = ((right - 6.0 - x) / 4.0).min(FIGURE + 6.0);
+    // Room for the unit after the last.
+    let column = ((right - 6.0 - x - 18.0) / 4.0).min(FIGURE + 6.0);
     for (i, (label, value)) in figures.iter().enumerate() {
-        let at = x + column * (i as f32 + 1.0) - 6.0;
+        let at = x + column * (i as f32 + 1.0) - 4.0;
         text.text(pos2(at, rect.top() + 27.0), Align2::RIGHT_TOP, label, FontId::proportional(9.0), cx.p.weak);
         text.text(pos2(at, rect.top() + 37.0), Align2::RIGHT_TOP, value, small.clone(), cx.p.strong);
     }
@@ -236,7 +240,7 @@ fn against(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: Finger) {
     );
     match &found.ledger.against {
         Some(found) => {
-            let side = ui.available_width().clamp(96.0, 220.0);
+            let side = ui.available_width().clamp(96.0, 340.0);
             let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), side), Sense::hover());
             let joint = &found.joint;
             let line = joint.line;
@@ -282,7 +286,7 @@ fn readings(cx: &mut Cx<'_>, ui: &mut Ui, readings: &[ChainReading]) {
     ui.spacing_mut().item_spacing.y = 0.0;
     let width = ui.available_width();
     let column = ((width - 118.0) / 4.0).clamp(30.0, 56.0);
-    let mut row = |ui: &mut Ui, name: &str, cells: [String; 4], on: bool, clickable: bool, head: bool| {
+    let row = |ui: &mut Ui, name: &str, cells: [String; 4], on: bool, clickable: bool, head: bool| {
         let sense = if clickable { Sense::click() } else { Sense::hover() };
         let (rect, response) = ui.allocate_exact_size(vec2(width, 16.0), sense);
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Reading {name}")));

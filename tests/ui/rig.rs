@@ -23,6 +23,7 @@ use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::sensor::bubble;
 use touch2touch::domain::sim;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::ui::{Options, StudioApp};
 
 /// The program's services with a generator that answers at once.
@@ -138,6 +139,10 @@ impl Services for QuickGenerator {
         imprint: &DepthMap,
     ) -> Result<Mask, TaskError> {
         self.live.mask_by_model(bundle, runtime, imprint)
+    }
+
+    fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {
+        self.live.save_statistics(statistics)
     }
 
     fn load_settings(&self) -> (Settings, Option<TaskError>) {

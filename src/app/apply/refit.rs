@@ -2,7 +2,7 @@
 
 use super::super::effect::Effect;
 use super::super::error::TaskError;
-use super::super::keys::{Recipe, ShiftMode};
+use super::super::keys::ShiftMode;
 use super::super::library::BundleKind;
 use super::super::state::State;
 use super::save_settings;
@@ -27,17 +27,8 @@ pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
     else {
         return;
     };
-    let settings = &state.settings.generate;
-    let recipe = Recipe {
-        touch,
-        bundle: bundle.id.clone(),
-        steps: settings.steps,
-        seed: settings.seed,
-        sampler: settings.sampler,
-        eta: settings.eta.into(),
-        runtime: state.settings.runtime,
-    };
-    let ticket = state.tasks.start(format!("{TITLE} of {}", source.title()), None);
+    let Some(recipe) = state.recipe(touch) else { return };
+    let ticket = state.tasks.start(format!("{TITLE} of {}", source.title()), Vec::new());
     effects.push(Effect::Refit { ticket, recipe, bundle, source });
 }
 

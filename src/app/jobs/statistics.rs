@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::super::error::TaskError;
-use super::super::keys::{Recipe, ShiftMode, TouchKey};
+use super::super::keys::{PairKey, Recipe, ShiftMode, TouchKey};
 use super::super::library::BundleInfo;
 use super::super::results::Prediction;
-use super::super::services::{DataSource, Services};
+use super::super::services::{DataSource, GenerateItem, Services};
 use super::JobCx;
 use super::compute::chain;
 use crate::domain::dataset::PairId;
@@ -115,11 +115,12 @@ pub fn of_data_set(
             Ok(Arc::new(sample))
         },
         |pair, finger, difference| {
-            let touch = TouchKey { pair: super::super::keys::PairKey { pair, ..recipe.touch.pair }, finger };
-            let recipe = Recipe { touch, ..recipe.clone() };
-            let output = services.generate(&recipe, bundle, difference, &quiet)?;
+            let touch = TouchKey { pair: PairKey { pair, ..recipe.touch.pair }, finger };
+            let item = GenerateItem { recipe: Recipe { touch, ..recipe.clone() }, difference, size: [0, 0] };
+            let made = services.generate(bundle, std::slice::from_ref(&item), &quiet)?;
+            let output = made.into_iter().next().ok_or_else(|| TaskError::new(WHAT, "the model gave no answer"))?;
             engine.clone_from(&output.runtime);
-            let prediction = Prediction { recipe, output, seconds: 0.0 };
+            let prediction = Prediction { recipe: item.recipe, output, seconds: 0.0 };
             let chain = chain(&prediction, ShiftMode::Raw)?;
             Ok((prediction.output.raw, chain))
         },
