@@ -473,7 +473,7 @@ impl Wanted<'_> {
             if compared {
                 self.comparison(finger, pair.finger(finger));
             }
-            if image || (on_screen && metrics) {
+            if image || (on_screen && state.is_visible(&[Pane::Metrics])) {
                 self.ambiguity(finger, pair.finger(finger));
             }
             let drawn = on_screen && (state.settings.mask_visible || state.is_visible(&[Pane::Masks]));
@@ -496,7 +496,7 @@ impl Wanted<'_> {
             }
             self.inspection();
         }
-        if metrics || state.is_visible(&[Pane::Ledger]) {
+        if state.is_visible(&[Pane::Metrics, Pane::Ledger]) {
             self.ledger(pair.finger(state.selection.finger));
         }
     }
