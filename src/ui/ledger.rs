@@ -240,7 +240,7 @@ fn against(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: Finger) {
     );
     match &found.ledger.against {
         Some(found) => {
-            let side = ui.available_width().clamp(96.0, 340.0);
+            let side = ui.available_width().clamp(96.0, 220.0);
             let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), side), Sense::hover());
             let joint = &found.joint;
             let line = joint.line;
