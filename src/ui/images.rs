@@ -461,15 +461,17 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
         Pane::Predicted => state.chosen(finger).map_or(String::new(), |recipe| {
             format!("seed {} · {} steps · {}", recipe.seed, recipe.steps, state.settings.shift.label().to_lowercase())
         }),
-        Pane::Error => state.comparison(finger).ready().map_or(String::new(), |c| {
-            let part = |mae: Option<f64>| mae.map_or("–".to_owned(), |v| units::fixed(units::mm(v), 2));
-            let whole = format!("mean |error| {}", units::text_mm(c.mae_m));
-            c.split.map_or(whole.clone(), |s| {
-                format!("{whole} · seen {} · invented {}", part(s.seen.mae), part(s.invented.mae))
-            })
-        }),
+        Pane::Error => state
+            .comparison(finger)
+            .ready()
+            .map_or(String::new(), |c| format!("mean |error| {}", units::text_mm(c.mae_m))),
         _ => String::new(),
     };
+    if let Some(split) = state.comparison(finger).ready().and_then(|c| c.split).filter(|_| pane == Pane::Error) {
+        let part = |mae: Option<f64>| mae.map_or("–".to_owned(), units::text_mm);
+        let text = format!("seen {} · invented {}", part(split.seen.mae), part(split.invented.mae));
+        output.caption(Align2::RIGHT_BOTTOM, &text, cx.p.strong_on_image());
+    }
     if let Some(warning) = state.ambiguity(finger).and_then(|a| a.caption()).filter(|_| pane == Pane::Predicted) {
         output.caption(Align2::RIGHT_BOTTOM, warning, super::theme::DARK.caution);
     }
