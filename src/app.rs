@@ -23,6 +23,7 @@ pub mod keys;
 pub mod library;
 pub mod results;
 pub mod runtime;
+pub mod seeds;
 pub mod services;
 pub mod settings;
 pub mod state;

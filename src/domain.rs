@@ -10,6 +10,7 @@ pub mod colormap;
 pub mod contact;
 pub mod dataset;
 pub mod diffusion;
+pub mod ensemble;
 pub mod evaluation;
 pub mod frames;
 pub mod grid;

@@ -1,6 +1,6 @@
 //! The command line: every verb calls the code that the studio's buttons call.
 //!
-//! With `--json`, standard output carries exactly one JSON object; progress, notes and errors go to standard error.
+//! With `--json`, standard output carries exactly one JSON object (`watch`: one a line, as things happen); progress, notes and errors go to standard error.
 //! The exit code is 0 only when everything asked for was done.
 
 mod basin;
@@ -16,8 +16,10 @@ mod models;
 mod output;
 mod pose;
 mod predict;
+mod seeds;
 mod simulate;
 mod stats;
+mod watch;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -53,6 +55,8 @@ enum Verb {
     Ledger(Box<ledger::LedgerArgs>),
     /// Statistics of a dataset's predictions and measurements, for the shift `--shift refit`.
     Stats(stats::StatsArgs),
+    /// Follow a folder: predict and pose each GelSlim touch that appears, and write the result beside it.
+    Watch(Box<watch::WatchArgs>),
     /// Estimate in-hand poses from measured or predicted imprints.
     Pose(pose::PoseArgs),
     /// The paper's results table of a dataset: generators side by side, with the measured imprints as the upper bound.
@@ -106,6 +110,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Generate(args)) => generate::run(&args),
         Some(Verb::Ledger(args)) => ledger::run(&args),
         Some(Verb::Stats(args)) => stats::run(&args),
+        Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
         Some(Verb::Basin(args)) => basin::run(&args),

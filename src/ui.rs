@@ -30,6 +30,7 @@ mod saved;
 mod scene;
 mod scene_view;
 mod screenshot;
+mod seeds;
 mod settings_pane;
 mod shortcuts;
 mod table;

@@ -16,6 +16,8 @@ use touch2touch::io::masks::{MaskStore, StoredReview};
 
 use crate::support;
 
+mod watch;
+
 fn run(args: &[&str], data: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_touch2touch"))
         .args(args)

@@ -45,6 +45,7 @@ fn touch(seed: f32) -> Sample {
                 truth: Some(BubbleTruth { imprint: imprint.map(|v| v * 0.5), contact: imprint.map(|&v| v > 0.005) }),
                 imprint,
             }),
+            rig: None,
         })
     });
     let pose = PlanarPose::object_from_grasp_of_lab(0.1 + f64::from(seed) * 0.01, 0.002, -0.003).inverse();

@@ -8,8 +8,10 @@ mod look;
 mod rig;
 
 mod chain;
+mod follow;
 mod generate;
 mod inspect;
 mod job;
 mod results;
+mod seeds;
 mod workbench;

@@ -8,6 +8,7 @@ use super::evaluation::EvaluateCommand;
 use super::inspect::{InspectCommand, Inspected};
 use super::keys::{ImprintSource, PoseEngine, Request, ShiftMode};
 use super::library::Place;
+use super::seeds::SeedsCommand;
 use super::settings::{ColourRange, MaskTool, Theme, Workspace};
 use super::state::State;
 use super::workbench::{Layer, SceneTool, WorkbenchCommand};
@@ -228,6 +229,7 @@ use Key as K;
 actions! {
     OpenFolder, File, "Open folder…", "Opens a folder with the lab's files or with images", [ctrl(K::O), ctrl_shift(K::O)];
     OpenDemo, File, "Open the demo", "Opens the built-in simulated data", [];
+    Follow, File, "Follow the folder", "Shows and predicts each touch that arrives in the open folder, or stops", [ctrl_shift(K::F)];
     Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)];
     Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)];
     ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
@@ -245,6 +247,7 @@ actions! {
 
     Generate, Generate, "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", [ctrl(K::G)];
     GenerateNewSeed, Generate, "Generate with a new seed", "Draws another seed, then generates", [ctrl_shift(K::G)];
+    RunSeeds, Generate, "Several seeds", "Predicts the touch with several seeds, one after the other, or stops; shows where they disagree", [];
     LockSeed, Generate, "Lock the seed", "Keeps the seed when generating again, or draws a new one each time", [ctrl(K::L)];
     EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [];
     ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown and JSON", [];
@@ -381,6 +384,10 @@ impl Action {
             Self::OpenFolder => ui(UiRequest::PickFolder),
             Self::OpenDemo => Some(Command::Open(Place::Demo)),
             Self::Reload => when(open, Command::Reload),
+            Self::Follow => {
+                let folder = state.library.open.as_ref().is_some_and(|open| open.source.root().is_some());
+                when(folder, Command::SetFollow(state.library.follow.is_none()))
+            }
             Self::Save => Some(Command::Save),
             Self::ExportMasks => when(open, Command::Ui(UiRequest::PickExportFolder)),
 
@@ -407,6 +414,10 @@ impl Action {
                 when(ready, Command::Evaluate(EvaluateCommand::Start))
             }
             Self::ExportTable => when(state.table.result.is_some(), Command::Ui(UiRequest::PickTableFolder)),
+            Self::RunSeeds => {
+                let possible = state.can_generate().is_ok() && state.selection.panes.contains(&Pane::Seeds);
+                when(possible, Command::Seeds(SeedsCommand::Run(!state.seeds.running)))
+            }
             Self::LockSeed => {
                 let mut generate = settings.generate.clone();
                 generate.seed_locked = !generate.seed_locked;
@@ -419,6 +430,8 @@ impl Action {
                     Some(Command::Workbench(command))
                 } else if state.tasks.demanded.iter().any(|r| matches!(r, Request::Basin(_))) {
                     Some(Command::Inspect(InspectCommand::StopBasin))
+                } else if state.seeds_to_come() > 0 {
+                    Some(Command::Seeds(SeedsCommand::Run(false)))
                 } else {
                     when(!state.tasks.running.is_empty(), Command::CancelAll)
                 }

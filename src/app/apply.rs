@@ -2,6 +2,7 @@
 
 mod answers;
 mod evaluate;
+mod follow;
 mod generate;
 mod inspect;
 mod masks;
@@ -36,6 +37,7 @@ fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
                 open(state, place, effects);
             }
         }
+        Command::SetFollow(on) => follow::set(state, on, effects),
         Command::ForgetRecent(place) => {
             state.settings.recent.retain(|p| *p != place);
             save_settings(state, effects);
@@ -80,6 +82,7 @@ fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
         Command::Generate => generate::generate(state, false, effects),
         Command::GenerateNewSeed => generate::generate(state, true, effects),
         Command::Refit => refit::start(state, effects),
+        Command::Seeds(command) => state.seeds.step(command),
         Command::Choose(recipe) => {
             if state.results.predictions.contains(&recipe) {
                 state.results.chosen.insert(recipe.touch, recipe);

@@ -13,8 +13,9 @@ use super::evaluation::EvaluateCommand;
 use super::inspect::{InspectCommand, Inspection};
 use super::keys::{DatasetSeq, ImprintSource, PoseEngine, Recipe, Request, ShiftMode};
 use super::library::{BundleInfo, Place, Sort};
-use super::results::{Clouds, Comparison, LayerResult, LedgerResult, PoseResult, Prediction, Preview};
-use super::services::{DataSource, NamedTool};
+use super::results::{Clouds, Comparison, Ensemble, LayerResult, LedgerResult, PoseResult, Prediction, Preview};
+use super::seeds::SeedsCommand;
+use super::services::{DataSource, Followed, NamedTool};
 use super::settings::{
     ColourMap, ColourRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, RuntimeChoice, Settings, Theme,
     Workspace,
@@ -59,6 +60,8 @@ pub enum Pane {
     BasinMap,
     /// The generator.
     Generate,
+    /// Several seeds of one touch.
+    Seeds,
     /// The mask tools.
     Masks,
     /// Residuals, reasons, distances and observability of a registration.
@@ -142,6 +145,8 @@ pub enum Command {
     Open(Place),
     /// Opens the same place again.
     Reload,
+    /// Follows the folder that is open, or stops: what arrives is shown and predicted.
+    SetFollow(bool),
     /// Removes a place from the recent ones.
     ForgetRecent(Place),
     /// Narrows the list.
@@ -188,6 +193,8 @@ pub enum Command {
     GenerateNewSeed,
     /// Computes shift statistics of the open data set with the generator and its settings, then uses them.
     Refit,
+    /// Several seeds of the selected touch.
+    Seeds(SeedsCommand),
     /// Shows another prediction of the same touch.
     Choose(Recipe),
     /// Tells a job to stop.
@@ -302,6 +309,8 @@ pub enum Command {
     ResetSettings,
 
     // Answers of the runtime
+    /// A touch arrived in the followed folder.
+    Followed(DatasetSeq, Followed),
     /// A data set was opened.
     Opened(Ticket, DatasetSeq, Place, Opened),
     /// Bundles were looked for.
@@ -368,6 +377,8 @@ pub enum Computed {
     Ledger(Arc<LedgerResult>),
     /// Of [`Request::Ambiguity`]; `None` for an image without a finite pixel.
     Ambiguity(Option<Ambiguity>),
+    /// Of [`Request::Ensemble`].
+    Ensemble(Arc<Ensemble>),
     /// Of [`Request::Mask`].
     Mask(Arc<Mask>),
     /// Of [`Request::Cloud`].

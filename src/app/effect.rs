@@ -26,6 +26,8 @@ pub enum Effect {
         /// What to open.
         place: Place,
     },
+    /// Follow the folder of a data set, or none any more.
+    Follow(Option<(DatasetSeq, Arc<dyn DataSource>)>),
     /// Look for bundles.
     FindBundles(Vec<PathBuf>),
     /// Make predictions of one pair, all in one go.
@@ -97,6 +99,7 @@ impl std::fmt::Debug for Effect {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Open { place, .. } => write!(f, "Open({place})"),
+            Self::Follow(of) => write!(f, "Follow({:?})", of.as_ref().map(|(seq, _)| seq)),
             Self::FindBundles(folders) => write!(f, "FindBundles({folders:?})"),
             Self::Generate { ticket, recipes, .. } => write!(f, "Generate({ticket:?}, {recipes:?})"),
             Self::Refit { ticket, recipe, .. } => write!(f, "Refit({ticket:?}, {recipe:?})"),

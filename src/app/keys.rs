@@ -255,6 +255,15 @@ pub struct BasinKey {
     pub plane: Plane,
 }
 
+/// Several predictions of one touch, as far as they are there.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct EnsembleKey {
+    /// At least one; they differ in their seeds.
+    pub recipes: Vec<Recipe>,
+    /// How they become metres.
+    pub shift: ShiftMode,
+}
+
 /// A result that is computed because a visible pane shows it. Ordered, hashable: it is its own key.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Request {
@@ -268,6 +277,10 @@ pub enum Request {
     Stored(TouchKey),
     /// The prediction that a pane needs because the one of the other finger was made.
     Prediction(Recipe),
+    /// A prediction with one of several seeds.
+    Seed(Recipe),
+    /// Mean and spread of several predictions.
+    Ensemble(EnsembleKey),
     /// A prediction in metres (of a raw prediction that exists).
     Imprint(Recipe, ShiftMode),
     /// A prediction against the measurement.
@@ -302,9 +315,11 @@ impl Request {
             Self::Tool(dataset, _) => Some(*dataset),
             Self::Stored(touch) | Self::Ambiguity(touch) => Some(touch.pair.dataset),
             Self::Prediction(recipe)
+            | Self::Seed(recipe)
             | Self::Imprint(recipe, _)
             | Self::Comparison(recipe, _)
             | Self::Ledger(recipe, _) => Some(recipe.touch.pair.dataset),
+            Self::Ensemble(key) => key.recipes.first().map(|recipe| recipe.touch.pair.dataset),
             Self::Mask(key) => Some(key.imprint.touch().pair.dataset),
             Self::Cloud(key)
             | Self::Pose(PoseKey { cloud: key, .. })

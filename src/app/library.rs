@@ -129,6 +129,17 @@ pub enum BundleKind {
     Classifier,
 }
 
+/// A folder that is followed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Follow {
+    /// Touches that arrived.
+    pub arrived: usize,
+    /// Files among them that could not be read.
+    pub broken: usize,
+    /// The name of the newest.
+    pub newest: Option<String>,
+}
+
 /// The open data set and its list.
 #[derive(Clone, Debug, Default)]
 pub struct Library {
@@ -140,6 +151,8 @@ pub struct Library {
     pub failure: Option<TaskError>,
     /// The number of the last opening.
     pub last_seq: DatasetSeq,
+    /// What was seen of the folder while it is followed; `None` while it is not.
+    pub follow: Option<Follow>,
     /// Shows only pairs whose name or tool contains every word (any case). `tool:`, `is:` narrow a word.
     pub filter: String,
     /// Shows only this tool.

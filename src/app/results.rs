@@ -7,12 +7,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::DVec3;
 
 use super::inspect::Inspection;
-use super::keys::{BasinKey, CloudKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, RunKey, ShiftMode, TouchKey};
+use super::keys::{
+    BasinKey, CloudKey, EnsembleKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, RunKey, ShiftMode, TouchKey,
+};
 use super::services::{Generated, NamedTool};
 use crate::domain::align::basin::Basin;
 use crate::domain::align::reason::{Reason, ReasonCounts};
 use crate::domain::align::{AlignReport, Directions, PointFit, TraceStep};
 use crate::domain::ambiguity::Ambiguity;
+use crate::domain::ensemble::Spread;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::metrics::Split;
@@ -132,6 +135,22 @@ pub struct Preview {
     pub of: u32,
     /// As the model sees it now, metres, as large as the bubble image.
     pub depth: DepthMap,
+}
+
+/// Several predictions of one touch against each other.
+#[derive(Clone, Debug)]
+pub struct Ensemble {
+    /// Around their mean, metres.
+    pub spread: Spread,
+    /// Mean over them of the spread of the decoder's channels, metres; `None` for a decoder of one channel.
+    pub channels: Option<DepthMap>,
+}
+
+impl Ensemble {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        4 * (2 * self.spread.mean.len() + self.channels.as_ref().map_or(0, Grid::len))
+    }
 }
 
 /// A prediction against the measurement of the same touch.
@@ -292,6 +311,8 @@ pub struct Results {
     pub predictions: Cache<Recipe, Prediction>,
     /// Predictions in metres, as large as the bubble image.
     pub imprints: Cache<(Recipe, ShiftMode), DepthMap>,
+    /// Several predictions of one touch.
+    pub ensembles: Cache<EnsembleKey, Ensemble>,
     /// Predictions against measurements.
     pub comparisons: Cache<(Recipe, ShiftMode), Comparison>,
     /// Depth chains.
@@ -340,6 +361,7 @@ impl Default for Results {
             thumbnails: Cache::new(32 * MIB),
             predictions: Cache::new(256 * MIB),
             imprints: Cache::new(64 * MIB),
+            ensembles: Cache::new(32 * MIB),
             comparisons: Cache::new(32 * MIB),
             ledgers: Cache::new(24 * MIB),
             ambiguities: Cache::new(MIB),
@@ -369,6 +391,7 @@ impl Results {
         self.thumbnails.clear();
         self.predictions.clear();
         self.imprints.clear();
+        self.ensembles.clear();
         self.comparisons.clear();
         self.ledgers.clear();
         self.ambiguities.clear();

@@ -1,5 +1,6 @@
 //! [`Runtime`]: turns effects and wishes into jobs on lanes, and their answers into commands.
 
+mod follow;
 mod lanes;
 mod perform;
 
@@ -38,6 +39,8 @@ pub(super) enum JobId {
     SaveSettings,
     /// Looking for bundles.
     Bundles,
+    /// Following a folder.
+    Follow,
 }
 
 /// Runs what `apply` wants done and what the panes want to show.
@@ -54,6 +57,8 @@ pub struct Runtime {
     preview_wish: Arc<std::sync::Mutex<PreviewWish>>,
     wake: Wake,
     cancels: BTreeMap<Ticket, Cancel>,
+    follower: Option<follow::Job>,
+    threaded: bool,
 }
 
 impl Runtime {
@@ -80,6 +85,8 @@ impl Runtime {
             preview_wish: Arc::default(),
             wake,
             cancels: BTreeMap::new(),
+            follower: None,
+            threaded,
         }
     }
 
@@ -95,6 +102,7 @@ impl Runtime {
     /// Returns what only the window can do. Cheap when there is nothing to do.
     pub fn tick(&mut self, state: &mut State, commands: Vec<Command>) -> Vec<UiRequest> {
         let mut ui = Vec::new();
+        self.poll_follower();
         while let Ok(Event { id, command }) = self.events.try_recv() {
             if let JobId::Task(ticket) = &id {
                 self.cancels.remove(ticket);
@@ -162,6 +170,7 @@ impl Drop for Runtime {
         for cancel in self.cancels.values() {
             cancel.cancel();
         }
+        self.follow(None);
         self.lanes.close();
     }
 }

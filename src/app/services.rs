@@ -53,6 +53,11 @@ pub trait DataSource: Send + Sync {
     /// If there is none, or it cannot be read.
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError>;
 
+    /// Follows its folder for touches that appear; `None` for a source without a folder.
+    fn follow(&self) -> Option<Box<dyn Following>> {
+        None
+    }
+
     /// Reads the labels stored for a pair; empty if there are none.
     ///
     /// # Errors
@@ -86,6 +91,31 @@ pub struct GenerateItem<'a> {
     pub difference: &'a RgbGrid,
     /// `[width, height]` of the bubble image; `[0, 0]` where there is none.
     pub size: [usize; 2],
+}
+
+/// A data set whose folder is followed.
+pub trait Following: Send {
+    /// The next touch that arrived since the last call; returns soon if there is none.
+    fn poll(&mut self) -> Option<Followed>;
+}
+
+/// What happened in a followed folder.
+#[derive(Clone)]
+pub struct Followed {
+    /// The data set with all pairs so far: those known before keep their ids.
+    pub source: Arc<dyn DataSource>,
+    /// The touch.
+    pub pair: PairId,
+    /// Whether it was there before, and only its bubble came later.
+    pub completed: bool,
+    /// Its tensors, or why they cannot be read.
+    pub sample: Result<Arc<Sample>, TaskError>,
+}
+
+impl std::fmt::Debug for Followed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Followed({:?}, whole: {})", self.pair, self.sample.is_ok())
+    }
 }
 
 /// A generator's own output, with the ways to metres.

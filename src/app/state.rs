@@ -14,6 +14,7 @@ use super::inspect::Inspect;
 use super::keys::{PairKey, TouchKey};
 use super::library::Library;
 use super::results::Results;
+use super::seeds::Seeds;
 use super::settings::Settings;
 use super::tasks::{Log, Tasks};
 use super::workbench::Workbench;
@@ -39,6 +40,8 @@ pub struct State {
     pub table: TableState,
     /// What the 3D panes do and show besides.
     pub workbench: Workbench,
+    /// What a person chose about seeds.
+    pub seeds: Seeds,
     /// What a person prefers.
     pub settings: Settings,
     /// What runs.

@@ -151,7 +151,6 @@ impl State {
     /// Why this source cannot give one for this finger.
     pub fn mask_recipe(&self, finger: Finger) -> Result<MaskRecipe, Absent> {
         let mask = &self.settings.mask;
-        let bubble = self.bubble(finger).ready();
         match mask.source {
             MaskSource::Threshold => Ok(MaskRecipe::Threshold(mask.threshold_m.into())),
             MaskSource::TopPercent => Ok(MaskRecipe::TopPercent(mask.top_percent.into())),
@@ -161,7 +160,7 @@ impl State {
                 if sample.is_some_and(|s| s.grasp_from_object.is_none()) {
                     return Err(Absent::NoTruth);
                 }
-                if bubble.is_some_and(|b| b.camera.is_none()) {
+                if self.touch(finger).ready().is_some_and(|t| t.camera().is_none()) {
                     return Err(Absent::NoCamera);
                 }
                 Ok(MaskRecipe::Cad(mask.cad_distance_m.into()))
@@ -171,7 +170,7 @@ impl State {
                 .bundle(BundleKind::Mask)
                 .map_or(MaskRecipe::Threshold(mask.threshold_m.into()), |bundle| MaskRecipe::Unet(bundle.id.clone()))),
             MaskSource::Truth => {
-                if bubble.is_some_and(|b| b.truth.is_none()) {
+                if self.touch(finger).ready().is_some_and(|t| t.bubble.as_ref().is_none_or(|b| b.truth.is_none())) {
                     return Err(Absent::NotSimulated);
                 }
                 Ok(MaskRecipe::Truth)
@@ -277,11 +276,13 @@ impl State {
         let mut parts = [None, None];
         let mut reason = Absent::NoBubble;
         for finger in Finger::BOTH {
-            let Some(bubble) = sample.finger(finger).and_then(|t| t.bubble.as_ref()) else {
+            let Some(touch) = sample.finger(finger) else {
                 continue;
             };
-            if bubble.camera.is_none() {
-                reason = Absent::NoCamera;
+            if touch.camera().is_none() {
+                if touch.bubble.is_some() || source == ImprintSource::Predicted {
+                    reason = Absent::NoCamera;
+                }
                 continue;
             }
             let key = match self.imprint_key(source, finger) {
@@ -385,6 +386,9 @@ impl State {
     pub fn wanted(&self) -> Vec<Request> {
         let mut list = Wanted { state: self, list: Vec::new() };
         list.selection();
+        for request in self.wanted_seeds() {
+            list.ask(false, request);
+        }
         list.thumbnails();
         list.neighbours();
         list.list
@@ -421,6 +425,7 @@ const PAIR_PANES: [Pane; 16] = [
     Pane::TimeMachine,
     Pane::BasinMap,
     Pane::Generate,
+    Pane::Seeds,
     Pane::Masks,
     Pane::Layers,
     Pane::Poses,

@@ -284,7 +284,7 @@ mod tests {
     #[test]
     fn fingers_are_joined_and_a_missing_one_is_fine() {
         let bubble = BubbleTouch { imprint: imprint(), camera: Some(testing::camera(WIDTH, HEIGHT)), truth: None };
-        let touch = |bubble| Some(FingerTouch { gelslim: None, bubble });
+        let touch = |bubble| Some(FingerTouch { bubble, ..FingerTouch::default() });
         let mut sample = Sample { fingers: [None, touch(Some(bubble.clone()))], ..Sample::default() };
         let mask = Mask::from_fn(WIDTH, HEIGHT, |x, _| x < 10);
         let cloud = ContactCloud::from_sample(&sample, [None, Some(&mask)]).unwrap();

@@ -1,5 +1,7 @@
 //! One loaded grasp: what both sensors felt, the rig it was felt with, and the truth where it is known.
 
+use std::sync::Arc;
+
 use glam::DAffine3;
 
 use super::frames::PlanarPose;
@@ -37,6 +39,15 @@ pub struct FingerTouch {
     pub gelslim: Option<GelSlimTouch>,
     /// The Soft Bubble's touch.
     pub bubble: Option<BubbleTouch>,
+    /// The bubble camera of the same rig, where the bubble itself was not recorded: what a prediction is lifted with.
+    pub rig: Option<Arc<BubbleCamera>>,
+}
+
+impl FingerTouch {
+    /// The camera that saw the imprint, or would have seen it.
+    pub fn camera(&self) -> Option<&BubbleCamera> {
+        self.bubble.as_ref().and_then(|b| b.camera.as_ref()).or(self.rig.as_deref())
+    }
 }
 
 /// A GelSlim touch: 427 x 320 px from the lab's files, any size from an image folder.

@@ -61,6 +61,7 @@ pub fn simulate_apart(tool: &ToolSpec, gelslims: Grasp, bubbles: Grasp, seed: u6
         Some(FingerTouch {
             gelslim: Some(gelslim::touch(&config.gelslim, tool, gelslims, finger, seed)),
             bubble: Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed)),
+            rig: None,
         })
     });
     Sample { fingers, grasp_from_object: Some(bubbles.inverse()), ..Sample::default() }

@@ -109,7 +109,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     };
     let (mask, masks) = pose::masks(&args.mask, &sample, &tool, &imprints, predicted, &mut predictor)?;
     let fingers = Finger::BOTH.map(|f| {
-        let camera = sample.finger(f)?.bubble.as_ref()?.camera.as_ref()?;
+        let camera = sample.finger(f)?.camera()?;
         Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
     });
     let cloud = contact_cloud(&fingers)?;

@@ -3,6 +3,7 @@
 mod canvas;
 mod cases;
 mod dataset;
+pub(super) mod fan;
 mod figures;
 mod front;
 mod generator;

@@ -9,7 +9,7 @@ use crate::domain::contact::LAB_CAD_DISTANCE_M;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::pose::ToolModel;
-use crate::domain::sample::BubbleTouch;
+use crate::domain::sample::FingerTouch;
 
 /// Where masks come from.
 #[derive(Debug, Clone, Copy, Args)]
@@ -59,7 +59,7 @@ pub(super) fn contact_mask(
     source: MaskFrom,
     args: &MaskArgs,
     imprint: &DepthMap,
-    bubble: &BubbleTouch,
+    touch: &FingerTouch,
     tool: Option<&ToolModel>,
     truth: Option<PlanarPose>,
     predictor: &mut Predictor,
@@ -70,5 +70,5 @@ pub(super) fn contact_mask(
         MaskFrom::Truth => MaskRecipe::Truth,
         MaskFrom::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
     };
-    compute::mask(&recipe, imprint, Some(bubble), tool, truth).map_err(|err| anyhow::anyhow!("{err}"))
+    compute::mask(&recipe, imprint, Some(touch), tool, truth).map_err(|err| anyhow::anyhow!("{err}"))
 }

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::predict::{ModelArgs, Predictor};
+use super::seeds::{self, SeedArgs, SeedFigures};
 use super::{Common, Output, VerbResult};
 use crate::app::jobs::compute;
 use crate::app::results::Comparison;
@@ -33,6 +34,8 @@ pub(super) struct GenerateArgs {
     /// Take only this many pairs, spread evenly over the dataset.
     #[arg(long)]
     limit: Option<usize>,
+    #[command(flatten)]
+    ensemble: SeedArgs,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -81,6 +84,9 @@ struct Pair {
     seconds: f64,
     /// Whether it was made before and only read now.
     kept: bool,
+    /// With `--seeds`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ensemble: Option<SeedFigures>,
 }
 
 #[derive(Debug, Serialize)]
@@ -183,14 +189,22 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             let start = Instant::now();
             let predictions = predictor.predict(&differences)?;
             let seconds = start.elapsed().as_secs_f64() / predictions.len().max(1) as f64;
-            for ((finger, touch, _), predicted) in touches.into_iter().zip(predictions) {
+            for ((finger, touch, difference), predicted) in touches.into_iter().zip(predictions) {
                 let imprint = predictor.generator()?.depth(&predicted.raw, shift)?;
                 write(&args.out, &name, finger, &imprint)?;
                 let kept = predicted.kept;
                 let ambiguity = touch.gelslim.as_ref().and_then(|g| ambiguity(&g.difference));
-                let name = name.clone();
-                let mut pair = Pair { name, finger: finger.name(), ambiguity, seconds, kept, ..Pair::default() };
+                let mut pair =
+                    Pair { name: name.clone(), finger: finger.name(), ambiguity, seconds, kept, ..Pair::default() };
                 score(&dataset, id, (finger, &sample), &imprint, &mut pair)?;
+                if args.ensemble.seeds > 1 {
+                    let found = seeds::predict(&mut predictor, difference, args.ensemble.seeds)?;
+                    let mut of_mean = Pair::default();
+                    score(&dataset, id, (finger, &sample), &found.spread.mean, &mut of_mean)?;
+                    let scores = |_: &DepthMap| (of_mean.psnr_db, of_mean.ssim);
+                    pair.ensemble =
+                        Some(seeds::write(&args.out.join(stem(&name, finger)), &found, config.seed, scores)?);
+                }
                 made.push(pair);
             }
             Ok(made)
@@ -264,10 +278,15 @@ fn take(pair: &mut Pair, found: &Comparison) {
     pair.invented = found.split.map(|s| s.invented);
 }
 
+/// The name of a prediction's files.
+fn stem(name: &str, finger: Finger) -> String {
+    format!("{}_{}", name.replace(['/', '\\'], "__"), finger.name())
+}
+
 /// Writes `NAME_FINGER.npy` (metres, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
 /// -20 mm) for people.
 fn write(out: &Path, name: &str, finger: Finger, imprint: &DepthMap) -> anyhow::Result<()> {
-    let stem = format!("{}_{}", name.replace(['/', '\\'], "__"), finger.name());
+    let stem = stem(name, finger);
     crate::io::npz::write_npy(&out.join(format!("{stem}.npy")), imprint)?;
     let picture = imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
     images::write_grey16(&out.join(format!("{stem}.png")), &picture)?;

@@ -111,7 +111,8 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         let (entry, (id, corrected)) = (&entries[i], ids[i]);
         output.step(&entry.pair);
         let sample = dataset.load(id)?;
-        let bubble = sample.finger(entry.finger).and_then(|t| t.bubble.as_ref()).ok_or("it has no such imprint")?;
+        let touch = sample.finger(entry.finger).ok_or("it has no such finger")?;
+        let bubble = touch.bubble.as_ref().ok_or("it has no such imprint")?;
         if corrected && let Some(stored) = store.load(&entry.pair, entry.finger)? {
             return Ok((bubble.imprint.clone(), stored.mask));
         }
@@ -124,7 +125,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
             other => other,
         };
         let truth = sample.grasp_from_object;
-        let mask = contact_mask(source, &args.mask, &bubble.imprint, bubble, tool, truth, &mut predictor)?;
+        let mask = contact_mask(source, &args.mask, &bubble.imprint, touch, tool, truth, &mut predictor)?;
         Ok((bubble.imprint.clone(), mask))
     })?;
     let exported = Exported {

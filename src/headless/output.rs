@@ -45,6 +45,20 @@ impl Output {
         self.bar.suspend(|| note(text));
     }
 
+    /// Whether standard output is for programs.
+    pub fn json(&self) -> bool {
+        self.json
+    }
+
+    /// A line on standard output, now: a JSON object, or the text for people.
+    pub fn line(&self, value: &impl Serialize, human: impl FnOnce() -> String) -> anyhow::Result<()> {
+        use std::io::Write as _;
+        let text = if self.json { serde_json::to_string(value)? } else { human() };
+        let mut out = std::io::stdout().lock();
+        writeln!(out, "{text}")?;
+        Ok(out.flush()?)
+    }
+
     /// Ends the bar and prints the result: the JSON object, or the lines for people.
     pub fn finish(self, value: &impl Serialize, human: impl FnOnce() -> String) -> anyhow::Result<()> {
         self.bar.finish_and_clear();

@@ -11,6 +11,7 @@ use strum::IntoEnumIterator as _;
 
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::{ModelArgs, Predictor};
+use super::seeds::{self, FanArgs, PoseFan, SeedArgs};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::align::{AlignReport, Ask, LabIcpConfig, PaperTrap, Register, lab_starts};
 use crate::domain::ambiguity::{Ambiguity, ambiguity};
@@ -63,6 +64,10 @@ pub(super) struct PoseArgs {
     /// residual, weight and fate.
     #[arg(long)]
     trace: bool,
+    #[command(flatten)]
+    ensemble: SeedArgs,
+    #[command(flatten)]
+    fans: FanArgs,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -147,6 +152,9 @@ struct Case {
     /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
     #[serde(skip_serializing_if = "Option::is_none")]
     ambiguity: Option<[Option<Ambiguity>; 2]>,
+    /// With `--seeds`, for predicted imprints.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fan: Option<PoseFan>,
 }
 
 /// An accepted pose in the sense of the other numbers of a [`Case`].
@@ -209,6 +217,10 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         Imprints::Predicted => &["predicted"],
         Imprints::Both => &["measured", "predicted"],
     };
+    if let Some(folder) = &args.fans.fan_out {
+        std::fs::create_dir_all(folder)
+            .map_err(|err| anyhow::anyhow!("cannot create the folder: {err}: {}", folder.display()))?;
+    }
     let output = Output::new(args.common, "aligning", ids.len());
     let mut predictor = Predictor::new(&args.model);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
@@ -295,22 +307,29 @@ fn pose_cases(
     };
     let (mask_name, masks) = masks(&args.mask, sample, tool, &imprints, predicted, predictor)?;
     let fingers = Finger::BOTH.map(|f| {
-        let camera = sample.finger(f)?.bubble.as_ref()?.camera.as_ref()?;
+        let camera = sample.finger(f)?.camera()?;
         Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
     });
     let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
     // What was measured is as it is; what was predicted may have had nothing to go by.
     let left_open = predicted.then(|| Finger::BOTH.map(|f| ambiguity(&sample.finger(f)?.gelslim.as_ref()?.difference)));
-    Ok(engines
+    let several = predicted && args.ensemble.seeds > 1;
+    engines
         .iter()
         .map(|&engine| {
+            let fan = several
+                .then(|| seeds::fan(predictor, sample, tool, engine, &args.mask, args.ensemble.seeds))
+                .transpose()?;
+            if let (Some(fan), Some(folder)) = (&fan, &args.fans.fan_out) {
+                fan.write(folder, name, engine)?;
+            }
             let start = Instant::now();
             let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
             let ask = Ask { starts, record: args.trace };
             let result = pose::estimate_with(&fingers, tool, engine, &*registration(args, engine), ask);
             let ms = start.elapsed().as_secs_f64() * 1e3;
             let found = result.as_ref().ok().map(|r| r.object_from_grasp);
-            Case {
+            Ok(Case {
                 name: name.to_owned(),
                 engine: engine.key(),
                 imprint,
@@ -328,9 +347,10 @@ fn pose_cases(
                 accepted: accepted.map(|a| Accepted::new(a, truth)),
                 report: result.ok().map(|r| r.report).filter(|_| args.trace),
                 ambiguity: left_open,
-            }
+                fan,
+            })
         })
-        .collect())
+        .collect()
 }
 
 /// The contact masks and the name of their source.
@@ -350,13 +370,9 @@ pub(super) fn masks(
     };
     let mut masks = [None, None];
     for finger in Finger::BOTH {
-        let (Some(imprint), Some(bubble)) =
-            (&imprints[finger.index()], sample.finger(finger).and_then(|t| t.bubble.as_ref()))
-        else {
-            continue;
-        };
+        let (Some(imprint), Some(touch)) = (&imprints[finger.index()], sample.finger(finger)) else { continue };
         let truth = sample.grasp_from_object;
-        masks[finger.index()] = Some(contact_mask(source, args, imprint, bubble, Some(tool), truth, predictor)?);
+        masks[finger.index()] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
     }
     Ok((source.key(), masks))
 }

@@ -316,13 +316,18 @@ impl Predictor {
         Ok(out)
     }
 
-    /// The mask model's contact mask of an imprint.
-    pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<Mask> {
+    /// Loads the mask model, if it is not there yet.
+    pub(super) fn load_mask_model(&mut self) -> anyhow::Result<&mut MaskModel> {
         if self.mask_model.is_none() {
             let named = self.args.mask_bundle.as_ref();
             let bundle = find_bundle(named, "mask model", |b| b.mask_unet().is_some())?;
             self.mask_model = Some(MaskModel::open(&bundle, self.choice())?);
         }
-        Ok(self.mask_model.as_mut().expect("it was just loaded").predict(imprint)?)
+        Ok(self.mask_model.as_mut().expect("it was just loaded"))
+    }
+
+    /// The mask model's contact mask of an imprint.
+    pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<Mask> {
+        Ok(self.load_mask_model()?.predict(imprint)?)
     }
 }

@@ -1,30 +1,34 @@
 //! [`Dataset`]: one index over three kinds of source. Opening reads names only; samples load one by one.
 //!
 //! * the lab's folders of `.pt` files (the submodule `lab`),
-//! * a folder of pictures `NAME_gelslim.png` + `NAME_bubble.png` (the submodule `pictures`),
+//! * a folder of pictures `NAME_gelslim.png`, with or without `NAME_bubble.png`, or of camera images `NAME_touch.png`
+//!   with `NAME_reference.png` (the submodule `pictures`),
 //! * the built-in data sets (the demo and the test sets), rendered by the simulator.
 //!
 //! A [`Dataset`] never changes after opening and can be shared with worker threads.
 
 mod built_in;
+mod grow;
 mod lab;
 mod pictures;
 mod tool_scale;
 
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use crate::domain::dataset::{Index, PairEntry, PairId, Problem};
 use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::mesh::TriMesh;
-use crate::domain::sample::Sample;
+use crate::domain::sample::{BubbleCamera, Sample};
 
 use super::images::PictureError;
 use super::pt::PtError;
 use super::stl::MeshError;
 
 pub use built_in::BuiltIn;
+pub use grow::{Growth, OUTPUT_MARK, RIG_FILE, cameras_of, is_output};
 pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE};
-pub use tool_scale::{ToolScale, UNIT_FILE};
+pub use tool_scale::{ToolScale, UNIT_FILE, read_in_metres};
 
 /// Which kind of source a dataset is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,8 +66,8 @@ impl OpenError {
         match self {
             Self::Io { .. } => "check the path and its permissions",
             Self::NothingFound { .. } => {
-                "open the folder that holds train/, test/ and tools_stls/, or a folder of NAME_gelslim.png with \
-                 NAME_bubble.png"
+                "open the folder that holds train/, test/ and tools_stls/, a folder of GelSlim .pt files, of \
+                 NAME_gelslim.png (with NAME_bubble.png), or of NAME_touch.png with reference.png"
             }
         }
     }
@@ -84,6 +88,14 @@ pub enum LoadError {
     /// A picture of the pair.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// Touched and untouched image do not fit each other.
+    #[error("the touched image has {:?} pixels, the untouched one {:?} ({})", sizes[0], sizes[1], file.display())]
+    Sizes {
+        /// The touched image.
+        file: PathBuf,
+        /// Width and height of each.
+        sizes: [[usize; 2]; 2],
+    },
     /// The pair is not one of this dataset.
     #[error("the dataset has no pair number {}", id.0)]
     NoSuchPair {
@@ -98,6 +110,7 @@ impl LoadError {
         match self {
             Self::Pt(err) => Some(err.file()),
             Self::Picture(err) => Some(err.file()),
+            Self::Sizes { file, .. } => Some(file),
             Self::NoSuchPair { .. } => None,
         }
     }
@@ -107,6 +120,7 @@ impl LoadError {
         match self {
             Self::Pt(err) => err.hint(),
             Self::Picture(err) => err.hint(),
+            Self::Sizes { .. } => "take both images with the same camera settings",
             Self::NoSuchPair { .. } => "open the dataset again",
         }
     }
@@ -151,7 +165,7 @@ impl InvalidPixels {
 }
 
 /// An opened source of paired touches.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Dataset {
     /// What to call it.
     pub title: String,
@@ -166,9 +180,11 @@ pub struct Dataset {
     /// What the numbers of the CAD files mean; without it, what [`UNIT_FILE`] beside them says, else metres.
     pub tool_scale: Option<ToolScale>,
     source: Source,
+    /// The bubbles' cameras of the rig, for touches that come without a bubble; read when first needed.
+    rig: OnceLock<[Option<Arc<BubbleCamera>>; 2]>,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum Source {
     Lab(lab::Lab),
     Pictures(pictures::Pictures),
@@ -204,6 +220,7 @@ impl Dataset {
         drop(std::fs::read_dir(&folder).map_err(io)?);
         let scan = lab::scan(&folder)
             .or_else(|| pictures::scan(&folder))
+            .or_else(|| lab::scan_flat(&folder))
             .ok_or_else(|| OpenError::NothingFound { path: path.to_owned() })?;
         let title = scan.root.file_name().map_or_else(|| "dataset".into(), |n| n.to_string_lossy().into_owned());
         Ok(Self {
@@ -214,6 +231,7 @@ impl Dataset {
             problems: scan.problems,
             tool_scale: None,
             source: scan.source,
+            rig: OnceLock::new(),
         })
     }
 
@@ -232,6 +250,7 @@ impl Dataset {
             problems: Vec::new(),
             tool_scale: None,
             source: Source::BuiltIn(set),
+            rig: OnceLock::new(),
         }
     }
 
@@ -253,14 +272,16 @@ impl Dataset {
         if self.index.get(id).is_none() {
             return Err(LoadError::NoSuchPair { id });
         }
-        match &self.source {
-            Source::Lab(lab) => lab.load(id),
-            Source::Pictures(pictures) => pictures.load(id),
+        let mut loaded = match &self.source {
+            Source::Lab(lab) => lab.load(id)?,
+            Source::Pictures(pictures) => pictures.load(id)?,
             Source::BuiltIn(set) => {
                 let sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
-                Ok(Loaded { sample, notes: Vec::new(), invalid: Default::default() })
+                Loaded { sample, notes: Vec::new(), invalid: Default::default() }
             }
-        }
+        };
+        self.lend_cameras(&mut loaded.sample);
+        Ok(loaded)
     }
 
     /// The tool's CAD model in metres and the object frame; `None` where the dataset has none.

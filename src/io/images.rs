@@ -1,4 +1,4 @@
-//! PNG pictures to and from [`Grid`]s.
+//! Pictures (PNG, and JPEG for reading) to and from [`Grid`]s.
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
@@ -18,8 +18,8 @@ pub enum PictureError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// The file is no PNG, or a damaged one.
-    #[error("not a readable PNG: {source} ({})", file.display())]
+    /// The file is no PNG or JPEG, or a damaged one.
+    #[error("not a readable PNG or JPEG: {source} ({})", file.display())]
     Decode {
         /// The file.
         file: PathBuf,
@@ -50,7 +50,7 @@ impl PictureError {
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Io { .. } => "check that the file exists and may be read, and that the disk has room",
-            Self::Decode { .. } => "copy or save the picture again as PNG",
+            Self::Decode { .. } => "copy or save the picture again",
             Self::Kind { .. } => "save the picture again in that form",
         }
     }
@@ -60,8 +60,14 @@ fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
     let io = |source| PictureError::Io { file: path.to_owned(), source };
     let bytes = std::fs::read(path).map_err(io)?;
     // The decoder's default limits keep a small file from asking for gigabytes.
+    let jpeg = bytes.starts_with(&[0xff, 0xd8]);
+    // A JPEG decoder fills what is cut off with grey: the end mark tells a whole file from one being written.
+    if jpeg && !bytes.trim_ascii_end().ends_with(&[0xff, 0xd9]) {
+        let cut = std::io::Error::new(std::io::ErrorKind::UnexpectedEof, "the end of the JPEG is missing");
+        return Err(PictureError::Decode { file: path.to_owned(), source: image::ImageError::IoError(cut) });
+    }
     let mut reader = ImageReader::new(Cursor::new(bytes));
-    reader.set_format(ImageFormat::Png);
+    reader.set_format(if jpeg { ImageFormat::Jpeg } else { ImageFormat::Png });
     reader.decode().map_err(|source| PictureError::Decode { file: path.to_owned(), source })
 }
 
@@ -71,7 +77,7 @@ fn grid<T: Copy>(width: u32, height: u32, pixels: Vec<T>) -> Grid<T> {
     Grid::from_vec(width, height, pixels).expect("a decoder fills every pixel")
 }
 
-/// Reads any PNG as colour on the 0..255 scale; grey is repeated, 16 bits are scaled down, alpha is dropped.
+/// Reads any PNG or JPEG as colour on the 0..255 scale; grey is repeated, 16 bits are scaled down, alpha is dropped.
 ///
 /// # Errors
 /// [`PictureError`].
@@ -87,7 +93,7 @@ pub fn read_rgb(path: &Path) -> Result<RgbGrid, PictureError> {
     })
 }
 
-/// Reads any PNG as grey on the 0..255 scale; 16 bits keep their fractions, colour is weighted, alpha is dropped.
+/// Reads any PNG or JPEG as grey on the 0..255 scale; 16 bits keep their fractions, colour is weighted, alpha is dropped.
 ///
 /// # Errors
 /// [`PictureError`].

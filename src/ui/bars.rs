@@ -60,9 +60,10 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.local.dialogs.type_path(Purpose::Folder, "");
         }
         ui.separator();
-        for action in [Action::ExportMasks, Action::Save, Action::Reload] {
+        for action in [Action::ExportMasks, Action::Save, Action::Reload, Action::Follow] {
             let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
-            let button = egui::Button::new(action.name()).shortcut_text(keys);
+            let on = action == Action::Follow && cx.state.library.follow.is_some();
+            let button = egui::Button::new(action.name()).shortcut_text(keys).selected(on);
             let response = ui.add_enabled(action.command(cx.state).is_some(), button);
             if response.on_hover_text(action.tooltip()).clicked() {
                 cx.act(action);
@@ -129,6 +130,7 @@ pub(super) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.add_space(12.0);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 engine(cx, ui);
+                following(cx, ui);
                 jobs(cx, ui);
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
                     let (text, color) = match &cx.local.readout {
@@ -186,6 +188,22 @@ fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
         response.on_hover_text("Computing what the panes show");
         ui.label(caption("computing", cx.p));
     }
+}
+
+/// That the folder is followed, what arrived, and a way to stop it.
+fn following(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let Some(follow) = &cx.state.library.follow else { return };
+    let mut text = format!("Following: {} arrived", follow.arrived);
+    if follow.broken > 0 {
+        text += &format!(", {} unreadable", follow.broken);
+    }
+    let newest = follow.newest.as_ref().map_or(String::new(), |name| format!("Newest: {name}. "));
+    let text = RichText::new(text).size(12.0).color(cx.p.accent);
+    let button = ui.add(egui::Button::new(text).min_size(vec2(0.0, 20.0))).accessible_name("Stop following");
+    if button.on_hover_text(format!("{newest}Stops following the folder (Ctrl+Shift+F)")).clicked() {
+        cx.act(Action::Follow);
+    }
+    ui.add_space(8.0);
 }
 
 /// The runtime that made what is shown, and in debug builds how long a frame takes.

@@ -70,6 +70,12 @@ fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         if reload.on_hover_text(Action::Reload.tooltip()).clicked() {
             cx.act(Action::Reload);
         }
+        let following = cx.state.library.follow.is_some();
+        let button = egui::Button::new(Action::Follow.name()).shortcut_text("Ctrl+Shift+F").selected(following);
+        let follow = ui.add_enabled(Action::Follow.command(cx.state).is_some(), button);
+        if follow.on_hover_text(Action::Follow.tooltip()).clicked() {
+            cx.act(Action::Follow);
+        }
         let recent: Vec<_> = cx.state.settings.recent.iter().filter(|r| **r != Place::Demo).cloned().collect();
         if !recent.is_empty() {
             ui.separator();

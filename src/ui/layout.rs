@@ -27,6 +27,7 @@ pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
             Predicted,
             Error,
             Ledger,
+            Seeds,
             ScenePredicted,
             SceneMeasured,
             Generate,
@@ -91,7 +92,7 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let browser = b.tabs(&[Browser]);
             let gel = b.tabs(&[GelDifference, GelRaw, GelReference]);
             let (measured, predicted) = (b.tabs(&[Measured]), b.tabs(&[Predicted]));
-            let error = b.tabs(&[Error, Ledger]);
+            let error = b.tabs(&[Error, Ledger, Seeds]);
             let (scene_p, scene_m) = (b.tabs(&[ScenePredicted]), b.tabs(&[SceneMeasured]));
             let generate = b.tabs(&[Generate, Settings]);
             let metrics = b.tabs(&[Metrics, Log]);

@@ -8,7 +8,8 @@ use super::theme::{SMALL, medium};
 use super::timemachine;
 use super::widget::help;
 use super::{
-    basin, browser, generate, images, layers, ledger, log, masks, metrics, poses, results, scene, settings_pane, table,
+    basin, browser, generate, images, layers, ledger, log, masks, metrics, poses, results, scene, seeds, settings_pane,
+    table,
 };
 use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
@@ -28,6 +29,7 @@ pub(super) fn title(pane: Pane) -> &'static str {
         Pane::TimeMachine => "Time machine",
         Pane::BasinMap => "Basin map",
         Pane::Generate => "Generate",
+        Pane::Seeds => "Seeds",
         Pane::Masks => "Mask",
         Pane::Layers => "Layers",
         Pane::Poses => "Poses",
@@ -55,6 +57,7 @@ fn tooltip(pane: Pane) -> &'static str {
         Pane::TimeMachine => "The steps of a registration, forwards and backwards",
         Pane::BasinMap => "Where starts lead; a click on one loads its run into the time machine",
         Pane::Generate => "Predicts the Soft Bubble imprint",
+        Pane::Seeds => "Several predictions of the touch: where they disagree, and how their poses fan out",
         Pane::Masks => "Corrects the contact mask",
         Pane::Layers => "Residuals, drop reasons, distances both ways and the weak direction of a registration",
         Pane::Poses => "Truth, measurement and prediction against each other, per finger and joint",
@@ -91,6 +94,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         Pane::TimeMachine => timemachine::show(cx, ui),
         Pane::BasinMap => basin::show(cx, ui),
         Pane::Generate => generate::show(cx, ui),
+        Pane::Seeds => seeds::show(cx, ui),
         Pane::Masks => masks::show(cx, ui),
         Pane::Layers => layers::show(cx, ui),
         Pane::Poses => poses::show(cx, ui),

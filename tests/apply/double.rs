@@ -131,6 +131,7 @@ impl DataSource for Source {
             Some(FingerTouch {
                 gelslim: Some(GelSlimTouch { images: None, difference }),
                 bubble: Some(BubbleTouch { imprint, camera: None, truth: None }),
+                rig: None,
             })
         };
         Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, ..Sample::default() })

@@ -12,7 +12,7 @@ use super::super::library::{BundleKind, OpenDataset, Place};
 use super::super::results::Prediction;
 use super::super::state::State;
 use super::super::tasks::{Level, Task, Ticket};
-use super::{cancel_all, inspect, is_selected, masks, preferences, refit, remember, reorder, workbench};
+use super::{cancel_all, follow, inspect, is_selected, masks, preferences, refit, remember, reorder, workbench};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
 
@@ -24,6 +24,10 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
             if seq == state.library.last_seq {
                 show(state, seq, place, opened, effects);
             }
+        }
+        Command::Followed(seq, followed) => {
+            let current = state.library.open.as_ref().map(|open| open.seq);
+            follow::arrived(state, followed, current == Some(seq), effects);
         }
         Command::Bundles(bundles, problems) => {
             for problem in &problems {
@@ -111,6 +115,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.library.opening = None;
     let tools = opened.source.index().tools();
     state.library.open = Some(OpenDataset { seq, place: place.clone(), source: opened.source.clone(), tools });
+    follow::opened(state, same_place, effects);
     if !same_place {
         state.library.filter.clear();
         state.library.tool = None;
@@ -167,6 +172,21 @@ fn store(state: &mut State, request: Request, computed: Computed) {
             for prediction in list {
                 generated(state, prediction);
             }
+        }
+        (Request::Seed(recipe), Computed::Predictions(list)) => {
+            let touch = recipe.touch;
+            let shown = results.chosen.get(&touch).cloned();
+            for prediction in list {
+                generated(state, prediction);
+            }
+            // A seed among several does not push away what is looked at.
+            if let Some(shown) = shown.filter(|recipe| state.results.predictions.contains(recipe)) {
+                state.results.chosen.insert(touch, shown);
+            }
+        }
+        (Request::Ensemble(key), Computed::Ensemble(ensemble)) => {
+            let size = ensemble.bytes();
+            results.ensembles.insert(key, ensemble, size);
         }
         (Request::Imprint(recipe, shift), Computed::Depth(depth)) => {
             let size = bytes(&depth);

@@ -17,6 +17,14 @@ pub(super) fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effe
         state.settings.generate.seed = next_seed(state.settings.generate.seed);
         save_settings(state, effects);
     }
+    same_seed(state, effects);
+}
+
+/// The same with the seed as it is.
+pub(super) fn same_seed(state: &mut State, effects: &mut Vec<Effect>) {
+    if let Err(absent) = state.can_generate() {
+        return state.log.error(&refusal(absent));
+    }
     // A finger without a GelSlim image is left out; while the sample loads, the job finds out.
     let loaded = state.sample().ready().is_some();
     let mut fingers = state.fingers_to_generate();

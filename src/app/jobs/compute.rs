@@ -1,13 +1,15 @@
 //! Jobs as plain functions of values: the studio's lanes and the command line call the same ones.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::super::error::TaskError;
 use super::super::keys::{MaskRecipe, PoseEngine, ShiftMode};
-use super::super::results::{Clouds, Comparison, FingerCloud, PoseResult, Prediction};
+use super::super::results::{Clouds, Comparison, Ensemble, FingerCloud, PoseResult, Prediction};
 use super::super::services::NamedTool;
 use super::JobCx;
 use crate::domain::align::basin::{Basin, BasinConfig, Plane};
+use crate::domain::ensemble::{Spread, channel_spread};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::inspect::{basin_map, recorded};
@@ -16,7 +18,7 @@ use crate::domain::metrics::{self, SsimRange};
 use crate::domain::pose::{ToolModel, register};
 use crate::domain::postprocess::{DepthChain, PostprocessError, RawPrediction};
 use crate::domain::resample::bilinear;
-use crate::domain::sample::{BubbleCamera, BubbleTouch, Sample, Scale};
+use crate::domain::sample::{BubbleCamera, FingerTouch, Sample, Scale};
 use crate::domain::sensor::Finger;
 use crate::domain::{cloud, contact, units};
 
@@ -66,6 +68,28 @@ pub fn chain(prediction: &Prediction, shift: ShiftMode) -> Result<DepthChain, Ta
         }
         mode => of(mode),
     }
+}
+
+/// Mean and spreads of several predictions, `imprints` being the same in metres.
+///
+/// # Errors
+/// If there is none, or their sizes differ.
+pub fn ensemble(
+    predictions: &[Arc<Prediction>],
+    imprints: &[Arc<DepthMap>],
+    shift: ShiftMode,
+) -> Result<Ensemble, TaskError> {
+    const WHAT: &str = "Spread of the seeds";
+    let spread = Spread::of(&imprints.iter().map(|i| &**i).collect::<Vec<_>>())
+        .ok_or_else(|| TaskError::new(WHAT, "the predictions differ in size"))?;
+    let mut apart = Vec::new();
+    for prediction in predictions {
+        let chain = DepthChain { size: spread.mean.size(), ..chain(prediction, shift)? };
+        let found = channel_spread(&prediction.output.raw, &chain).map_err(|err| TaskError::from_error(WHAT, &err))?;
+        apart.extend(found);
+    }
+    let channels = Spread::of(&apart.iter().collect::<Vec<_>>()).map(|of| of.mean);
+    Ok(Ensemble { spread, channels })
 }
 
 /// A prediction against the measurement. With an assumed scale both are stretched to 0..1 first.
@@ -133,7 +157,7 @@ pub fn compare_parts(
 
 /// An automatic mask that needs no model.
 ///
-/// `tool` and `truth` (`grasp_from_object`) are needed for [`MaskRecipe::Cad`], `bubble` for it and for
+/// `tool` and `truth` (`grasp_from_object`) are needed for [`MaskRecipe::Cad`], `touch` for it and for
 /// [`MaskRecipe::Truth`].
 ///
 /// # Errors
@@ -141,7 +165,7 @@ pub fn compare_parts(
 pub fn mask(
     recipe: &MaskRecipe,
     imprint: &DepthMap,
-    bubble: Option<&BubbleTouch>,
+    touch: Option<&FingerTouch>,
     tool: Option<&ToolModel>,
     truth: Option<PlanarPose>,
 ) -> Result<Mask, TaskError> {
@@ -152,8 +176,8 @@ pub fn mask(
             Ok(contact::top_percent(imprint, f64::from(percent.get()), f32::NEG_INFINITY))
         }
         MaskRecipe::Cad(limit_m) => {
-            let camera = bubble
-                .and_then(|b| b.camera.as_ref())
+            let camera = touch
+                .and_then(FingerTouch::camera)
                 .ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))?;
             let tool = tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
             let truth = truth.ok_or_else(|| TaskError::new(WHAT, "the true pose is not known"))?;
@@ -161,8 +185,8 @@ pub fn mask(
                 .map_err(|err| TaskError::from_error(WHAT, &err))
         }
         MaskRecipe::Truth => {
-            let truth = bubble
-                .and_then(|b| b.truth.as_ref())
+            let truth = touch
+                .and_then(|t| t.bubble.as_ref()?.truth.as_ref())
                 .ok_or_else(|| TaskError::new(WHAT, "only simulated data knows the true contact"))?;
             Ok(truth.contact.clone())
         }
@@ -196,7 +220,7 @@ pub fn finger_cloud(imprint: &DepthMap, camera: &BubbleCamera, mask: Option<&Mas
 pub fn clouds(sample: &Sample, parts: [Option<(&DepthMap, Option<&Mask>)>; 2]) -> Result<Clouds, TaskError> {
     let mut clouds = Clouds::default();
     for finger in Finger::BOTH {
-        let camera = sample.finger(finger).and_then(|t| t.bubble.as_ref()).and_then(|b| b.camera.as_ref());
+        let camera = sample.finger(finger).and_then(|t| t.camera());
         if let (Some((imprint, mask)), Some(camera)) = (parts[finger.index()], camera) {
             clouds.fingers[finger.index()] = Some(finger_cloud(imprint, camera, mask)?);
         }
@@ -316,8 +340,8 @@ mod tests {
     #[test]
     fn a_thumbnail_keeps_means_and_survives_holes() {
         let imprint = Grid::from_fn(175, 140, |x, y| if (x + y) % 2 == 0 { f32::NAN } else { 0.004 });
-        let bubble = BubbleTouch { imprint, camera: None, truth: None };
-        let touch = crate::domain::sample::FingerTouch { gelslim: None, bubble: Some(bubble) };
+        let bubble = crate::domain::sample::BubbleTouch { imprint, camera: None, truth: None };
+        let touch = crate::domain::sample::FingerTouch { bubble: Some(bubble), ..Default::default() };
         let sample = Sample { fingers: [None, Some(touch)], ..Sample::default() };
         let small = thumbnail(&sample);
         assert_eq!(small.size(), [44, 36]);

@@ -117,7 +117,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 }),
             )
         }
-        Request::Prediction(recipe) => {
+        Request::Prediction(recipe) | Request::Seed(recipe) => {
             let (services, recipe) = (services.clone(), recipe.clone());
             let bundle = state.library.bundle(&recipe.bundle)?.clone();
             let sample = results.samples.get(&recipe.touch.pair).cloned();
@@ -128,6 +128,18 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                     let made = generate::generate(&*services, vec![recipe], &bundle, &*source, sample, cx)?;
                     Ok(Computed::Predictions(made))
                 }),
+            )
+        }
+        Request::Ensemble(key) => {
+            let predictions: Option<Vec<_>> =
+                key.recipes.iter().map(|recipe| results.predictions.get(recipe).cloned()).collect();
+            let imprints: Option<Vec<_>> =
+                key.recipes.iter().map(|recipe| results.imprints.get(&(recipe.clone(), key.shift)).cloned()).collect();
+            let (predictions, imprints, shift) = (predictions?, imprints?, key.shift);
+            job(
+                Lane::Compute,
+                "Spread of the seeds".into(),
+                Box::new(move |_| Ok(Computed::Ensemble(Arc::new(compute::ensemble(&predictions, &imprints, shift)?)))),
             )
         }
         Request::Imprint(recipe, shift) => {
@@ -208,12 +220,11 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "Contact mask".into(),
                 Box::new(move |_| {
-                    let bubble = sample.finger(touch.finger).and_then(|t| t.bubble.as_ref());
                     let imprint = imprint.get().ok_or_else(gone)?;
                     let mask = compute::mask(
                         &recipe,
                         imprint,
-                        bubble,
+                        sample.finger(touch.finger),
                         tool.as_deref().map(|t| &t.model),
                         sample.grasp_from_object,
                     )?;

@@ -26,6 +26,7 @@ impl Runtime {
                     Box::new(move |_: &JobCx| Ok(Command::Opened(ticket, seq, place.clone(), services.open(&place)?)));
                 self.task(Lane::Files, ticket, what, body);
             }
+            Effect::Follow(of) => self.follow(of),
             Effect::FindBundles(folders) => {
                 let services = self.services.clone();
                 // On the lane of the models: hashing them must not hold up the files.

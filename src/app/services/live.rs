@@ -1,6 +1,8 @@
 //! The services of the program: data sets and labels through `io`, models through `infer`, settings in the user's
 //! configuration folder.
 
+mod follow;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -13,7 +15,7 @@ use super::super::keys::{Revision, TouchKey};
 use super::super::library::{BundleInfo, BundleKind, GeneratorInfo, Place};
 use super::super::results::Prediction;
 use super::super::settings::{RuntimeChoice, SETTINGS_VERSION, Settings};
-use super::{DataSource, GenerateItem, Generated, Services};
+use super::{DataSource, Following, GenerateItem, Generated, Services};
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::mesh::TriMesh;
@@ -114,18 +116,18 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
             hint: err.hint().into(),
         }),
     }
-    Ok(LiveSource { dataset, store, problems, reviews, saved: Mutex::default() })
+    Ok(LiveSource { dataset: Arc::new(dataset), store, problems, reviews, saved: Arc::default() })
 }
 
 /// An open data set with its store of labels.
 #[derive(Debug)]
 pub struct LiveSource {
-    dataset: Dataset,
+    dataset: Arc<Dataset>,
     store: Result<MaskStore, StoreError>,
     problems: Vec<Problem>,
     reviews: BTreeMap<String, Review>,
     /// What is on the disk, as far as it was read or written here: only differences are written.
-    saved: Mutex<BTreeMap<String, PairLabels>>,
+    saved: Arc<Mutex<BTreeMap<String, PairLabels>>>,
 }
 
 impl LiveSource {
@@ -179,6 +181,10 @@ impl DataSource for LiveSource {
                 .with_hint("Put it into data/tools_stls, in metres and the object frame.")),
             Err(err) => Err(TaskError::from_error(what, &err).with_hint(err.hint())),
         }
+    }
+
+    fn follow(&self) -> Option<Box<dyn Following>> {
+        follow::start(self)
     }
 
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {

@@ -16,8 +16,9 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
+use crate::domain::sample::BubbleCamera;
 
-use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem};
+use super::{LoadError, Loaded, Scan, Source, SourceKind, is_output, last_integer, problem};
 
 const BUBBLES: &str = "bubbles";
 const GELSLIMS: [&str; 2] = ["gelslims", "gelslims_no_distortion"];
@@ -30,24 +31,27 @@ const TOOL_PREFIXES: [&str; 3] = [
 /// Tool folders lie at most this deep below `bubbles`; also what ends a loop of links.
 const MAX_DEPTH: usize = 3;
 
+/// `.pt` files that lie beside touches and are none.
+const NO_TOUCH: [&str; 4] = ["rig", "tools", "stats", "training_stats"];
+
 /// The files of the lab's folders, in the order of the index.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Lab {
-    folders: Vec<PathBuf>,
-    pairs: Vec<PairFiles>,
-    meshes: BTreeMap<String, PathBuf>,
+    pub(super) folders: Vec<PathBuf>,
+    pub(super) pairs: Vec<PairFiles>,
+    pub(super) meshes: BTreeMap<String, PathBuf>,
 }
 
 #[derive(Debug, Clone)]
-struct FileRef {
-    folder: u32,
-    name: OsString,
+pub(super) struct FileRef {
+    pub(super) folder: u32,
+    pub(super) name: OsString,
 }
 
-#[derive(Debug)]
-struct PairFiles {
-    gelslim: Option<FileRef>,
-    bubble: Option<FileRef>,
+#[derive(Clone, Debug)]
+pub(super) struct PairFiles {
+    pub(super) gelslim: Option<FileRef>,
+    pub(super) bubble: Option<FileRef>,
 }
 
 /// A file of one sensor, with what its path says.
@@ -136,18 +140,46 @@ pub(super) fn scan(path: &Path) -> Option<Scan> {
     if let Some(tool) = only_tool {
         pairs.retain(|(entry, _)| entry.tool.as_ref() == Some(&tool));
     }
-    pairs.sort_by(|(a, _), (b, _)| {
-        (a.split as u8, &a.tool, a.number, &a.name).cmp(&(b.split as u8, &b.tool, b.number, &b.name))
+    Some(scan.finish(root, &groups, pairs))
+}
+
+/// Looks for GelSlim `.pt` files directly in `folder`, as a robot may write them; `None` if there are none.
+pub(super) fn scan_flat(folder: &Path) -> Option<Scan> {
+    let mut scan = Scanner::default();
+    let mut found = Vec::new();
+    scan.folder(folder, None, MAX_DEPTH, &mut found);
+    found.retain(|f| !NO_TOUCH.contains(&f.name.as_str()));
+    found.sort_by(|a, b| a.name.cmp(&b.name));
+    found.dedup_by(|a, b| a.name == b.name);
+    // A folder of something else says so with its first readable file.
+    let other = |f: &Found| super::super::pt::read_dict(&scan.path(&f.file)).is_ok_and(|dict| !dict.has("gelslim"));
+    if found.is_empty() || found.iter().take(1).any(other) {
+        return None;
+    }
+    let pairs = found.into_iter().map(|f| {
+        let entry = PairEntry { name: f.name, tool: f.tool, split: Split::None, number: f.number };
+        (entry, PairFiles { gelslim: Some(f.file), bubble: None })
     });
-    let (pairs, files): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-    let meshes = scan.meshes(&root, &groups, &pairs);
-    Some(Scan {
-        root,
-        pairs,
-        problems: scan.problems,
-        source: Source::Lab(Lab { folders: scan.folders, pairs: files, meshes }),
-        kind: SourceKind::Lab,
-    })
+    let pairs = pairs.collect();
+    Some(scan.finish(folder.to_owned(), &[], pairs))
+}
+
+impl Scanner {
+    /// Sorts the pairs in the lab's order and adds the CAD models.
+    fn finish(mut self, root: PathBuf, groups: &[Group], mut pairs: Vec<(PairEntry, PairFiles)>) -> Scan {
+        pairs.sort_by(|(a, _), (b, _)| {
+            (a.split as u8, &a.tool, a.number, &a.name).cmp(&(b.split as u8, &b.tool, b.number, &b.name))
+        });
+        let (pairs, files): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
+        let meshes = self.meshes(&root, groups, &pairs);
+        Scan {
+            root,
+            pairs,
+            problems: self.problems,
+            source: Source::Lab(Lab { folders: self.folders, pairs: files, meshes }),
+            kind: SourceKind::Lab,
+        }
+    }
 }
 
 #[derive(Default)]
@@ -199,14 +231,20 @@ impl Scanner {
             let (bubble, gelslim) =
                 (if order.is_le() { b.next() } else { None }, if order.is_ge() { g.next() } else { None });
             let Some(first) = bubble.as_ref().or(gelslim.as_ref()) else { break };
-            if !one_sensor && (bubble.is_none() || gelslim.is_none()) {
-                let other = if bubble.is_none() { BUBBLES } else { GELSLIMS[0] };
+            if !one_sensor && gelslim.is_none() {
                 self.problems.push(problem(
                     self.path(&first.file),
-                    format!("its other half is missing: no {} in {other}", first.name),
+                    format!("its other half is missing: no {} in {}", first.name, GELSLIMS[0]),
                     "add the missing file, or remove this one",
                 ));
                 continue;
+            }
+            if !one_sensor && bubble.is_none() {
+                self.problems.push(problem(
+                    self.path(&first.file),
+                    format!("no {} in {BUBBLES}: it opens without a measured imprint", first.name),
+                    "add the bubble file if the truth is wanted",
+                ));
             }
             let prefix = match group.split {
                 Split::TrainOnly => "train_only/",
@@ -275,7 +313,7 @@ impl Scanner {
             };
             let name = entry.file_name();
             let text = name.to_string_lossy();
-            if text.starts_with('.') {
+            if text.starts_with('.') || is_output(&text) {
                 continue;
             }
             let mut kind = entry.file_type().ok();
@@ -369,6 +407,12 @@ impl Lab {
     pub(super) fn files(&self, id: PairId) -> Vec<PathBuf> {
         let files = self.pairs.get(id.0 as usize);
         files.into_iter().flat_map(|f| [&f.gelslim, &f.bubble]).flatten().map(|f| self.path(f)).collect()
+    }
+
+    /// The cameras in a bubble file, by finger.
+    pub(super) fn cameras(file: &Path) -> Result<[Option<BubbleCamera>; 2], LoadError> {
+        let sample = load::pair(None, Some(file))?.sample;
+        Ok(sample.fingers.map(|touch| touch?.bubble?.camera))
     }
 
     pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {

@@ -1,6 +1,8 @@
-//! A folder of pictures: `NAME_gelslim.png` with `NAME_bubble.png`, optionally `NAME_vqvae.png`.
+//! A folder of pictures (PNG or JPEG): `NAME_gelslim.png`, optionally with `NAME_bubble.png` and `NAME_vqvae.png`; or
+//! the camera's own images, `NAME_touch.png` with `NAME_reference.png` or one `reference.png` for all.
 //!
-//! Such pictures lost their scale: each was stretched to 0..255 on its own. What is assumed instead:
+//! Camera images are used as they are. The others lost their scale: each was stretched to 0..255 on its own. What is
+//! assumed instead:
 //!
 //! * **Imprint**: 0 and 255 stand for [`ASSUMED_IMPRINT_RANGE_M`]. The picture is rotated by 180 degrees (the
 //!   lab's convention for display beside a GelSlim image) and is turned back; it is resampled to 175 x 140 px.
@@ -13,7 +15,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
+use crate::domain::dataset::{PairEntry, PairId, Split};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::resample;
 use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample, Scale};
@@ -39,23 +41,36 @@ const CLEAN_GAIN: [f32; 3] = [0.039 * 0.0989 * 255.0, 0.039 * 0.0746 * 255.0, 0.
 /// Standard deviation of the lab's difference images, 0..255 scale (its training set's 0.0687, 0.0428, 0.0576).
 const DIFFERENCE_STD: [f32; 3] = [0.0687 * 255.0, 0.0428 * 255.0, 0.0576 * 255.0];
 
+/// Position of the GelSlim's suffix in [`SUFFIXES`].
+const GELSLIM: usize = 0;
 /// Position of the bubble's suffix in [`SUFFIXES`].
 pub(super) const BUBBLE: usize = 1;
 /// Position of the prediction's suffix in [`SUFFIXES`].
 pub(super) const VQVAE: usize = 2;
+/// Position of the camera image's suffix in [`SUFFIXES`].
+const TOUCH: usize = 3;
+/// Position of the untouched camera image's suffix in [`SUFFIXES`].
+const REFERENCE: usize = 4;
 
-const SUFFIXES: [&str; 3] = ["_gelslim.png", "_bubble.png", "_vqvae.png"];
+const SUFFIXES: [&str; 5] = ["_gelslim", "_bubble", "_vqvae", "_touch", "_reference"];
+const EXTENSIONS: [&str; 3] = [".png", ".jpg", ".jpeg"];
+/// The untouched image of all touches that have none of their own.
+const COMMON_REFERENCE: &str = "reference";
 
-/// The files of a picture folder, in the order of the index: GelSlim, bubble, prediction.
-#[derive(Debug)]
+type Files = [Option<PathBuf>; SUFFIXES.len()];
+
+/// The files of a picture folder, in the order of the index.
+#[derive(Clone, Debug)]
 pub(super) struct Pictures {
-    pairs: Vec<[Option<PathBuf>; 3]>,
+    pub(super) pairs: Vec<Files>,
+    pub(super) folder: PathBuf,
 }
 
-/// Looks for picture pairs directly in `folder`; `None` if there is no such picture.
+/// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
 pub(super) fn scan(folder: &Path) -> Option<Scan> {
     let mut problems = Vec::new();
-    let mut found: BTreeMap<String, [Option<PathBuf>; 3]> = BTreeMap::new();
+    let mut found: BTreeMap<String, Files> = BTreeMap::new();
+    let mut common = None;
     for entry in std::fs::read_dir(folder).ok()? {
         let path = match entry {
             Ok(entry) => entry.path(),
@@ -66,13 +81,18 @@ pub(super) fn scan(folder: &Path) -> Option<Scan> {
         };
         let Some(name) = path.file_name().map(|n| n.to_string_lossy().into_owned()) else { continue };
         let lower = name.to_ascii_lowercase();
-        let Some(kind) = SUFFIXES.iter().position(|suffix| lower.ends_with(suffix)) else { continue };
+        let Some(stem) = EXTENSIONS.iter().find_map(|ext| lower.strip_suffix(ext)) else { continue };
         if name.starts_with('.') {
             continue;
         }
-        // The suffix is ASCII, so the cut is at a character.
-        let stem = name[..name.len() - SUFFIXES[kind].len()].to_owned();
-        let slot = &mut found.entry(stem).or_default()[kind];
+        if stem == COMMON_REFERENCE {
+            common = Some(path);
+            continue;
+        }
+        let Some(kind) = SUFFIXES.iter().position(|suffix| stem.ends_with(suffix)) else { continue };
+        // Suffix and extension are ASCII, so the cut is at a character.
+        let pair = name[..stem.len() - SUFFIXES[kind].len()].to_owned();
+        let slot = &mut found.entry(pair).or_default()[kind];
         match slot {
             Some(first) => problems.push(problem(
                 path.clone(),
@@ -82,22 +102,29 @@ pub(super) fn scan(folder: &Path) -> Option<Scan> {
             None => *slot = Some(path),
         }
     }
-    if found.values().all(|files| files[0].is_none() && files[BUBBLE].is_none()) {
+    if found.values().all(|files| [GELSLIM, BUBBLE, TOUCH].iter().all(|kind| files[*kind].is_none())) {
         return None;
     }
-    let mut pairs: Vec<(PairEntry, [Option<PathBuf>; 3])> = Vec::new();
-    for (name, files) in found {
-        match (&files[0], &files[BUBBLE]) {
-            (Some(_), Some(_)) => {
-                let number = last_integer(&name);
-                pairs.push((PairEntry { name, tool: None, split: Split::None, number }, files));
-            }
-            (Some(file), None) => problems.push(half(file, &name, SUFFIXES[BUBBLE])),
-            (None, Some(file)) => problems.push(half(file, &name, SUFFIXES[0])),
-            (None, None) => {
-                let file = files[VQVAE].clone().unwrap_or_default();
-                problems.push(half(&file, &name, SUFFIXES[0]));
-            }
+    let mut pairs: Vec<(PairEntry, Files)> = Vec::new();
+    for (name, mut files) in found {
+        let touched = files[TOUCH].is_some();
+        if touched && files[REFERENCE].is_none() {
+            files[REFERENCE].clone_from(&common);
+        }
+        let lone = |kind: usize| files[kind].clone().unwrap_or_default();
+        if files[GELSLIM].is_some() || (touched && files[REFERENCE].is_some()) {
+            let number = last_integer(&name);
+            pairs.push((PairEntry { name, tool: None, split: Split::None, number }, files));
+        } else if touched {
+            let what = format!("the untouched image is missing: {name}_reference.png, or one reference.png for all");
+            problems.push(problem(lone(TOUCH), what, "add the image of the gel without contact"));
+        } else if files[REFERENCE].is_none() || files[BUBBLE].is_some() || files[VQVAE].is_some() {
+            let file = if files[BUBBLE].is_some() { lone(BUBBLE) } else { lone(VQVAE) };
+            problems.push(problem(
+                file,
+                format!("its other half {name}{}.png is missing", SUFFIXES[GELSLIM]),
+                "add the missing picture, or remove this one",
+            ));
         }
     }
     pairs.sort_by(|(a, _), (b, _)| (a.number, &a.name).cmp(&(b.number, &b.name)));
@@ -106,13 +133,9 @@ pub(super) fn scan(folder: &Path) -> Option<Scan> {
         root: folder.to_owned(),
         pairs,
         problems,
-        source: Source::Pictures(Pictures { pairs: files }),
+        source: Source::Pictures(Pictures { pairs: files, folder: folder.to_owned() }),
         kind: SourceKind::Pictures,
     })
-}
-
-fn half(file: &Path, name: &str, missing: &str) -> Problem {
-    problem(file, format!("its other half {name}{missing} is missing"), "add the missing picture, or remove this one")
 }
 
 impl Pictures {
@@ -122,7 +145,9 @@ impl Pictures {
     }
 
     pub(super) fn files(&self, id: PairId) -> Vec<PathBuf> {
-        self.pairs.get(id.0 as usize).into_iter().flat_map(|files| files[..VQVAE].iter().flatten().cloned()).collect()
+        let files = self.pairs.get(id.0 as usize);
+        let kinds = [GELSLIM, TOUCH, REFERENCE, BUBBLE];
+        files.into_iter().flat_map(|files| kinds.iter().filter_map(|&kind| files[kind].clone())).collect()
     }
 
     /// A grey picture, laid upright as its pair's GelSlim picture tells.
@@ -140,7 +165,7 @@ impl Pictures {
 
     /// The upright difference image, and how it lay.
     fn difference(&self, id: PairId) -> Result<Option<(RgbGrid, Turn)>, LoadError> {
-        let Some(path) = self.file(id, 0)? else { return Ok(None) };
+        let Some(path) = self.file(id, GELSLIM)? else { return Ok(None) };
         let difference = difference_from_tile(&images::read_rgb(path)?);
         let turn = upright::seen(&difference).unwrap_or_default();
         Ok(Some((turn.undo(&difference), turn)))
@@ -157,10 +182,20 @@ impl Pictures {
     pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
         let mut notes = Vec::new();
         let mut touch = FingerTouch::default();
+        let mut scale = Scale::Assumed;
         let mut laid = Turn::default();
-        if let Some((difference, turn)) = self.difference(id)? {
+        if let (Some(touched), Some(reference)) = (self.file(id, TOUCH)?, self.file(id, REFERENCE)?) {
+            let (raw, untouched) = (images::read_rgb(touched)?, images::read_rgb(reference)?);
+            let sizes = [raw.size(), untouched.size()];
+            touch.gelslim = GelSlimTouch::from_images(raw, untouched);
+            if touch.gelslim.is_none() {
+                return Err(LoadError::Sizes { file: touched.to_owned(), sizes });
+            }
+            // The model's metres are its own; only a bubble picture has none.
+            scale = Scale::Measured;
+        } else if let Some((difference, turn)) = self.difference(id)? {
             laid = turn;
-            let path = self.file(id, 0)?.unwrap_or(Path::new(""));
+            let path = self.file(id, GELSLIM)?.unwrap_or(Path::new(""));
             if difference.as_slice().iter().all(|p| *p == [0.0; 3]) {
                 notes.push(problem(path, "the picture is a single colour", "check that the right picture was saved"));
             }
@@ -180,8 +215,9 @@ impl Pictures {
                 notes.push(problem(path, "the picture is a single grey", "check that the right picture was saved"));
             }
             touch.bubble = Some(BubbleTouch { imprint: imprint_from_tile(&tile), camera: None, truth: None });
+            scale = Scale::Assumed;
         }
-        let sample = Sample { fingers: [Some(touch), None], grasp_from_object: None, scale: Scale::Assumed, laid };
+        let sample = Sample { fingers: [Some(touch), None], grasp_from_object: None, scale, laid };
         Ok(Loaded { sample, notes, invalid: Default::default() })
     }
 }

@@ -57,7 +57,7 @@ impl ToolScale {
 ///
 /// # Errors
 /// [`MeshError`]; [`MeshError::Unit`], with the factor that would fit, if the model cannot be in metres.
-pub(super) fn read_in_metres(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, MeshError> {
+pub fn read_in_metres(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, MeshError> {
     let scale = match scale {
         Some(scale) => scale,
         None => ToolScale::beside(path)?.unwrap_or_default(),

@@ -94,7 +94,7 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
     let Some(cloud) = clouds.finger(picked.finger) else { return };
     let (x, y) = (usize::from(picked.pixel[0]), usize::from(picked.pixel[1]));
     let imprint = state.imprint(source, picked.finger).shown().and_then(|i| i.get(x, y).copied());
-    let camera = state.bubble(picked.finger).ready().and_then(|b| b.camera.as_ref());
+    let camera = state.touch(picked.finger).ready().and_then(|t| t.camera());
     let depth = camera.and_then(|c| c.depth_reference.get(x, y).copied()).zip(imprint).map(|(r, i)| r - i);
     let layer = state.layers(source).ready().and_then(|layers| layers.at(picked.finger, cloud, picked.pixel));
     let mm = |v: Option<f32>| v.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| units::text_mm(f64::from(v)));

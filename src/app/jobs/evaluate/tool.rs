@@ -142,8 +142,7 @@ impl Tool {
             MaskBy::Threshold(m) => MaskRecipe::Threshold(m.into()),
             MaskBy::Truth | MaskBy::Unet => MaskRecipe::Truth,
         };
-        let bubble = sample.finger(finger).and_then(|t| t.bubble.as_ref());
-        compute::mask(&recipe, imprint, bubble, self.model.as_ref(), sample.grasp_from_object)
+        compute::mask(&recipe, imprint, sample.finger(finger), self.model.as_ref(), sample.grasp_from_object)
             .map_err(|err| err.to_string())
     }
 

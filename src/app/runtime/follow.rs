@@ -1,0 +1,77 @@
+//! The thread that follows a folder. It sleeps almost always, and wakes the window only when a touch arrived.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+
+use super::super::command::Command;
+use super::super::error::TaskError;
+use super::super::jobs::Cancel;
+use super::super::keys::DatasetSeq;
+use super::super::services::{DataSource, Following};
+use super::lanes::Event;
+use super::{JobId, Runtime, Wake};
+use crate::io::follow::PERIOD;
+
+/// A followed folder.
+pub(super) enum Job {
+    /// On a thread of its own, until told to stop.
+    Thread(Cancel),
+    /// Looked at in each round, where the runtime has no threads.
+    Inline(DatasetSeq, Box<dyn Following>),
+}
+
+impl Runtime {
+    /// Follows a data set's folder instead of what was followed before; `None` follows nothing.
+    pub(super) fn follow(&mut self, of: Option<(DatasetSeq, Arc<dyn DataSource>)>) {
+        if let Some(Job::Thread(cancel)) = self.follower.take() {
+            cancel.cancel();
+        }
+        let Some((seq, source)) = of else { return };
+        if !self.threaded {
+            self.follower = source.follow().map(|following| Job::Inline(seq, following));
+            return;
+        }
+        let cancel = Cancel::default();
+        let (stop, sender, wake) = (cancel.clone(), self.sender.clone(), self.wake.clone());
+        let thread = std::thread::Builder::new().name("follow".into()).spawn(move || {
+            let work = AssertUnwindSafe(|| watch(seq, &*source, &stop, &sender, &wake));
+            if let Err(payload) = catch_unwind(work) {
+                let err = TaskError::panicked("Follow", &*payload);
+                drop(sender.send(Event { id: JobId::Follow, command: Command::Report(err) }));
+                wake();
+            }
+        });
+        match thread {
+            Ok(_) => self.follower = Some(Job::Thread(cancel)),
+            Err(err) => {
+                let command = Command::Report(TaskError::from_error("Follow", &err));
+                drop(self.sender.send(Event { id: JobId::Follow, command }));
+            }
+        }
+    }
+
+    pub(super) fn poll_follower(&mut self) {
+        if let Some(Job::Inline(seq, following)) = &mut self.follower {
+            while let Some(followed) = following.poll() {
+                let command = Command::Followed(*seq, followed);
+                drop(self.sender.send(Event { id: JobId::Follow, command }));
+            }
+        }
+    }
+}
+
+fn watch(seq: DatasetSeq, source: &dyn DataSource, stop: &Cancel, sender: &Sender<Event>, wake: &Wake) {
+    let Some(mut following) = source.follow() else { return };
+    while !stop.is_cancelled() {
+        match following.poll() {
+            Some(followed) => {
+                if sender.send(Event { id: JobId::Follow, command: Command::Followed(seq, followed) }).is_err() {
+                    return;
+                }
+                wake();
+            }
+            None => std::thread::sleep(PERIOD),
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! Several seeds of one touch: what `generate --seeds` and `pose --seeds` share.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
+use super::predict::Predictor;
+use crate::domain::ensemble::{AngleFan, Spread, channel_spread, seeds};
+use crate::domain::grid::{DepthMap, RgbGrid};
+use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
+use crate::domain::sample::Sample;
+use crate::domain::sensor::Finger;
+use crate::domain::units::angle_error;
+use crate::io::{images, npz};
+
+/// How many seeds.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct SeedArgs {
+    /// Predict with this many seeds, from the seed on: mean, spread per pixel, spread of the decoder's channels, and
+    /// the fan of the poses.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub seeds: u16,
+}
+
+/// Where the pictures of the fans go.
+#[derive(Debug, Clone, Args)]
+pub(super) struct FanArgs {
+    /// With `--seeds`: write a picture of each fan of poses into this folder.
+    #[arg(long, value_name = "DIR", requires = "seeds")]
+    pub fan_out: Option<PathBuf>,
+}
+
+/// The predictions of one finger.
+pub(super) struct FingerSeeds {
+    /// Metres, one per seed.
+    pub imprints: Vec<DepthMap>,
+    /// Around their mean.
+    pub spread: Spread,
+    /// Mean over the seeds of the spread of the decoder's channels, metres; `None` with a single channel.
+    pub channels: Option<DepthMap>,
+}
+
+/// Predicts one touch with every seed, in one batch.
+pub(super) fn predict(predictor: &mut Predictor, difference: &RgbGrid, count: u16) -> anyhow::Result<FingerSeeds> {
+    let config = predictor.config()?;
+    let shift = predictor.shift();
+    let generator = predictor.generator()?;
+    let list = seeds(config.seed, count.into());
+    let raw = generator.generate_seeds(difference, &list, &config, &mut |_| ControlFlow::Continue(()))?;
+    let chain = generator.spec().depth_chain(shift)?;
+    let imprints = raw.iter().map(|raw| chain.run(raw)).collect::<Result<Vec<_>, _>>()?;
+    let apart = raw.iter().map(|raw| channel_spread(raw, &chain)).collect::<Result<Option<Vec<_>>, _>>()?;
+    let mean = |maps: Vec<DepthMap>| Spread::of(&maps.iter().collect::<Vec<_>>()).map(|s| s.mean);
+    let spread = Spread::of(&imprints.iter().collect::<Vec<_>>());
+    let spread = spread.ok_or_else(|| anyhow::anyhow!("the generator gave no prediction"))?;
+    Ok(FingerSeeds { imprints, spread, channels: apart.and_then(mean) })
+}
+
+/// Figures of the seeds of one touch.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct SeedFigures {
+    seeds: Vec<u64>,
+    /// Of the spread over all pixels, metres.
+    spread_mean_m: Option<f64>,
+    spread_max_m: Option<f64>,
+    /// Of the spread of the decoder's channels, metres.
+    channels_mean_m: Option<f64>,
+    /// Of the mean over the seeds, against the measurement.
+    mean_psnr_db: Option<f64>,
+    mean_ssim: Option<f64>,
+}
+
+/// Writes mean and spreads as `STEM_{mean,spread,channels}.npy` (metres) and pictures of the spreads (0.0001 mm steps)
+/// and of the mean (0.001 mm steps from -20 mm).
+pub(super) fn write(
+    stem: &Path,
+    found: &FingerSeeds,
+    first: u64,
+    scores: impl FnOnce(&DepthMap) -> (Option<f64>, Option<f64>),
+) -> anyhow::Result<SeedFigures> {
+    let file = |what: &str, ending: &str| {
+        let mut name = stem.file_name().map(std::ffi::OsStr::to_os_string).unwrap_or_default();
+        name.push(format!("_{what}.{ending}"));
+        stem.with_file_name(name)
+    };
+    let maps = [
+        ("mean", Some(&found.spread.mean)),
+        ("spread", Some(&found.spread.std)),
+        ("channels", found.channels.as_ref()),
+    ];
+    for (what, map) in maps {
+        let Some(map) = map else { continue };
+        npz::write_npy(&file(what, "npy"), map)?;
+        let (from, step) = if what == "mean" { (0.02, 1e6) } else { (0.0, 1e7) };
+        images::write_grey16(&file(what, "png"), &map.map(|&d| ((d + from) * step).clamp(0.0, 65535.0) as u16))?;
+    }
+    let finite = |v: f64| v.is_finite().then_some(v);
+    let mean_of = |map: &DepthMap| finite(crate::domain::postprocess::Stats::of(map).mean);
+    let (mean_psnr_db, mean_ssim) = scores(&found.spread.mean);
+    Ok(SeedFigures {
+        seeds: seeds(first, found.imprints.len()),
+        spread_mean_m: finite(found.spread.mean_std()),
+        spread_max_m: finite(found.spread.max_std()),
+        channels_mean_m: found.channels.as_ref().and_then(mean_of),
+        mean_psnr_db,
+        mean_ssim,
+    })
+}
+
+/// The poses of the seeds of one grasp. All angles are the lab's, degrees.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct PoseFan {
+    seeds: Vec<u64>,
+    /// Of each seed; `None` without a pose.
+    angles_deg: Vec<Option<f64>>,
+    /// The circular mean.
+    mean_deg: Option<f64>,
+    /// Circular standard deviation.
+    std_deg: Option<f64>,
+    /// Farthest to either side of the mean, as differences from it.
+    extremes_deg: Option<[f64; 2]>,
+    /// Of the pose of the mean imprint.
+    pub of_mean_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_error_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of_mean_error_deg: Option<f64>,
+    #[serde(skip)]
+    fan: Option<AngleFan>,
+    #[serde(skip)]
+    truth_rad: Option<f64>,
+}
+
+impl PoseFan {
+    /// Writes `NAME_ENGINE_fan.png`; nothing where the angles have no mean.
+    pub(super) fn write(&self, folder: &Path, name: &str, engine: Engine) -> anyhow::Result<()> {
+        let file = folder.join(format!("{}_{}_fan.png", name.replace(['/', '\\'], "__"), engine.key()));
+        if let Some(picture) = self.fan.as_ref().and_then(|fan| super::bench::fan::picture(name, fan, self.truth_rad)) {
+            images::write_rgb8(&file, &picture)?;
+        }
+        Ok(())
+    }
+}
+
+/// Predicts both fingers with every seed and registers each, and the mean imprint.
+pub(super) fn fan(
+    predictor: &mut Predictor,
+    sample: &Sample,
+    tool: &ToolModel,
+    engine: Engine,
+    args: &MaskArgs,
+    count: u16,
+) -> anyhow::Result<PoseFan> {
+    let mut fingers: [Option<FingerSeeds>; 2] = [None, None];
+    for finger in Finger::BOTH {
+        if let Some(gelslim) = sample.finger(finger).and_then(|t| t.gelslim.as_ref()) {
+            fingers[finger.index()] = Some(predict(predictor, &gelslim.difference, count)?);
+        }
+    }
+    let source = match args.mask {
+        MaskFrom::Auto => MaskFrom::Unet,
+        other => other,
+    };
+    let mut angle = |imprints: [Option<&DepthMap>; 2]| -> anyhow::Result<Option<f64>> {
+        let mut masks = [None, None];
+        for finger in Finger::BOTH {
+            let (Some(imprint), Some(touch)) = (imprints[finger.index()], sample.finger(finger)) else { continue };
+            let truth = sample.grasp_from_object;
+            masks[finger.index()] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
+        }
+        let inputs = Finger::BOTH.map(|f| {
+            let camera = sample.finger(f)?.camera()?;
+            Some(FingerInput { imprint: imprints[f.index()]?, camera, mask: masks[f.index()].as_ref() })
+        });
+        Ok(estimate(&inputs, tool, engine, false).ok().map(|r| r.object_from_grasp.theta_rad))
+    };
+    let mut angles = Vec::new();
+    for i in 0..usize::from(count) {
+        angles.push(angle(fingers.each_ref().map(|f| Some(&f.as_ref()?.imprints[i])))?);
+    }
+    let of_mean = angle(fingers.each_ref().map(|f| Some(&f.as_ref()?.spread.mean)))?;
+    let fan = AngleFan::of(&angles.iter().flatten().copied().collect::<Vec<_>>());
+    let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
+    let mean = fan.as_ref().and_then(|f| f.mean_rad);
+    let error = |angle: Option<f64>| Some(angle_error(angle?, truth?).to_degrees());
+    let finite = |v: f64| v.is_finite().then_some(v.to_degrees());
+    Ok(PoseFan {
+        seeds: seeds(predictor.config()?.seed, count.into()),
+        angles_deg: angles.iter().map(|a| a.map(f64::to_degrees)).collect(),
+        mean_deg: mean.map(f64::to_degrees),
+        std_deg: fan.as_ref().and_then(|f| finite(f.std_rad)),
+        extremes_deg: fan.as_ref().map(|f| f.extremes_rad).filter(|e| e[0].is_finite()).map(|e| e.map(f64::to_degrees)),
+        of_mean_deg: of_mean.map(f64::to_degrees),
+        mean_error_deg: error(mean),
+        of_mean_error_deg: error(of_mean),
+        fan,
+        truth_rad: truth,
+    })
+}

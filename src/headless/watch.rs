@@ -1,0 +1,247 @@
+//! `touch2touch watch`: each GelSlim touch that appears in a folder is predicted, posed, and written beside it. This is
+//! how a robot uses the models online.
+
+mod one;
+mod summary;
+mod write;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant, SystemTime};
+
+use async_signal::{Signal, Signals};
+use clap::Args;
+use serde::Serialize;
+use serde_json::json;
+
+use super::contact_mask::{MaskArgs, MaskFrom};
+use super::pose::{Engines, parse_engines};
+use super::predict::{ModelArgs, Predictor};
+use super::{Common, Output, ToolArgs, VerbResult};
+use crate::domain::dataset::{PairId, Problem};
+use crate::domain::sample::BubbleCamera;
+use crate::io::dataset::{Dataset, cameras_of};
+use crate::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
+use one::{Done, Worker};
+use summary::Summary;
+use write::Save;
+
+/// Arguments of `watch`.
+#[derive(Debug, Args)]
+pub(super) struct WatchArgs {
+    /// The folder to follow, which may still be empty: a dataset in the lab's layout (the bubbles may be missing), a
+    /// folder of GelSlim .pt files, of NAME_gelslim.png, or of NAME_touch.png with NAME_reference.png or one
+    /// reference.png (or .jpg).
+    path: PathBuf,
+    /// Write the results into this folder instead of beside the touches.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// The tool held: an .stl file, or the name of a tool of the dataset or the demo. Without it, the tool that the
+    /// file's name says; if that says none, there is no pose.
+    #[arg(long, value_name = "NAME|FILE.stl")]
+    tool: Option<String>,
+    #[command(flatten)]
+    unit: ToolArgs,
+    /// The bubble cameras for touches without a bubble file: a bubble .pt file of the same rig, or `demo`. Without it,
+    /// rig.pt in the folder, else its first bubble file; if there is none, there is no pose.
+    #[arg(long, value_name = "FILE.pt|demo")]
+    camera: Option<PathBuf>,
+    #[command(flatten)]
+    mask: MaskArgs,
+    /// The registration.
+    #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = parse_engines())]
+    engine: Engines,
+    /// What is written beside NAME.t2t.json: imprints in metres and masks as .npz or .pt, 16-bit pictures (0.001 mm
+    /// steps from -20 mm) as .png.
+    #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Save::Npz, Save::Png])]
+    save: Vec<Save>,
+    /// Take up what lies there already as well, unless it was done with the same recipe.
+    #[arg(long)]
+    existing: bool,
+    /// Take up what lies there, and end.
+    #[arg(long)]
+    once: bool,
+    /// How long a file that cannot be read may stay unchanged before it counts as broken, seconds.
+    #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
+    patience: f64,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// Where the results of a touch go: `stem` and an ending.
+fn stem(out: Option<&Path>, file: &Path, name: &str) -> PathBuf {
+    match out {
+        Some(out) => out.join(name.replace(['/', '\\'], "__")),
+        None => file.with_extension(""),
+    }
+}
+
+/// What a touch was when it was done: with the same numbers and the same recipe it need not be done again.
+#[derive(Debug, Clone, Serialize)]
+struct Source {
+    file: String,
+    bytes: u64,
+    modified_ns: u64,
+}
+
+impl Source {
+    fn new(file: &Path, stamp: Stamp) -> Self {
+        let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        Self { file: name, bytes: stamp.bytes, modified_ns: stamp.modified_ns() }
+    }
+}
+
+pub(super) fn run(args: &WatchArgs) -> VerbResult {
+    let output = Output::new(args.common, "watching", 0);
+    let stop = Arc::new(AtomicBool::new(false));
+    take_signals(stop.clone())?;
+    if matches!(args.mask.mask, MaskFrom::Cad | MaskFrom::Truth) {
+        anyhow::bail!("--mask {} needs the true pose, which a new touch does not have", args.mask.mask.key());
+    }
+    if let Some(out) = &args.out {
+        std::fs::create_dir_all(out)
+            .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;
+    }
+    let patience = Duration::try_from_secs_f64(args.patience)
+        .map_err(|_| anyhow::anyhow!("--patience {} is no time in seconds", args.patience))?;
+    let config = FollowConfig {
+        existing: args.existing || args.once,
+        patience,
+        tool_scale: args.unit.tool_scale,
+        rig: rig(args.camera.as_deref())?,
+    };
+    let mut follower = Follower::new(&args.path, config)?;
+    let mut worker = Worker::new(args, Predictor::new(&args.model), stop.clone())?;
+    let ready = json!({
+        "event": "ready", "folder": args.path, "recipe": worker.recipe(None)?, "period_ms": PERIOD.as_secs_f64() * 1e3,
+        "load_and_warm_up_s": worker.warm_s,
+    });
+    output.line(&ready, || {
+        format!("following {} (models warm after {:.1} s); Ctrl-C ends", args.path.display(), worker.warm_s)
+    })?;
+
+    let mut summary = Summary::default();
+    let mut unreadable = None;
+    while !stop.load(Ordering::Relaxed) {
+        let Some(ready) = follower.poll(Instant::now()) else {
+            let why = follower.unreadable().map(str::to_owned);
+            if why != unreadable {
+                if let Some(why) = &why {
+                    output.note(why);
+                }
+                unreadable = why;
+            }
+            if args.once && follower.waiting() == 0 {
+                break;
+            }
+            std::thread::sleep(PERIOD);
+            continue;
+        };
+        touch(args, &mut follower, &mut worker, &ready, &output, &mut summary)?;
+    }
+    if args.once && follower.dataset().is_none() {
+        anyhow::bail!(
+            "no touch was found ({}); see `touch2touch watch --help` for what counts as one",
+            args.path.display()
+        );
+    }
+    output.line(&summary.json(), || summary.text())?;
+    Ok(summary.failed() == 0)
+}
+
+/// From now on Ctrl-C sets `stop` instead of ending the program in the middle of a touch; a second one ends it.
+fn take_signals(stop: Arc<AtomicBool>) -> anyhow::Result<()> {
+    let wanted: &[Signal] = if cfg!(unix) { &[Signal::Int, Signal::Term] } else { &[Signal::Int] };
+    let signals =
+        Signals::new(wanted).map_err(|err| anyhow::anyhow!("cannot take care of Ctrl-C and its kind: {err}"))?;
+    std::thread::Builder::new().name("signals".into()).spawn(move || {
+        for _ in futures_lite::stream::block_on(signals) {
+            if stop.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        }
+    })?;
+    Ok(())
+}
+
+/// The cameras that `--camera` names.
+fn rig(named: Option<&Path>) -> anyhow::Result<Option<[Option<BubbleCamera>; 2]>> {
+    let Some(file) = named else { return Ok(None) };
+    let cameras = if file == Path::new("demo") {
+        Dataset::demo().load(PairId(0))?.fingers.map(|touch| touch?.bubble?.camera)
+    } else {
+        cameras_of(file)?
+    };
+    if cameras.iter().all(Option::is_none) {
+        anyhow::bail!(
+            "the file has no camera: K, bubbles_tr_quat, grasp_frame_quat and bubble_depth_ref are needed ({})",
+            file.display()
+        );
+    }
+    Ok(Some(cameras))
+}
+
+/// Takes one touch as far as it goes now.
+fn touch(
+    args: &WatchArgs,
+    follower: &mut Follower,
+    worker: &mut Worker<'_>,
+    ready: &Ready,
+    output: &Output,
+    summary: &mut Summary,
+) -> anyhow::Result<()> {
+    if ready.completed {
+        return Ok(());
+    }
+    let stem = stem(args.out.as_deref(), &ready.file, &ready.name);
+    let source = Source::new(&ready.file, ready.stamp);
+    let tool = worker.tool_name(follower.dataset().and_then(|d| d.index.get(ready.id)?.tool.clone()));
+    let recipe = worker.recipe(tool.as_deref())?;
+    if write::is_done(&stem, &source, &recipe) {
+        summary.skip();
+        return output.line(&json!({"event": "skipped", "name": ready.name}), || {
+            format!("{}: was done with the same recipe", ready.name)
+        });
+    }
+    let found = SystemTime::now();
+    let start = Instant::now();
+    let problem = match follower.load(ready, start) {
+        Arrival::Unfinished => return Ok(()),
+        Arrival::Gone => {
+            return output.line(&json!({"event": "gone", "name": ready.name}), || format!("{}: is gone", ready.name));
+        }
+        Arrival::Broken(problem) => problem,
+        Arrival::Whole(loaded) => {
+            let Some(dataset) = follower.dataset().cloned() else { return Ok(()) };
+            match worker.work(&dataset, &loaded.sample, tool.as_deref(), &stem, &source, &recipe, (ready, found, start))
+            {
+                Ok(Some(done)) => return report(output, &done, summary),
+                // Ctrl-C.
+                Ok(None) => return Ok(()),
+                Err(err) => Problem {
+                    file: ready.file.clone(),
+                    what: format!("{err:#}"),
+                    hint: "touch the file to have it tried again".into(),
+                },
+            }
+        }
+    };
+    summary.fail();
+    if let Err(err) = write::failure(&stem, &source, &recipe, &problem) {
+        output.note(&format!("{}: {err:#}", ready.name));
+    }
+    let event = json!({"event": "error", "name": ready.name, "error": problem.what, "hint": problem.hint});
+    output.line(&event, || format!("{}: {} ({})", ready.name, problem.what, problem.hint))
+}
+
+fn report(output: &Output, done: &Done, summary: &mut Summary) -> anyhow::Result<()> {
+    summary.add(&done.latency, done.fresh);
+    let mut event = json!({"event": "done"});
+    if let (Some(event), serde_json::Value::Object(rest)) = (event.as_object_mut(), serde_json::to_value(done)?) {
+        event.extend(rest);
+    }
+    output.line(&event, || done.text())
+}

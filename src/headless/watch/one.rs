@@ -1,0 +1,323 @@
+//! One touch: prediction, masks, pose, files.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Instant, SystemTime};
+
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::super::contact_mask::MaskFrom;
+use super::super::predict::Predictor;
+use super::summary::Latency;
+use super::write::{self, FingerResult};
+use super::{Source, WatchArgs};
+use crate::app::jobs::compute;
+use crate::app::keys::MaskRecipe;
+use crate::domain::frames::PlanarPose;
+use crate::domain::grid::{Grid, RgbGrid};
+use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
+use crate::domain::sample::{Sample, Scale};
+use crate::domain::sensor::{Finger, gelslim};
+use crate::domain::units::angle_error;
+use crate::infer::generator::GenerateError;
+use crate::io::dataset::{Dataset, read_in_metres};
+use crate::io::follow::Ready;
+
+/// The models, loaded once, and the tools met so far.
+pub(super) struct Worker<'a> {
+    args: &'a WatchArgs,
+    predictor: Predictor,
+    engine: Engine,
+    tools: BTreeMap<String, ToolModel>,
+    stop: Arc<AtomicBool>,
+    /// Seconds that loading and the first run took.
+    pub warm_s: f64,
+}
+
+/// Figures of one finger.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct FingerFigures {
+    finger: &'static str,
+    min_m: f64,
+    max_m: f64,
+    mean_m: f64,
+    contact_px: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    psnr_db: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ssim: Option<f64>,
+}
+
+/// A pose, in the lab's sense of the angle.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct PoseFigures {
+    tool: String,
+    angle_deg: f64,
+    y_m: f64,
+    z_m: f64,
+    grasp_from_object: PlanarPose,
+    rms_m: f64,
+    points: usize,
+    stop: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    truth_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_deg: Option<f64>,
+}
+
+/// A result, as it is written and said.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Done {
+    name: String,
+    source: Source,
+    recipe: Value,
+    files: Vec<String>,
+    scale: &'static str,
+    fingers: Vec<FingerFigures>,
+    pose: Option<PoseFigures>,
+    /// Why there is no pose.
+    no_pose: Option<String>,
+    /// Up to the writing of this very file; the event and the summary include it.
+    pub latency: Latency,
+    error: Option<String>,
+    #[serde(skip)]
+    pub fresh: bool,
+}
+
+impl Done {
+    pub(super) fn text(&self) -> String {
+        let pose = match (&self.pose, &self.no_pose) {
+            (Some(p), _) => format!("{:.1} deg, y {:.2} mm, z {:.2} mm", p.angle_deg, p.y_m * 1e3, p.z_m * 1e3),
+            (None, Some(why)) => format!("no pose: {why}"),
+            (None, None) => "no pose".to_owned(),
+        };
+        let l = &self.latency;
+        let when = if self.fresh { format!("{:.0} ms after it was closed", l.total) } else { "lay there".to_owned() };
+        format!("{}: {pose} ({when}; generator {:.0} ms)", self.name, l.generate)
+    }
+}
+
+impl<'a> Worker<'a> {
+    /// Loads the models and runs them once, so that the first touch does not wait for memory and kernels.
+    pub(super) fn new(args: &'a WatchArgs, mut predictor: Predictor, stop: Arc<AtomicBool>) -> anyhow::Result<Self> {
+        let engine = match args.engine.0.as_slice() {
+            [engine] => *engine,
+            _ => anyhow::bail!("--engine all is for `touch2touch pose`; one registration is needed here"),
+        };
+        let start = Instant::now();
+        let config = predictor.config()?;
+        let blank = RgbGrid::filled(gelslim::WIDTH, gelslim::HEIGHT, [0.0; 3]);
+        let shift = predictor.shift();
+        let generator = predictor.generator()?;
+        let raw = generator.generate_batch(&[&blank, &blank], &config, &mut |_| ControlFlow::Continue(()))?;
+        let imprint = generator.depth(&raw[0], shift)?;
+        if matches!(args.mask.mask, MaskFrom::Unet | MaskFrom::Auto) {
+            predictor.mask(&imprint)?;
+        }
+        let warm_s = start.elapsed().as_secs_f64();
+        Ok(Self { args, predictor, engine, tools: BTreeMap::new(), stop, warm_s })
+    }
+
+    /// The tool of a touch: what the command line says, else what the file's name says.
+    pub(super) fn tool_name(&self, of_pair: Option<String>) -> Option<String> {
+        self.args.tool.clone().or(of_pair)
+    }
+
+    /// Everything the result depends on besides the touch.
+    pub(super) fn recipe(&mut self, tool: Option<&str>) -> anyhow::Result<Value> {
+        let config = self.predictor.config()?;
+        let shift = self.predictor.shift();
+        let generator = self.predictor.generator()?.recipe(String::new(), &config);
+        let mask = match self.args.mask.mask {
+            MaskFrom::Threshold => json!({"threshold_mm": self.args.mask.threshold_mm}),
+            _ => json!("unet"),
+        };
+        Ok(json!({
+            "bundle": self.predictor.bundle_name(), "bundle_hash": generator.bundle, "runtime": generator.engine,
+            "sampler": config.sampler, "steps": config.steps, "seed": config.seed, "eta": config.eta,
+            "spacing": config.spacing, "guidance": config.guidance, "shift": shift, "mask": mask, "registration": self.engine, "tool": tool,
+            "camera": self.args.camera, "version": env!("CARGO_PKG_VERSION"),
+        }))
+    }
+
+    /// The CAD model of a tool, from memory; one that was not there is looked for again.
+    fn tool(&mut self, dataset: &Dataset, name: &str) -> Result<&ToolModel, String> {
+        if !self.tools.contains_key(name) {
+            let model = load_tool(dataset, name, self.args).map_err(|err| format!("{err:#}"))?;
+            self.tools.insert(name.to_owned(), model);
+        }
+        self.tools.get(name).ok_or_else(|| format!("no CAD model of {name}"))
+    }
+
+    /// Predicts, poses and writes. `None` if the run was told to stop meanwhile.
+    #[allow(clippy::too_many_arguments, reason = "one call site, and each is a part of the question")]
+    pub(super) fn work(
+        &mut self,
+        dataset: &Dataset,
+        sample: &Sample,
+        tool: Option<&str>,
+        stem: &Path,
+        source: &Source,
+        recipe: &Value,
+        (ready, found, start): (&Ready, SystemTime, Instant),
+    ) -> anyhow::Result<Option<Done>> {
+        let since = |earlier: SystemTime, later: SystemTime| {
+            later.duration_since(earlier).map_or(0.0, |d| d.as_secs_f64() * 1e3)
+        };
+        let ms = |from: Instant| from.elapsed().as_secs_f64() * 1e3;
+        let mut latency = Latency { found: since(ready.stamp.closed, found), load: ms(start), ..Latency::default() };
+
+        let step = Instant::now();
+        let Some(mut fingers) = self.imprints(sample)? else { return Ok(None) };
+        latency.generate = ms(step);
+        let step = Instant::now();
+        for f in &mut fingers {
+            f.mask = Some(match self.args.mask.mask {
+                MaskFrom::Threshold => {
+                    let recipe = MaskRecipe::Threshold((self.args.mask.threshold_mm / 1e3).into());
+                    compute::mask(&recipe, &f.imprint, None, None, None).map_err(|err| anyhow::anyhow!("{err}"))?
+                }
+                _ => self.predictor.mask(&f.imprint)?,
+            });
+        }
+        latency.mask = ms(step);
+        let step = Instant::now();
+        let (pose, no_pose) = match self.pose(dataset, sample, tool, &fingers) {
+            Ok(pose) => (Some(pose), None),
+            Err(why) => (None, Some(why)),
+        };
+        latency.pose = ms(step);
+
+        let step = Instant::now();
+        let files = write::predictions(stem, &fingers, &self.args.save)?;
+        latency.write = ms(step);
+        latency.total = since(ready.stamp.closed, SystemTime::now());
+        let mut done = Done {
+            name: ready.name.clone(),
+            source: source.clone(),
+            recipe: recipe.clone(),
+            files,
+            scale: match sample.scale {
+                Scale::Measured => "measured",
+                Scale::Assumed => "assumed",
+            },
+            fingers: fingers.iter().map(|f| figures(sample, f)).collect(),
+            pose,
+            no_pose,
+            latency,
+            error: None,
+            fresh: ready.fresh,
+        };
+        write::result(stem, &done)?;
+        done.latency.write = ms(step);
+        done.latency.total = since(ready.stamp.closed, SystemTime::now());
+        Ok(Some(done))
+    }
+
+    /// Imprints of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
+    fn imprints(&mut self, sample: &Sample) -> anyhow::Result<Option<Vec<FingerResult>>> {
+        let touched: Vec<(Finger, &RgbGrid)> = Finger::BOTH
+            .into_iter()
+            .filter_map(|finger| Some((finger, &sample.finger(finger)?.gelslim.as_ref()?.difference)))
+            .collect();
+        if touched.is_empty() {
+            anyhow::bail!("no GelSlim image");
+        }
+        let config = self.predictor.config()?;
+        let shift = self.predictor.shift();
+        let stop = self.stop.clone();
+        let mut progress = |_| match stop.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        let generator = self.predictor.generator()?;
+        let differences: Vec<&RgbGrid> = touched.iter().map(|(_, difference)| *difference).collect();
+        let raw = match generator.generate_batch(&differences, &config, &mut progress) {
+            Err(GenerateError::Cancelled) => return Ok(None),
+            other => other?,
+        };
+        let mut out = Vec::new();
+        for ((finger, _), raw) in touched.iter().zip(&raw) {
+            out.push(FingerResult { finger: *finger, imprint: generator.depth(raw, shift)?, mask: None });
+        }
+        Ok(Some(out))
+    }
+
+    /// The pose, or why there is none.
+    fn pose(
+        &mut self,
+        dataset: &Dataset,
+        sample: &Sample,
+        tool: Option<&str>,
+        fingers: &[FingerResult],
+    ) -> Result<PoseFigures, String> {
+        let engine = self.engine;
+        let name = tool.ok_or("the file's name says no tool; name it with --tool")?;
+        let mut inputs = [None, None];
+        for f in fingers {
+            let camera = sample.finger(f.finger).and_then(|t| t.camera());
+            inputs[f.finger.index()] =
+                camera.map(|camera| FingerInput { imprint: &f.imprint, camera, mask: f.mask.as_ref() });
+        }
+        if inputs.iter().all(Option::is_none) {
+            return Err("no bubble camera is known; name a bubble file of the rig with --camera".into());
+        }
+        let model = self.tool(dataset, name)?;
+        let found = estimate(&inputs, model, engine, false).map_err(|err| err.to_string())?;
+        let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
+        let theta = found.object_from_grasp.theta_rad;
+        Ok(PoseFigures {
+            tool: name.to_owned(),
+            angle_deg: theta.to_degrees(),
+            y_m: found.object_from_grasp.y_m,
+            z_m: found.object_from_grasp.z_m,
+            grasp_from_object: found.grasp_from_object,
+            rms_m: found.report.inlier_rms_m,
+            points: found.cloud.points.len(),
+            stop: found.report.stop.to_string(),
+            truth_deg: truth.map(f64::to_degrees),
+            error_deg: truth.map(|t| angle_error(theta, t).to_degrees()),
+        })
+    }
+}
+
+/// The CAD model of a tool: a file, one of the dataset's, or one of the demo's.
+fn load_tool(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<ToolModel> {
+    let mesh = if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("stl")) {
+        Some(
+            read_in_metres(Path::new(name), args.unit.tool_scale)
+                .map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))?,
+        )
+    } else {
+        match dataset.tool_mesh(name).map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))? {
+            Some(mesh) => Some(mesh),
+            None => Dataset::demo().tool_mesh(name).ok().flatten(),
+        }
+    };
+    let mesh = mesh.ok_or_else(|| {
+        anyhow::anyhow!("no CAD model of {name}: put {name}.stl into tools_stls, or name a file with --tool")
+    })?;
+    Ok(ToolModel::new(mesh)?)
+}
+
+/// Numbers of one prediction, against the measurement where there is one.
+fn figures(sample: &Sample, result: &FingerResult) -> FingerFigures {
+    let stats = crate::domain::postprocess::Stats::of(&result.imprint);
+    let measured = sample.finger(result.finger).and_then(|t| t.bubble.as_ref()).map(|b| &b.imprint);
+    let measured = measured.filter(|m| m.size() == result.imprint.size());
+    let compared = measured.and_then(|m| compute::compare(&result.imprint, m, sample.scale).ok());
+    let count = |mask: &Grid<bool>| mask.as_slice().iter().filter(|&&m| m).count();
+    FingerFigures {
+        finger: result.finger.name(),
+        min_m: stats.min,
+        max_m: stats.max,
+        mean_m: stats.mean,
+        contact_px: result.mask.as_ref().map(count),
+        psnr_db: compared.as_ref().and_then(|c| c.psnr_db),
+        ssim: compared.as_ref().and_then(|c| c.ssim),
+    }
+}

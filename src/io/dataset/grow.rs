@@ -1,0 +1,177 @@
+//! Folders that fill while they are open: pairs that appear are added behind the others, so that a [`PairId`] stays what
+//! it was; touches without a bubble borrow the cameras of the rig.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+
+use super::lab::{FileRef, Lab};
+use super::{Dataset, LoadError, OpenError, Source};
+use crate::domain::dataset::PairId;
+use crate::domain::sample::{BubbleCamera, Sample};
+use crate::domain::sensor::Finger;
+
+/// What is in the name of every file that is written beside a touch; such files are never taken for touches.
+pub const OUTPUT_MARK: &str = ".t2t.";
+/// A bubble file of the rig, in the root of a dataset: its cameras serve touches that have no bubble file.
+pub const RIG_FILE: &str = "rig.pt";
+
+/// Whether a file name is one that this program writes beside touches.
+pub fn is_output(name: &str) -> bool {
+    name.contains(OUTPUT_MARK)
+}
+
+/// A dataset after its folder was read again.
+#[derive(Debug)]
+pub struct Growth {
+    /// The dataset: pairs known before keep their ids, also where their files are gone.
+    pub dataset: Dataset,
+    /// The pairs that were not there before.
+    pub new: Vec<PairId>,
+    /// Pairs known before that have other files now, such as a bubble that came later.
+    pub changed: Vec<PairId>,
+}
+
+impl Dataset {
+    /// Reads the folder again, for pairs that appeared.
+    ///
+    /// # Errors
+    /// [`OpenError`]; [`OpenError::NothingFound`] also where the folder now holds another kind of dataset.
+    pub fn grown(&self) -> Result<Growth, OpenError> {
+        let Some(root) = &self.root else {
+            return Ok(Growth { dataset: self.clone(), new: Vec::new(), changed: Vec::new() });
+        };
+        let fresh = Self::open(root)?;
+        let known: BTreeMap<&str, usize> =
+            self.index.pairs.iter().enumerate().map(|(at, entry)| (entry.name.as_str(), at)).collect();
+        let mut dataset = Self { problems: fresh.problems.clone(), rig: OnceLock::new(), ..self.clone() };
+        if let Some(rig) = self.rig.get().filter(|rig| rig.iter().any(Option::is_some)) {
+            dataset.rig.set(rig.clone()).ok();
+        }
+        let (mut new, mut changed) = (Vec::new(), Vec::new());
+        for (at, entry) in fresh.index.pairs.iter().enumerate() {
+            let at = PairId(at as u32);
+            match known.get(entry.name.as_str()) {
+                Some(&old) => {
+                    let old = PairId(old as u32);
+                    if self.pair_files(old) != fresh.pair_files(at) && dataset.take(&fresh, at, Some(old)) {
+                        changed.push(old);
+                    }
+                }
+                None => {
+                    if dataset.take(&fresh, at, None) {
+                        new.push(PairId(dataset.index.pairs.len() as u32));
+                        dataset.index.pairs.push(entry.clone());
+                    }
+                }
+            }
+        }
+        if let (Source::Lab(mine), Source::Lab(other)) = (&mut dataset.source, &fresh.source) {
+            mine.meshes.clone_from(&other.meshes);
+        }
+        Ok(Growth { dataset, new, changed })
+    }
+
+    /// Takes over the files of a pair of `fresh`, for the pair `into` or a further one; not from another kind of source.
+    fn take(&mut self, fresh: &Self, id: PairId, into: Option<PairId>) -> bool {
+        match (&mut self.source, &fresh.source) {
+            (Source::Lab(mine), Source::Lab(other)) => {
+                let mut files = other.pairs[id.0 as usize].clone();
+                for file in [&mut files.gelslim, &mut files.bubble].into_iter().flatten() {
+                    *file =
+                        FileRef { folder: mine.folder_number(&other.folders[file.folder as usize]), ..file.clone() };
+                }
+                put(&mut mine.pairs, files, into);
+            }
+            (Source::Pictures(mine), Source::Pictures(other)) => {
+                put(&mut mine.pairs, other.pairs[id.0 as usize].clone(), into);
+            }
+            _ => return false,
+        }
+        true
+    }
+
+    /// The folders whose content decides which pairs there are.
+    pub fn folders(&self) -> Vec<PathBuf> {
+        match &self.source {
+            Source::Lab(lab) => lab.folders.clone(),
+            Source::Pictures(pictures) => vec![pictures.folder.clone()],
+            Source::BuiltIn(_) => Vec::new(),
+        }
+    }
+
+    /// The GelSlim file of a pair, or the picture that stands for it; `None` where there is none.
+    pub fn gelslim_file(&self, id: PairId) -> Option<PathBuf> {
+        let first = self.pair_files(id).into_iter().next()?;
+        match &self.source {
+            Source::Lab(lab) => lab.pairs[id.0 as usize].gelslim.is_some().then_some(first),
+            Source::Pictures(_) | Source::BuiltIn(_) => Some(first),
+        }
+    }
+
+    /// Lets touches that come without a bubble use these cameras, by [`Finger::index`].
+    pub fn set_rig_cameras(&mut self, cameras: [Option<BubbleCamera>; 2]) {
+        self.rig = OnceLock::from(cameras.map(|camera| camera.map(Arc::new)));
+    }
+
+    /// The cameras for touches without a bubble: of [`RIG_FILE`] in the root, else of the first bubble file.
+    fn rig(&self) -> &[Option<Arc<BubbleCamera>>; 2] {
+        self.rig.get_or_init(|| {
+            let named = self.root.iter().map(|root| root.join(RIG_FILE)).find(|file| file.is_file());
+            let first = || match &self.source {
+                Source::Lab(lab) => lab.first_bubble(),
+                Source::Pictures(_) | Source::BuiltIn(_) => None,
+            };
+            let cameras = named.or_else(first).map(|file| (Lab::cameras(&file), file));
+            match cameras {
+                Some((Ok(cameras), _)) => cameras.map(|camera| camera.map(Arc::new)),
+                Some((Err(err), file)) => {
+                    log::warn!("no cameras for touches without a bubble: {err} ({})", file.display());
+                    [None, None]
+                }
+                None => [None, None],
+            }
+        })
+    }
+
+    pub(super) fn lend_cameras(&self, sample: &mut Sample) {
+        for finger in Finger::BOTH {
+            if let Some(touch) = &mut sample.fingers[finger.index()]
+                && touch.bubble.is_none()
+            {
+                touch.rig.clone_from(&self.rig()[finger.index()]);
+            }
+        }
+    }
+}
+
+/// The cameras in a bubble file of the lab's, by [`Finger::index`].
+///
+/// # Errors
+/// [`LoadError`] if the file cannot be read; one without camera data has none.
+pub fn cameras_of(file: &Path) -> Result<[Option<BubbleCamera>; 2], LoadError> {
+    Lab::cameras(file)
+}
+
+fn put<T>(list: &mut Vec<T>, item: T, at: Option<PairId>) {
+    match at.and_then(|at| list.get_mut(at.0 as usize)) {
+        Some(place) => *place = item,
+        None => list.push(item),
+    }
+}
+
+impl Lab {
+    /// The position of a folder in the list; added if it is new.
+    fn folder_number(&mut self, folder: &Path) -> u32 {
+        let at = self.folders.iter().position(|f| f == folder).unwrap_or_else(|| {
+            self.folders.push(folder.to_owned());
+            self.folders.len() - 1
+        });
+        at as u32
+    }
+
+    fn first_bubble(&self) -> Option<PathBuf> {
+        let file = self.pairs.iter().find_map(|pair| pair.bubble.as_ref())?;
+        Some(self.folders[file.folder as usize].join(&file.name))
+    }
+}
