@@ -413,7 +413,7 @@ impl State {
 }
 
 /// Panes that show something of the selected pair.
-const PAIR_PANES: [Pane; 16] = [
+const PAIR_PANES: [Pane; 17] = [
     Pane::GelRaw,
     Pane::GelReference,
     Pane::GelDifference,
