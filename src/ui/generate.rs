@@ -203,7 +203,7 @@ fn preset_help(preset: Preset, bundle: Option<&BundleInfo>) -> String {
     let what = match preset {
         Preset::Fast => "For looking through a data set",
         Preset::Default => "What the model's bundle recommends",
-        Preset::Best => "As many steps as still change anything",
+        Preset::Best => "The sharpest picture: as many steps as still change anything",
     };
     match bundle.and_then(|bundle| bundle.generator.as_ref()) {
         Some(g) => {

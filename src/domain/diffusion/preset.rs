@@ -27,7 +27,8 @@ pub enum Preset {
     /// What the bundle recommends.
     #[default]
     Default,
-    /// As many steps as still change anything.
+    /// As many steps as still change anything: the sharpest picture. Whether it is also the one with the smallest
+    /// error depends on the bundle: `touch2touch bench generator` tells.
     Best,
 }
 
@@ -53,7 +54,9 @@ impl Preset {
             ..defaults
         };
         match self {
-            Self::Fast => with(2, Sampler::Ddim),
+            // On 12 simulated grasps with the shipped bundle: rms error 0.80 mm and pose error 1.4 degrees, where two
+            // steps of DDIM have 0.86 mm and 2.5 degrees.
+            Self::Fast => with(2, Sampler::Ddpm),
             Self::Default => defaults,
             Self::Best => with(50, Sampler::DpmSolver2m),
         }
