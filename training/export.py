@@ -192,7 +192,7 @@ def generator(args, out):
     if args.average_with:
         averaged((encoder, denoiser, decoder), args)
     shapes = (models.CONDITION, 16, 16), (models.LATENT, 16, 16)
-    return generator_bundle(args, out, "Latent diffusion, simulated data", (encoder, denoiser, decoder), shapes, 10,
+    return generator_bundle(args, out, "Latent diffusion, simulated data", (encoder, denoiser, decoder), shapes, args.steps,
                             {"autoencoder": ae, "generator": state})
 
 
@@ -256,6 +256,7 @@ def main():
     parser.add_argument("--fp16", action="store_true", help="store large weights in 16 bits (half the size)")
     parser.add_argument("--average-with", help="generator bundle that the run began from (`--from`); its weights are mixed in")
     parser.add_argument("--share", type=float, default=0.5, help="the run's own share of that mixture")
+    parser.add_argument("--steps", type=int, default=10, help="default sampling steps of a diffusion bundle")
     parser.add_argument("--note", default="", help="free text for the provenance")
     parser.add_argument("--seed", type=int, default=7, help="which training touches the shift statistics come from")
     args = parser.parse_args()
