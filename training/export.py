@@ -129,10 +129,12 @@ def write(net, path, inputs, outputs, examples, f16=False):
 
 
 def provenance(note, shards, states, differences):
+    record = shards.record()
+    unseen = "the unseen tools are among them" if any(r["mix"] == "unseen" for r in record) else "the unseen tools are not among them"
     return {
         "note": note,
-        "data": "simulated touches (examples/training_data.rs); the unseen tools are not among them",
-        "shards": shards.record(),
+        "data": f"simulated touches (examples/training_data.rs); {unseen}",
+        "shards": record,
         "runs": {name: {k: s[k] for k in ("step", "samples", "minutes", "losses", "seed", "options") if k in s} for name, s in states.items()},
         "onnx_minus_torch_max": differences,
         "tools": {"torch": torch.__version__, "onnx_opset": OPSET},
