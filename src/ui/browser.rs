@@ -283,7 +283,8 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
 fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
     let open = cx.state.library.open.as_ref()?;
     let key = open.key(id);
-    let depth = cx.state.thumbnail(id)?;
+    // Without a measured imprint it is empty, and the device takes no empty picture: the whole window would stay black.
+    let depth = cx.state.thumbnail(id).filter(|depth| !depth.is_empty())?;
     let range = super::images::range_of(cx.state);
     let bits = (range.lo.to_bits(), range.hi.to_bits());
     let map = super::images::map_of(cx.state);

@@ -58,6 +58,8 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     assert_eq!(state.library.follow.as_ref().unwrap().arrived, 2);
     rig.send(Command::SetWorkspace(Workspace::Inspect));
     rig.shoot("follow-gelslim-only-1280");
+    let image = rig.harness.render().unwrap();
+    assert!(image.pixels().any(|p| p.0[..3] != [0; 3]), "an empty thumbnail must not black out the window");
 
     // Stopped by its button: what comes now is not looked at, until the folder is read again.
     rig.harness.get_by_label("Stop following").click();
