@@ -175,7 +175,7 @@ def generator_bundle(args, out, name, nets, shapes, steps, states):
         "shift": {"pred_mean": (predicted.mean().item() + data.RANGE_M[1]) / 2,
                   "pred_std": predicted.std(correction=0).item() / 2,
                   "gt_mean": measured.mean().item(), "gt_std": measured.std(correction=0).item()},
-        "defaults": {"steps": steps, "sampler": "ddim", "spacing": "trailing", "eta": 0.0, "seed": 42},
+        "defaults": {"steps": steps, "sampler": args.sampler, "spacing": "trailing", "eta": 0.0, "seed": 42},
         "provenance": provenance(args.note, shards, states, differences),
     }
 
@@ -259,6 +259,7 @@ def main():
     parser.add_argument("--average-with", help="generator bundle that the run began from (`--from`); its weights are mixed in")
     parser.add_argument("--share", type=float, default=0.5, help="the run's own share of that mixture")
     parser.add_argument("--steps", type=int, default=10, help="default sampling steps of a diffusion bundle")
+    parser.add_argument("--sampler", default="ddim", help="its default sampler: ddim, ddpm or dpm_solver2m")
     parser.add_argument("--note", default="", help="free text for the provenance")
     parser.add_argument("--seed", type=int, default=7, help="which training touches the shift statistics come from")
     args = parser.parse_args()

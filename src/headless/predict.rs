@@ -30,7 +30,7 @@ pub(super) struct ModelArgs {
     /// The mask model's bundle (default: the shipped one).
     #[arg(long)]
     mask_bundle: Option<PathBuf>,
-    /// How good: `fast` (two steps), `default` (what the bundle recommends) or `best` (the sharpest picture). The options below change single
+    /// How good: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below change single
     /// numbers of it.
     #[arg(long, value_parser = PossibleValuesParser::new(Preset::iter().map(Preset::key)).map(preset), default_value = "default")]
     preset: Preset,

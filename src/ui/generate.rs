@@ -194,16 +194,16 @@ fn preset_name(preset: Preset) -> &'static str {
     match preset {
         Preset::Fast => "Fast",
         Preset::Default => "Default",
-        Preset::Best => "Best",
+        Preset::Sharp => "Sharp",
     }
 }
 
 /// What a preset does with this bundle, for its tooltip.
 fn preset_help(preset: Preset, bundle: Option<&BundleInfo>) -> String {
     let what = match preset {
-        Preset::Fast => "For looking through a data set",
+        Preset::Fast => "For looking through a data set: about the mean of all plausible imprints",
         Preset::Default => "What the model's bundle recommends",
-        Preset::Best => "The sharpest picture: as many steps as still change anything",
+        Preset::Sharp => "The sharpest picture: as many steps as still change anything",
     };
     match bundle.and_then(|bundle| bundle.generator.as_ref()) {
         Some(g) => {

@@ -42,7 +42,7 @@ fn presets_are_one_click_and_show_their_numbers() {
         state.recipe(state.touch_key(Finger::Right).unwrap()).unwrap().steps
     };
     assert_eq!(steps(&rig), 4, "what the bundle recommends");
-    for (label, preset) in [("Fast", Preset::Fast), ("Best", Preset::Best), ("Default", Preset::Default)] {
+    for (label, preset) in [("Fast", Preset::Fast), ("Sharp", Preset::Sharp), ("Default", Preset::Default)] {
         let node = rig.harness.get_all_by_label(label).next().unwrap_or_else(|| panic!("no {label}"));
         node.click();
         rig.harness.step();
