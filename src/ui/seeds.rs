@@ -165,8 +165,8 @@ fn maps(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[Recipe], ensemble: &Ensemble) {
     let spread = (ensemble.spread.count > 1).then_some(&ensemble.spread.std);
     let all = [
         ("Mean", Some(&ensemble.spread.mean), map_of(cx.state), Some(range_of(cx.state)), "No seed yet"),
-        ("Spread of the seeds", spread, ColorMap::Viridis, None, "needs 2 seeds"),
-        ("Spread of the channels", ensemble.channels.as_ref(), ColorMap::Viridis, None, "one channel only"),
+        ("Seed spread", spread, ColorMap::Viridis, None, "needs 2 seeds"),
+        ("Channel spread", ensemble.channels.as_ref(), ColorMap::Viridis, None, "one channel only"),
     ];
     for (i, (name, map, colors, range, without)) in all.into_iter().enumerate() {
         let left = area.left() + i as f32 * (size.x + GAP);

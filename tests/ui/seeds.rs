@@ -46,7 +46,7 @@ fn seeds_run_in_sight_only_and_show_where_they_disagree() {
     assert!(ensemble.channels.as_ref().unwrap()[at] > 0.0);
     let angles: Vec<f64> = state.seed_poses().iter().flatten().map(|p| p.angle_rad).collect();
     assert!(!angles.is_empty() && AngleFan::of(&angles).is_some());
-    for label in ["Fan of poses", "Mean", "Spread of the seeds", "Spread of the channels"] {
+    for label in ["Fan of poses", "Mean", "Seed spread", "Channel spread"] {
         assert!(rig.harness.query_by_label(label).is_some(), "{label}");
     }
     rig.shoot("seeds-1280");
