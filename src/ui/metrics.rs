@@ -185,11 +185,11 @@ fn parts(cx: &Cx<'_>, ui: &mut Ui, c: &Comparison) {
     let number = |v: Option<f64>, digits: usize| v.map_or("–".to_owned(), |v| units::fixed(v, digits));
     let spacing = std::mem::replace(&mut ui.spacing_mut().item_spacing.y, 0.0);
     let width = ((ui.available_width() - 60.0) / 4.0).clamp(34.0, 64.0);
-    let heads = ["dB", "SSIM", "|err| mm", "bias mm"].map(|h| (h.to_owned(), cx.p.weak));
+    let heads = ["dB", "SSIM", "err mm", "bias mm"].map(|h| (h.to_owned(), cx.p.weak));
     line(ui, ("", cx.p.weak), &heads, width);
     for (name, f, tip) in [
-        ("Seen", split.seen, "Inside the dashed window: the GelSlim saw this part"),
-        ("Invented", split.invented, "Outside the dashed window: the model made this part up"),
+        ("Seen", split.seen, "Inside the dashed window: the GelSlim saw this part. err: mean |error|"),
+        ("Invented", split.invented, "Outside the dashed window: the model made this part up. err: mean |error|"),
     ] {
         let numbers = [
             number(f.psnr_db, 1),
