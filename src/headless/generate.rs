@@ -13,11 +13,12 @@ use crate::app::jobs::compute;
 use crate::app::results::Comparison;
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::sensor::Finger;
 use crate::domain::{metrics, resample};
-use crate::io::{dataset::Dataset, images};
+use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset};
+use crate::io::images;
 
 /// Arguments of `generate`.
 #[derive(Debug, Args)]
@@ -253,11 +254,13 @@ fn score(
         }
         Scale::Assumed => {
             // Compared on the tile's own pixels and in its orientation, so that the lab's prediction is not resampled.
-            if let Some(tile) = dataset.bubble_tile(id)? {
+            let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
+            let metres = |tile: Grid<f32>| tile.map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32);
+            if let Some(tile) = dataset.bubble_tile(id)?.map(metres) {
                 let ours = resample::bilinear(&imprint.rotated_180(), tile.width(), tile.height());
                 let seen = metrics::footprint_mask(finger, tile.size()).rotated_180();
                 take(pair, &compared(&ours, &tile, scale, &seen)?);
-                if let Some(vqvae) = dataset.vqvae_tile(id)? {
+                if let Some(vqvae) = dataset.vqvae_tile(id)?.map(metres) {
                     let theirs = compared(&vqvae, &tile, scale, &seen)?;
                     (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
                 }
