@@ -340,7 +340,7 @@ fn write(file: &std::path::Path, report: &Report) -> anyhow::Result<()> {
         move |err: std::io::Error| anyhow::anyhow!("cannot write {path}: {err}")
     };
     atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes()).map_err(failed(file))?;
-    let engine = report.rows.first().map_or("", |row| row.engine.label());
+    let engine = report.first.first().map_or("", |first| first.engine.label());
     let default = name(&report.defaults, EngineKind::Rten, false);
     for (what, unit, points, suffix) in [
         ("pose angle error", "°", &report.front_angle, ""),
