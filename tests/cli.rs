@@ -16,6 +16,7 @@ use touch2touch::io::masks::{MaskStore, StoredReview};
 
 use crate::support;
 
+#[cfg(feature = "onnx")]
 mod watch;
 
 fn run(args: &[&str], data: &Path) -> Output {
@@ -332,6 +333,7 @@ fn the_basin_map_of_a_pair_is_written() {
 }
 
 /// With the tiny bundles: the form of the table, not its figures.
+#[cfg(feature = "onnx")]
 #[test]
 fn the_results_table_is_printed_and_written() {
     let dir = tempfile::tempdir().unwrap();
@@ -399,6 +401,7 @@ fn the_results_table_is_printed_and_written() {
 }
 
 /// The lab's own predictions in the picture folder, as they were measured before.
+#[cfg(feature = "onnx")]
 #[test]
 fn stored_predictions_get_a_row() {
     let Some(pairs) = support::shared().map(|dir| dir.join("real-pairs")) else { return };
