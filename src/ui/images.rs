@@ -454,7 +454,9 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger, preview: &Arc<Pre
 
 fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
     let text = finger_text(cx.state, finger);
-    output.caption(Align2::LEFT_BOTTOM, &source_note(cx.state), super::theme::DARK.caution);
+    // The error's own figures stand in the other corner: one line has no room for more than the scale.
+    let note = if pane == Pane::Error { scale_note(cx.state).to_owned() } else { source_note(cx.state) };
+    output.caption(Align2::LEFT_BOTTOM, &note, super::theme::DARK.caution);
     output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
     let state = cx.state;
     let right = match pane {
