@@ -13,11 +13,11 @@ use crate::app::jobs::compute;
 use crate::app::results::Comparison;
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
-use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::sensor::Finger;
 use crate::domain::{metrics, resample};
-use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset};
+use crate::io::dataset::{Dataset, assumed_metres};
 use crate::io::images;
 
 /// Arguments of `generate`.
@@ -202,7 +202,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                     let found = seeds::predict(&mut predictor, difference, args.ensemble.seeds)?;
                     let mut of_mean = Pair::default();
                     score(&dataset, id, (finger, &sample), &found.spread.mean, &mut of_mean)?;
-                    let scores = |_: &DepthMap| (of_mean.psnr_db, of_mean.ssim);
+                    let scores = (of_mean.psnr_db, of_mean.ssim);
                     pair.ensemble =
                         Some(seeds::write(&args.out.join(stem(&name, finger)), &found, config.seed, scores)?);
                 }
@@ -254,13 +254,11 @@ fn score(
         }
         Scale::Assumed => {
             // Compared on the tile's own pixels and in its orientation, so that the lab's prediction is not resampled.
-            let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
-            let metres = |tile: Grid<f32>| tile.map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32);
-            if let Some(tile) = dataset.bubble_tile(id)?.map(metres) {
+            if let Some(tile) = dataset.bubble_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
                 let ours = resample::bilinear(&imprint.rotated_180(), tile.width(), tile.height());
                 let seen = metrics::footprint_mask(finger, tile.size()).rotated_180();
                 take(pair, &compared(&ours, &tile, scale, &seen)?);
-                if let Some(vqvae) = dataset.vqvae_tile(id)?.map(metres) {
+                if let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
                     let theirs = compared(&vqvae, &tile, scale, &seen)?;
                     (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
                 }

@@ -1,6 +1,5 @@
 //! `touch2touch ledger`: everything between a decoder's picture and metres, for one touch.
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -132,9 +131,8 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let mut predictor = Predictor::new(&args.model);
     let config = predictor.config()?;
     let shift = predictor.shift();
-    let generator = predictor.generator()?;
-    let raw = generator.generate(&gelslim.difference, &config, &mut |_| ControlFlow::Continue(()))?;
-    let spec = generator.spec();
+    let raw = predictor.predict_one(&gelslim.difference)?;
+    let spec = predictor.generator()?.spec();
     let mut chain = spec.depth_chain(shift)?;
     let mut shift_name = shift.label();
     if let Some(MappingArg::Correct) = args.mapping {

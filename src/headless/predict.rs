@@ -30,8 +30,8 @@ pub(super) struct ModelArgs {
     /// The mask model's bundle (default: the shipped one).
     #[arg(long)]
     mask_bundle: Option<PathBuf>,
-    /// How good: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below change single
-    /// numbers of it.
+    /// How good: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below
+    /// change single numbers of it.
     #[arg(long, value_parser = PossibleValuesParser::new(Preset::iter().map(Preset::key)).map(preset), default_value = "default")]
     preset: Preset,
     /// Sampling steps (default: the preset's).
@@ -261,6 +261,12 @@ impl Predictor {
         let made = self.predict_with(store.as_ref(), differences, &config);
         self.store = store;
         made
+    }
+
+    /// The prediction of one GelSlim difference image, as [`Self::predict`].
+    pub(super) fn predict_one(&mut self, difference: &RgbGrid) -> anyhow::Result<RawPrediction> {
+        let mut made = self.predict(&[difference])?;
+        made.pop().map(|made| made.raw).ok_or_else(|| anyhow::anyhow!("the generator gave no prediction"))
     }
 
     fn predict_with(

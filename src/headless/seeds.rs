@@ -74,12 +74,12 @@ pub(super) struct SeedFigures {
 }
 
 /// Writes mean and spreads as `STEM_{mean,spread,channels}.npy` (metres) and pictures of the spreads (0.0001 mm steps)
-/// and of the mean (0.001 mm steps from -20 mm).
+/// and of the mean (0.001 mm steps from -20 mm). PSNR and SSIM are of the mean.
 pub(super) fn write(
     stem: &Path,
     found: &FingerSeeds,
     first: u64,
-    scores: impl FnOnce(&DepthMap) -> (Option<f64>, Option<f64>),
+    (mean_psnr_db, mean_ssim): (Option<f64>, Option<f64>),
 ) -> anyhow::Result<SeedFigures> {
     let file = |what: &str, ending: &str| {
         let mut name = stem.file_name().map(std::ffi::OsStr::to_os_string).unwrap_or_default();
@@ -99,7 +99,6 @@ pub(super) fn write(
     }
     let finite = |v: f64| v.is_finite().then_some(v);
     let mean_of = |map: &DepthMap| finite(crate::domain::postprocess::Stats::of(map).mean);
-    let (mean_psnr_db, mean_ssim) = scores(&found.spread.mean);
     Ok(SeedFigures {
         seeds: seeds(first, found.imprints.len()),
         spread_mean_m: finite(found.spread.mean_std()),

@@ -1,6 +1,5 @@
 //! `touch2touch stats`: the statistics behind the "refit on this dataset" shift, in one pass over a dataset.
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -74,10 +73,7 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
         |id, finger, difference| {
             let name = &dataset.index.pairs[id.0 as usize].name;
             let what = format!("{name} {}", finger.name());
-            let generator = predictor.generator().map_err(|err| TaskError::new(&what, err))?;
-            let raw = generator
-                .generate(difference, &config, &mut |_| ControlFlow::Continue(()))
-                .map_err(|err| TaskError::from_error(&what, &err))?;
+            let raw = predictor.predict_one(difference).map_err(|err| TaskError::new(&what, err))?;
             Ok((raw, chain.clone()))
         },
         &cx,

@@ -20,6 +20,7 @@ use crate::domain::dataset::{Index, PairEntry, PairId, Problem};
 use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::{BubbleCamera, Sample};
+use crate::domain::upright::Turn;
 
 use super::images::PictureError;
 use super::pt::PtError;
@@ -27,7 +28,7 @@ use super::stl::MeshError;
 
 pub use built_in::BuiltIn;
 pub use grow::{Growth, OUTPUT_MARK, RIG_FILE, cameras_of, is_output};
-pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE};
+pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, assumed_metres};
 pub use tool_scale::{ToolScale, UNIT_FILE, read_in_metres};
 
 /// Which kind of source a dataset is.
@@ -315,25 +316,26 @@ impl Dataset {
         }
     }
 
-    /// The bubble picture as it is in the file (0..255, rotated by 180 degrees); `None` for other sources.
+    /// The bubble picture on its own pixels (0..255, rotated by 180 degrees), laid upright from how the pair's pictures lay
+    /// ([`crate::domain::sample::Sample::laid`]); `None` for other sources.
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn bubble_tile(&self, id: PairId) -> Result<Option<Grid<f32>>, LoadError> {
+    pub fn bubble_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => pictures.tile(id, pictures::BUBBLE),
+            Source::Pictures(pictures) => pictures.tile(id, pictures::BUBBLE, laid),
             Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
 
-    /// The lab's own VQ-VAE prediction for the pair as it is in the file `NAME_vqvae.png` (0..255, rotated by
-    /// 180 degrees like the bubble's); `None` where there is none.
+    /// The lab's own VQ-VAE prediction for the pair, from the file `NAME_vqvae.png`, as [`Dataset::bubble_tile`]; `None`
+    /// where there is none.
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn vqvae_tile(&self, id: PairId) -> Result<Option<Grid<f32>>, LoadError> {
+    pub fn vqvae_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => pictures.tile(id, pictures::VQVAE),
+            Source::Pictures(pictures) => pictures.tile(id, pictures::VQVAE, laid),
             Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
@@ -353,8 +355,8 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn vqvae_imprint(&self, id: PairId) -> Result<Option<DepthMap>, LoadError> {
-        Ok(self.vqvae_tile(id)?.map(|tile| pictures::imprint_from_tile(&tile)))
+    pub fn vqvae_imprint(&self, id: PairId, laid: Turn) -> Result<Option<DepthMap>, LoadError> {
+        Ok(self.vqvae_tile(id, laid)?.map(|tile| pictures::imprint_from_tile(&tile)))
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use touch2touch::domain::dataset::{PairId, Split};
 use touch2touch::domain::grid::Grid;
 use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::upright::Turn;
 use touch2touch::io::dataset::{Dataset, LoadError, OpenError, SourceKind};
 use touch2touch::io::images;
 use touch2touch::io::pt::{PtItem, Tensor, read_dict, write_dict};
@@ -186,7 +187,7 @@ fn picture_folders() {
     let imprint = &touch.finger(Finger::Right).unwrap().bubble.as_ref().unwrap().imprint;
     assert!(imprint[(0, 0)] > imprint[(174, 139)], "turned back by 180 degrees");
     assert!(dataset.load(PairId(1)).unwrap_err().to_string().contains("b10_bubble.png"));
-    assert_eq!(dataset.vqvae_tile(PairId(0)).unwrap(), None);
+    assert_eq!(dataset.vqvae_tile(PairId(0), Turn::default()).unwrap(), None);
     assert_eq!(dataset.tool_mesh("rod").unwrap(), None);
 }
 

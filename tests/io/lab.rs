@@ -115,9 +115,10 @@ fn the_real_pictures_open_without_a_problem() {
         assert_eq!(imprint.size(), [175, 140]);
         let largest = imprint.as_slice().iter().copied().fold(0f32, f32::max);
         assert!((0.015..=0.0180001).contains(&largest), "{i}: {largest}");
-        assert_eq!(dataset.bubble_tile(PairId(i)).unwrap().unwrap().size(), [128, 128]);
-        assert_eq!(dataset.vqvae_tile(PairId(i)).unwrap().unwrap().size(), [128, 128]);
-        assert_eq!(dataset.vqvae_imprint(PairId(i)).unwrap().unwrap().size(), [175, 140]);
+        let laid = loaded.sample.laid;
+        assert_eq!(dataset.bubble_tile(PairId(i), laid).unwrap().unwrap().size(), [128, 128]);
+        assert_eq!(dataset.vqvae_tile(PairId(i), laid).unwrap().unwrap().size(), [128, 128]);
+        assert_eq!(dataset.vqvae_imprint(PairId(i), laid).unwrap().unwrap().size(), [175, 140]);
         let difference = &touch.gelslim.as_ref().unwrap().difference;
         for (c, sum) in squares.iter_mut().enumerate() {
             let mean_square: f64 =

@@ -20,7 +20,7 @@ use crate::app::keys::MaskRecipe;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{Grid, RgbGrid};
 use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
-use crate::domain::sample::{Sample, Scale};
+use crate::domain::sample::Sample;
 use crate::domain::sensor::{Finger, gelslim};
 use crate::domain::units::angle_error;
 use crate::infer::generator::GenerateError;
@@ -201,10 +201,7 @@ impl<'a> Worker<'a> {
             source: source.clone(),
             recipe: recipe.clone(),
             files,
-            scale: match sample.scale {
-                Scale::Measured => "measured",
-                Scale::Assumed => "assumed",
-            },
+            scale: super::super::scale_name(sample.scale),
             fingers: fingers.iter().map(|f| figures(sample, f)).collect(),
             pose,
             no_pose,

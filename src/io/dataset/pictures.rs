@@ -150,17 +150,12 @@ impl Pictures {
         files.into_iter().flat_map(|files| kinds.iter().filter_map(|&kind| files[kind].clone())).collect()
     }
 
-    /// A grey picture, laid upright as its pair's GelSlim picture tells.
-    pub(super) fn tile(&self, id: PairId, kind: usize) -> Result<Option<Grid<f32>>, LoadError> {
-        let turn = self.difference(id)?.map_or_else(Turn::default, |(_, turn)| turn);
-        self.upright_tile(id, kind, turn)
-    }
-
-    fn upright_tile(&self, id: PairId, kind: usize, turn: Turn) -> Result<Option<Grid<f32>>, LoadError> {
+    /// A grey picture that lay this way in its file, upright.
+    pub(super) fn tile(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         let Some(path) = self.file(id, kind)? else { return Ok(None) };
         let tile = images::read_grey(path)?;
         // Pairs are turned as squares; in another shape a quarter turn would not fit back.
-        Ok(Some(if tile.width() == tile.height() || turn.quarters.is_multiple_of(2) { turn.undo(&tile) } else { tile }))
+        Ok(Some(if tile.width() == tile.height() || laid.quarters.is_multiple_of(2) { laid.undo(&tile) } else { tile }))
     }
 
     /// The upright difference image, and how it lay.
@@ -201,7 +196,7 @@ impl Pictures {
             }
             touch.gelslim = Some(GelSlimTouch { images: None, difference });
         }
-        if let Some(tile) = self.upright_tile(id, BUBBLE, laid)? {
+        if let Some(tile) = self.tile(id, BUBBLE, laid)? {
             let [w, h] = tile.size();
             let path = self.file(id, BUBBLE)?.unwrap_or(Path::new(""));
             if w < 16 || h < 16 {
@@ -222,10 +217,15 @@ impl Pictures {
     }
 }
 
+/// A bubble picture (0..255) on its own pixels, in the assumed metres.
+pub fn assumed_metres(tile: &Grid<f32>) -> DepthMap {
+    let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
+    tile.map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32)
+}
+
 /// Assumed metres, turned back by 180 degrees, at the lab's size.
 pub(super) fn imprint_from_tile(tile: &Grid<f32>) -> DepthMap {
-    let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
-    let metres = tile.rotated_180().map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32);
+    let metres = assumed_metres(&tile.rotated_180());
     // The lab made these pictures with torchvision's resize, so they are undone with the same one.
     resample::bilinear(&metres, bubble::WIDTH, bubble::HEIGHT)
 }

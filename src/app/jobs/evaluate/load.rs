@@ -98,7 +98,8 @@ fn load(dataset: &Dataset, id: PairId) -> Result<Case, Skipped> {
     let pictures = sample.scale == Scale::Assumed;
     let (tile, lab, clipped) = if pictures {
         let clipped = dataset.gelslim_is_clipped(id).map_err(fail)?;
-        (dataset.bubble_tile(id).map_err(fail)?, dataset.vqvae_tile(id).map_err(fail)?, clipped)
+        let laid = sample.laid;
+        (dataset.bubble_tile(id, laid).map_err(fail)?, dataset.vqvae_tile(id, laid).map_err(fail)?, clipped)
     } else {
         (None, None, None)
     };

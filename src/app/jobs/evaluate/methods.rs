@@ -15,6 +15,7 @@ use crate::domain::postprocess::{RawPrediction, ShiftMode};
 use crate::domain::resample::bilinear;
 use crate::domain::sample::Scale;
 use crate::domain::sensor::Finger;
+use crate::domain::upright::Turn;
 use crate::infer::bundle::Bundle;
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::generator::{GenerateError, Generator};
@@ -94,7 +95,7 @@ impl Models {
             names.push(name.clone());
             methods.push(Method::Generator(Box::new(GeneratorMethod { name, generator, config })));
         }
-        let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id)), Ok(Some(_)));
+        let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id), Turn::default()), Ok(Some(_)));
         if pictures && (0..LOOKED_AT).any(stored) {
             methods.push(Method::Stored);
         }
