@@ -17,6 +17,7 @@ pub mod grid;
 pub mod hand;
 pub mod inspect;
 pub mod label;
+mod linear;
 pub mod mesh;
 pub mod metrics;
 pub mod moments;

@@ -20,7 +20,6 @@ mod directions;
 pub mod field;
 pub mod icp;
 pub mod lab_icp;
-mod linear;
 mod observability;
 mod planar;
 pub mod reason;

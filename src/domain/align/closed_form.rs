@@ -5,8 +5,8 @@
 
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3};
 
-use super::linear::eigen_symmetric;
 use crate::domain::frames::PlanarPose;
+use crate::domain::linear::eigen_symmetric;
 
 /// Points closer together than this share of their coordinates are one point: rounding is all that sets them apart.
 const SPOT: f64 = 1e-13;

@@ -3,9 +3,9 @@
 use glam::DVec2;
 
 use super::field::batch::{Cloud, State};
-use super::linear::eigen_symmetric;
 use super::{ANGLE_SCALE_M, DistanceField};
 use crate::domain::frames::PlanarPose;
+use crate::domain::linear::eigen_symmetric;
 
 /// Smallest eigenvalue below which a pose counts as not determined.
 ///

@@ -1,5 +1,7 @@
 //! Distance of two sets of feature vectors, each taken for a sample of a normal distribution.
 
+use crate::domain::linear::{diagonalise, rotation};
+
 /// A square matrix by rows.
 type Matrix = Vec<Vec<f64>>;
 
@@ -74,40 +76,14 @@ fn root(c: Matrix) -> Option<Matrix> {
     Some(out)
 }
 
-/// Eigenvalues (in no order) and unit eigenvectors (as columns) by cyclic Jacobi rotations, which find small eigenvalues
-/// beside large ones.
+/// Eigenvalues (in no order) and unit eigenvectors (as columns), small ones beside large ones too.
 fn eigen_symmetric(mut a: Matrix) -> Option<(Vec<f64>, Matrix)> {
     let d = a.len();
     if a.iter().flatten().any(|x| !x.is_finite()) {
         return None;
     }
     let mut v: Matrix = (0..d).map(|i| (0..d).map(|j| f64::from(u8::from(i == j))).collect()).collect();
-    for _ in 0..60 {
-        let size: f64 = (0..d).map(|i| a[i][i].abs()).sum();
-        let off: f64 = (0..d).flat_map(|i| (i + 1..d).map(move |j| (i, j))).map(|(i, j)| a[i][j].abs()).sum();
-        if off <= 1e-15 * size {
-            break;
-        }
-        for p in 0..d {
-            for q in p + 1..d {
-                if a[p][q] == 0.0 {
-                    continue;
-                }
-                let tau = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-                let t = 1f64.copysign(tau) / (tau.abs() + (1.0 + tau * tau).sqrt());
-                let c = 1.0 / (1.0 + t * t).sqrt();
-                let s = t * c;
-                let turn = |x: f64, y: f64| (c * x - s * y, s * x + c * y);
-                for row in a.iter_mut().chain(&mut v) {
-                    (row[p], row[q]) = turn(row[p], row[q]);
-                }
-                let (above, below) = a.split_at_mut(q);
-                for (x, y) in above[p].iter_mut().zip(&mut below[0]) {
-                    (*x, *y) = turn(*x, *y);
-                }
-            }
-        }
-    }
+    diagonalise(&mut a, &mut v);
     Some(((0..d).map(|i| a[i][i]).collect(), v))
 }
 
@@ -126,10 +102,7 @@ fn singular_values(mut a: Matrix) -> Vec<f64> {
                     continue;
                 }
                 turned = true;
-                let tau = (yy - xx) / (2.0 * xy);
-                let t = 1f64.copysign(tau) / (tau.abs() + (1.0 + tau * tau).sqrt());
-                let c = 1.0 / (1.0 + t * t).sqrt();
-                let s = t * c;
+                let (c, s) = rotation(xx, yy, xy);
                 for (x, y) in x.iter_mut().zip(y.iter_mut()) {
                     (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
                 }

@@ -10,9 +10,9 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use super::policy::{Dof, Kernel, Rejector, Residual, Solver, Target};
 use super::samples::{Matcher, Samples};
 use crate::domain::align::closed_form::closest_rotation;
-use crate::domain::align::linear::{Matrix, eigen_symmetric, solve_symmetric};
 use crate::domain::align::{ANGLE_SCALE_M, Fate};
 use crate::domain::frames::PlanarPose;
+use crate::domain::linear::{Matrix, eigen_symmetric, solve_symmetric};
 use crate::domain::mesh::MeshDistance;
 use crate::domain::tool::ToolModel;
 

@@ -1,4 +1,4 @@
-//! The few lines of linear algebra that registration needs, for matrices of up to 6 x 6.
+//! The few lines of linear algebra that registration (matrices of up to 6 x 6) and the Fréchet distance need.
 
 /// A symmetric matrix by rows.
 pub(super) type Matrix<const N: usize> = [[f64; N]; N];
@@ -12,8 +12,47 @@ fn identity<const N: usize>() -> Matrix<N> {
     m
 }
 
-/// Eigenvalues (ascending) and unit eigenvectors of a symmetric matrix, by Jacobi rotations: slower than a closed
-/// form, but accurate for repeated and tiny eigenvalues, which are the interesting ones here.
+/// Cosine and sine of the Jacobi rotation that makes the entry `pq` of a symmetric 2 x 2 block zero; `pq` is not 0.
+pub(super) fn rotation(pp: f64, qq: f64, pq: f64) -> (f64, f64) {
+    let tau = (qq - pp) / (2.0 * pq);
+    let t = 1f64.copysign(tau) / (tau.abs() + (1.0 + tau * tau).sqrt());
+    let c = 1.0 / (1.0 + t * t).sqrt();
+    (c, t * c)
+}
+
+/// Makes a symmetric matrix (by rows, finite) diagonal by cyclic Jacobi rotations, and turns the columns of `v` along:
+/// slower than a closed form, but accurate for repeated and tiny eigenvalues, which are the interesting ones here.
+pub(super) fn diagonalise<R: AsRef<[f64]> + AsMut<[f64]>>(a: &mut [R], v: &mut [R]) {
+    let d = a.len();
+    for _ in 0..60 {
+        let at = |i: usize, j: usize| a[i].as_ref()[j].abs();
+        let size: f64 = (0..d).map(|i| at(i, i)).sum();
+        let off: f64 = (0..d).flat_map(|i| (i + 1..d).map(move |j| (i, j))).map(|(i, j)| at(i, j)).sum();
+        if off <= 1e-15 * size {
+            break;
+        }
+        for p in 0..d {
+            for q in p + 1..d {
+                let at = |i: usize, j: usize| a[i].as_ref()[j];
+                if at(p, q) == 0.0 {
+                    continue;
+                }
+                let (c, s) = rotation(at(p, p), at(q, q), at(p, q));
+                let turn = |x: f64, y: f64| (c * x - s * y, s * x + c * y);
+                for row in a.iter_mut().chain(&mut *v) {
+                    let row = row.as_mut();
+                    (row[p], row[q]) = turn(row[p], row[q]);
+                }
+                let (above, below) = a.split_at_mut(q);
+                for (x, y) in above[p].as_mut().iter_mut().zip(below[0].as_mut()) {
+                    (*x, *y) = turn(*x, *y);
+                }
+            }
+        }
+    }
+}
+
+/// Eigenvalues (ascending) and unit eigenvectors of a symmetric matrix.
 ///
 /// `None` if an entry is not finite: nothing is decomposed then.
 pub(super) fn eigen_symmetric<const N: usize>(mut a: Matrix<N>) -> Option<([f64; N], Matrix<N>)> {
@@ -21,29 +60,7 @@ pub(super) fn eigen_symmetric<const N: usize>(mut a: Matrix<N>) -> Option<([f64;
         return None;
     }
     let mut v = identity::<N>();
-    for _ in 0..50 {
-        let size: f64 = (0..N).map(|i| a[i][i].abs()).sum();
-        let off: f64 = (0..N).flat_map(|i| (i + 1..N).map(move |j| (i, j))).map(|(i, j)| a[i][j].abs()).sum();
-        if off <= 1e-15 * size {
-            break;
-        }
-        for (p, q) in (0..N).flat_map(|i| (i + 1..N).map(move |j| (i, j))) {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let tau = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = 1f64.copysign(tau) / (tau.abs() + (1.0 + tau * tau).sqrt());
-            let c = 1.0 / (1.0 + t * t).sqrt();
-            let s = t * c;
-            let turn = |x: f64, y: f64| (c * x - s * y, s * x + c * y);
-            for row in a.iter_mut().chain(&mut v) {
-                (row[p], row[q]) = turn(row[p], row[q]);
-            }
-            for (k, (x, y)) in a[p].into_iter().zip(a[q]).enumerate() {
-                (a[p][k], a[q][k]) = turn(x, y);
-            }
-        }
-    }
+    diagonalise(&mut a, &mut v);
     let mut order: [usize; N] = std::array::from_fn(|i| i);
     order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
     Some((order.map(|i| a[i][i]), order.map(|i| std::array::from_fn(|row| v[row][i]))))
