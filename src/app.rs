@@ -13,7 +13,6 @@ pub mod apply;
 pub mod command;
 pub mod document;
 pub mod effect;
-pub mod error;
 pub mod evaluation;
 mod generating;
 pub mod history;

@@ -5,6 +5,7 @@
 
 pub mod align;
 pub mod ambiguity;
+pub mod bits;
 pub mod cloud;
 pub mod colormap;
 pub mod contact;

@@ -164,14 +164,6 @@ fn find_pair(dataset: &crate::io::dataset::Dataset, name: &str) -> anyhow::Resul
     Ok(crate::domain::dataset::PairId(at as u32))
 }
 
-/// Where lengths come from, in JSON.
-fn scale_name(scale: crate::domain::sample::Scale) -> &'static str {
-    match scale {
-        crate::domain::sample::Scale::Measured => "measured",
-        crate::domain::sample::Scale::Assumed => "assumed",
-    }
-}
-
 /// At most `limit` of `len` positions, spread evenly.
 fn spread(len: usize, limit: Option<usize>) -> Vec<usize> {
     match limit {

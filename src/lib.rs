@@ -25,3 +25,4 @@ pub mod infer;
 pub mod io;
 #[cfg(feature = "gui")]
 pub mod ui;
+pub mod work;

@@ -5,12 +5,9 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use strum::IntoEnumIterator as _;
-use touch2touch::app::jobs::JobCx;
-use touch2touch::app::keys::{DatasetSeq, PairKey, Recipe, TouchKey};
-use touch2touch::app::library::BundleInfo;
+use touch2touch::app::keys::{DatasetSeq, PairKey, PredictionKey, TouchKey};
+use touch2touch::app::services::Services;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::app::services::{GenerateItem, Services};
-use touch2touch::app::settings::RuntimeChoice;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
 use touch2touch::domain::grid::{Grid, RgbGrid};
@@ -19,6 +16,9 @@ use touch2touch::domain::sensor::Finger;
 use touch2touch::infer::bundle::{Bundle, MANIFEST};
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::infer::generator::{GenerateError, Generator, Item, Observer};
+use touch2touch::work::bundles::BundleInfo;
+use touch2touch::work::job::JobCx;
+use touch2touch::work::models::Wanted;
 
 fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator")
@@ -230,35 +230,35 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     let services = start();
     let info = bundle(&services);
     let recipe = |finger, seed| {
-        Recipe::new(touch(finger), info.id.clone(), RuntimeChoice::Rten, &GenerateConfig { seed, ..config() })
+        PredictionKey::new(touch(finger), info.id.clone(), EngineChoice::Rten, &GenerateConfig { seed, ..config() })
     };
-    let item = |finger, seed, difference| GenerateItem { recipe: recipe(finger, seed), difference, size: [0, 0] };
-    assert!(services.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty());
-    let both = [item(Finger::Right, 1, &a), item(Finger::Left, 1, &b)];
-    let made = services.generate(&info, &both, &cx).unwrap();
-    assert!(made.iter().all(|m| m.kept.is_none()));
+    let item = |seed, difference| Wanted { difference, seed, size: [0, 0] };
+    assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &a).is_empty());
+    let both = [item(1, &a), item(1, &b)];
+    let made = services.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
+    assert!(made.iter().all(|m| !m.kept));
 
     let again = start();
-    let found = again.generate(&info, &both, &cx).unwrap();
-    assert!(found.iter().all(|m| m.kept.is_some()), "read, not made");
+    let found = again.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
+    assert!(found.iter().all(|m| m.kept), "read, not made");
     for (made, found) in made.iter().zip(&found) {
         assert_eq!(made.raw, found.raw);
         assert_eq!(made.chains.keys().collect::<Vec<_>>(), found.chains.keys().collect::<Vec<_>>());
     }
-    let listed = again.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &a);
-    assert_eq!(listed.iter().map(|p| p.recipe.clone()).collect::<Vec<_>>(), [recipe(Finger::Right, 1)]);
+    let listed = again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &a);
+    assert_eq!(listed.iter().map(|(key, _)| key.clone()).collect::<Vec<_>>(), [recipe(Finger::Right, 1)]);
     // The same pair and finger with another image (another data set of the same names) is another touch.
     assert!(
-        again.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &image(2.0)).is_empty()
+        again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &image(2.0)).is_empty()
     );
     let another = image(2.0);
-    let other = again.generate(&info, &[item(Finger::Right, 1, &another)], &cx).unwrap();
-    assert!(other[0].kept.is_none() && other[0].raw != made[0].raw);
+    let other = again.predict(&info, EngineChoice::Rten, &config(), &[item(1, &another)], &cx).unwrap();
+    assert!(!other[0].kept && other[0].raw != made[0].raw);
     // Half known, half new: only the new one is made. Another engine's results are not taken for this one's.
-    let half = again.generate(&info, &[item(Finger::Right, 2, &a), item(Finger::Left, 1, &b)], &cx).unwrap();
-    assert!(half[0].kept.is_none() && half[1].kept.is_some());
-    assert_eq!(again.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &a).len(), 2);
-    assert!(again.stored(&[], RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty(), "its bundle is gone");
+    let half = again.predict(&info, EngineChoice::Rten, &config(), &[item(2, &a), item(1, &b)], &cx).unwrap();
+    assert!(!half[0].kept && half[1].kept);
+    assert_eq!(again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &a).len(), 2);
+    assert!(again.stored(&[], EngineChoice::Rten, touch(Finger::Right), &a).is_empty(), "its bundle is gone");
 
     // Damaged files are not there; a budget of nothing keeps nothing.
     for entry in std::fs::read_dir(folder.path().join("predictions")).unwrap() {
@@ -268,7 +268,7 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     let mut settings = services.load_settings().0;
     settings.cache_mib = 0;
     services.save_settings(&settings).unwrap();
-    let made_again = services.generate(&info, &both, &cx).unwrap();
-    assert!(made_again.iter().all(|m| m.kept.is_none()) && made_again[0].raw == made[0].raw);
-    assert!(services.stored(std::slice::from_ref(&info), RuntimeChoice::Rten, touch(Finger::Right), &a).is_empty());
+    let made_again = services.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
+    assert!(made_again.iter().all(|m| !m.kept) && made_again[0].raw == made[0].raw);
+    assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &a).is_empty());
 }

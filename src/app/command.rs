@@ -8,19 +8,18 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::document::{PairLabels, Review};
-use super::error::TaskError;
 use super::evaluation::EvaluateCommand;
 use super::inspect::{InspectCommand, Inspection};
-use super::keys::{DatasetSeq, ImprintSource, PoseEngine, Recipe, Request, ShiftMode};
-use super::library::{BundleInfo, Place, Sort};
-use super::results::{Clouds, Comparison, Ensemble, LayerResult, LedgerResult, PoseResult, Prediction, Preview};
+use super::jobs::generate::Keyed;
+use super::keys::{DatasetSeq, ImprintSource, PoseEngine, PredictionKey, Request, ShiftMode};
+use super::library::{Place, Sort};
+use super::results::Preview;
 use super::seeds::SeedsCommand;
-use super::services::{DataSource, Followed, NamedTool};
+use super::services::{DataSource, Followed};
 use super::settings::{
-    ColourMap, ColourRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, RuntimeChoice, Settings, Theme,
-    Workspace,
+    ColourMap, ColourRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, Settings, Theme, Workspace,
 };
-use super::tasks::{Progress, Ticket};
+use super::tasks::Ticket;
 use super::workbench::WorkbenchCommand;
 use crate::domain::align::basin::Basin;
 use crate::domain::ambiguity::Ambiguity;
@@ -28,7 +27,18 @@ use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
+use crate::infer::engine::EngineChoice;
 use crate::io::statistics::ShiftStatistics;
+use crate::work::bundles::BundleInfo;
+use crate::work::cloud::Clouds;
+use crate::work::compare::Comparison;
+use crate::work::ensemble::Ensemble;
+use crate::work::error::TaskError;
+use crate::work::job::Progress;
+use crate::work::layers::LayerResult;
+use crate::work::ledger::LedgerResult;
+use crate::work::pose::PoseResult;
+use crate::work::tool::NamedTool;
 
 /// A pane of the window. What is visible decides what is computed.
 #[derive(
@@ -196,7 +206,7 @@ pub enum Command {
     /// Several seeds of the selected touch.
     Seeds(SeedsCommand),
     /// Shows another prediction of the same touch.
-    Choose(Recipe),
+    Choose(PredictionKey),
     /// Tells a job to stop.
     Cancel(Ticket),
     /// Tells every job to stop.
@@ -288,7 +298,7 @@ pub enum Command {
     /// The registration.
     SetPoseEngine(PoseEngine),
     /// The model runtime.
-    SetRuntime(RuntimeChoice),
+    SetRuntime(EngineChoice),
     /// What kept predictions may take on the disk, MiB.
     SetCacheBudget(u32),
     /// Whether the 3D views move together.
@@ -322,7 +332,7 @@ pub enum Command {
     /// A result that a pane asked for.
     Computed(Request, Computed),
     /// Predictions are there.
-    Generated(Ticket, Vec<Arc<Prediction>>),
+    Generated(Ticket, Keyed),
     /// A prediction as it looks on the way.
     Previewed(Ticket, Arc<Preview>),
     /// Shift statistics are there.
@@ -368,7 +378,7 @@ pub enum Computed {
     /// Of [`Request::Tool`].
     Tool(Arc<NamedTool>),
     /// Of [`Request::Stored`] and [`Request::Prediction`].
-    Predictions(Vec<Arc<Prediction>>),
+    Predictions(Keyed),
     /// Of [`Request::Imprint`] and [`Request::Thumbnail`].
     Depth(Arc<DepthMap>),
     /// Of [`Request::Comparison`].

@@ -6,13 +6,14 @@ use std::sync::Arc;
 
 use super::command::{LabelsToSave, UiRequest};
 use super::document::PairLabels;
-use super::jobs::evaluate::{Evaluation, Setup};
-use super::keys::{DatasetSeq, Recipe};
-use super::library::{BundleInfo, Place};
+use super::keys::{DatasetSeq, PredictionKey};
+use super::library::Place;
 use super::services::DataSource;
 use super::settings::Settings;
 use super::tasks::Ticket;
 use crate::domain::sample::Sample;
+use crate::work::bundles::BundleInfo;
+use crate::work::evaluate::{Evaluation, Setup};
 
 /// Work that leaves the state.
 #[derive(Clone)]
@@ -35,7 +36,7 @@ pub enum Effect {
         /// The job.
         ticket: Ticket,
         /// What to make.
-        recipes: Vec<Recipe>,
+        recipes: Vec<PredictionKey>,
         /// The bundle.
         bundle: BundleInfo,
         /// The data.
@@ -48,7 +49,7 @@ pub enum Effect {
         /// The job.
         ticket: Ticket,
         /// How its touches are predicted; the touch itself is replaced.
-        recipe: Recipe,
+        recipe: PredictionKey,
         /// The bundle.
         bundle: BundleInfo,
         /// The data.

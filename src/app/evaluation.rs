@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::jobs::evaluate::{Evaluation, Setup};
-use super::library::{BundleInfo, BundleKind};
 use super::state::State;
 use super::tasks::{Task, Ticket};
 use crate::domain::evaluation::{Row, paper_rows};
+use crate::work::bundles::{BundleInfo, BundleKind};
+use crate::work::evaluate::{Evaluation, Setup};
 
 /// Grasps of each tool that the studio offers; `None` is all of them.
 pub const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];

@@ -4,18 +4,18 @@ use std::sync::Arc;
 
 use super::command::Pane;
 use super::jobs::PreviewWish;
-use super::keys::{ImprintSource, Recipe, TouchKey};
-use super::library::BundleKind;
+use super::keys::{ImprintSource, PredictionKey, TouchKey};
 use super::results::Preview;
 use super::state::State;
 use crate::domain::sensor::Finger;
+use crate::work::bundles::BundleKind;
 
 impl State {
     /// The recipe that the settings give a touch; `None` without a generator.
-    pub fn recipe(&self, touch: TouchKey) -> Option<Recipe> {
+    pub fn recipe(&self, touch: TouchKey) -> Option<PredictionKey> {
         let bundle = self.bundle(BundleKind::Generator).ok()?;
         let config = self.settings.generate.config(bundle);
-        Some(Recipe::new(touch, bundle.id.clone(), self.settings.runtime, &config))
+        Some(PredictionKey::new(touch, bundle.id.clone(), self.settings.runtime, &config))
     }
 
     /// The fingers whose prediction is looked at: those on screen, and both where a visible pane makes one cloud or

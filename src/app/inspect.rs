@@ -6,7 +6,6 @@ use glam::DVec3;
 
 use super::command::Pane;
 use super::keys::{BasinKey, ImprintSource, PairKey, PoseBits, PoseEngine, Request, RunKey};
-use super::results::PoseResult;
 use super::state::{Absent, Lookup, State};
 use super::workbench::Layer;
 use crate::domain::align::basin::{Basin, Plane};
@@ -14,6 +13,7 @@ use crate::domain::align::{AlignReport, TraceStep};
 use crate::domain::frames::PlanarPose;
 use crate::domain::inspect::Counterparts;
 use crate::domain::pose::ToolModel;
+use crate::work::pose::PoseResult;
 
 /// Panes that show a recorded run or the map of starts.
 pub const INSPECT_PANES: [Pane; 2] = [Pane::TimeMachine, Pane::BasinMap];

@@ -1,21 +1,14 @@
-//! What a job may do besides computing: see whether it should stop, and say how far it is.
+//! Jobs of the studio: where they run, how a request becomes one, and what of a prediction under way would be looked at.
 
-pub mod compute;
-pub mod evaluate;
 pub mod generate;
-pub mod inspect;
-pub mod ledger;
 pub mod prepare;
-pub mod statistics;
 
 use std::collections::BTreeSet;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::error::TaskError;
-use super::keys::{ShiftMode, TouchKey};
+use super::keys::{PredictionKey, ShiftMode, TouchKey};
 use super::results::Preview;
-use super::tasks::Progress;
+use crate::work::job::{PreviewPicture, Previews};
 
 /// Where a job runs. Each lane has its own threads, so that none waits for another kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
@@ -42,25 +35,6 @@ impl Lane {
     }
 }
 
-/// A flag that tells a job to stop. Clones share it.
-#[derive(Clone, Debug, Default)]
-pub struct Cancel(Arc<AtomicBool>);
-
-impl Cancel {
-    /// Tells the job to stop.
-    pub fn cancel(&self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-
-    /// Whether it was told to stop.
-    pub fn is_cancelled(&self) -> bool {
-        self.0.load(Ordering::Relaxed)
-    }
-}
-
-/// Receives progress.
-pub type ProgressSink = Arc<dyn Fn(Progress) + Send + Sync>;
-
 /// Receives pictures on the way.
 pub type PreviewSink = Arc<dyn Fn(Preview) + Send + Sync>;
 
@@ -82,54 +56,36 @@ impl PreviewWish {
     }
 }
 
-/// Cancel flag, progress and previews of one job. Cheap to clone.
+/// Who looks at the pictures of predictions on the way, whichever they are.
 #[derive(Clone)]
-pub struct JobCx {
-    /// The flag.
-    pub cancel: Cancel,
-    sink: ProgressSink,
-    previews: Option<(Arc<Mutex<PreviewWish>>, PreviewSink)>,
+pub struct Onlooker {
+    /// What would be looked at now.
+    pub wish: Arc<Mutex<PreviewWish>>,
+    /// Receives it.
+    pub sink: PreviewSink,
 }
 
-impl JobCx {
-    /// From a flag and a receiver.
-    pub fn new(cancel: Cancel, sink: ProgressSink) -> Self {
-        Self { cancel, sink, previews: None }
+impl Onlooker {
+    /// The same for the predictions of one call, in its order.
+    pub(super) fn of(self, items: Vec<PredictionKey>) -> Arc<dyn Previews> {
+        Arc::new(Watched { by: self, items })
+    }
+}
+
+struct Watched {
+    by: Onlooker,
+    items: Vec<PredictionKey>,
+}
+
+impl Previews for Watched {
+    fn wants(&self, item: usize, step: u32) -> Option<ShiftMode> {
+        let wish = self.by.wish.lock().unwrap_or_else(PoisonError::into_inner);
+        wish.wants(self.items.get(item)?.touch, step).then_some(wish.shift)
     }
 
-    /// The same with pictures on the way, where somebody looks.
-    #[must_use]
-    pub fn with_previews(self, wish: Arc<Mutex<PreviewWish>>, sink: PreviewSink) -> Self {
-        Self { previews: Some((wish, sink)), ..self }
-    }
-
-    /// How a picture of `touch` after `step` steps would become metres; `None` if nobody would look at it.
-    pub fn wants_preview(&self, touch: TouchKey, step: u32) -> Option<ShiftMode> {
-        let (wish, _) = self.previews.as_ref()?;
-        let wish = wish.lock().unwrap_or_else(PoisonError::into_inner);
-        wish.wants(touch, step).then_some(wish.shift)
-    }
-
-    /// Shows a picture on the way.
-    pub fn preview(&self, preview: Preview) {
-        if let Some((_, sink)) = &self.previews {
-            sink(preview);
+    fn show(&self, item: usize, picture: PreviewPicture) {
+        if let Some(recipe) = self.items.get(item).cloned() {
+            (self.by.sink)(Preview { recipe, picture });
         }
-    }
-
-    /// A job that nobody watches.
-    pub fn unwatched() -> Self {
-        Self::new(Cancel::default(), Arc::new(|_| {}))
-    }
-
-    /// Says how far the job is.
-    pub fn progress(&self, done: u64, total: u64, text: impl Into<String>) {
-        (self.sink)(Progress { done, total, text: text.into() });
-    }
-
-    /// # Errors
-    /// If the job was told to stop.
-    pub fn check(&self, what: &str) -> Result<(), TaskError> {
-        if self.cancel.is_cancelled() { Err(TaskError::cancelled(what)) } else { Ok(()) }
     }
 }

@@ -5,15 +5,17 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
+pub use crate::domain::bits::Bits;
 pub use crate::domain::diffusion::{Preset, Sampler, Spacing};
 pub use crate::domain::postprocess::ShiftMode;
+pub use crate::work::mask::MaskRecipe;
 
-use super::settings::RuntimeChoice;
 use crate::domain::align::basin::Plane;
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::frames::PlanarPose;
 use crate::domain::sensor::Finger;
+use crate::infer::engine::EngineChoice;
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -44,23 +46,6 @@ pub struct TouchKey {
     pub finger: Finger,
 }
 
-/// A float that compares and hashes by its bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Bits(u32);
-
-impl From<f32> for Bits {
-    fn from(value: f32) -> Self {
-        Self(value.to_bits())
-    }
-}
-
-impl Bits {
-    /// The float.
-    pub fn get(self) -> f32 {
-        f32::from_bits(self.0)
-    }
-}
-
 /// What a range mapping does, for its tooltip.
 pub fn shift_tooltip(mode: ShiftMode) -> &'static str {
     match mode {
@@ -73,7 +58,7 @@ pub fn shift_tooltip(mode: ShiftMode) -> &'static str {
 
 /// Everything that decides a prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Recipe {
+pub struct PredictionKey {
     /// The touch whose GelSlim image is the condition.
     pub touch: TouchKey,
     /// The bundle's identity (its digest): a changed bundle is another recipe.
@@ -91,12 +76,12 @@ pub struct Recipe {
     /// Scale of the guidance; 1 is none.
     pub guidance: Bits,
     /// The model runtime: two of them round differently.
-    pub runtime: RuntimeChoice,
+    pub runtime: EngineChoice,
 }
 
-impl Recipe {
+impl PredictionKey {
     /// The recipe of a touch with a bundle, a runtime and the choices of one generation.
-    pub fn new(touch: TouchKey, bundle: Arc<str>, runtime: RuntimeChoice, config: &GenerateConfig) -> Self {
+    pub fn new(touch: TouchKey, bundle: Arc<str>, runtime: EngineChoice, config: &GenerateConfig) -> Self {
         Self {
             touch,
             bundle,
@@ -149,7 +134,7 @@ pub enum ImprintKey {
     /// Measured: it is in the sample.
     Measured(TouchKey),
     /// Derived from a prediction.
-    Predicted(Recipe, ShiftMode),
+    Predicted(PredictionKey, ShiftMode),
 }
 
 impl ImprintKey {
@@ -160,21 +145,6 @@ impl ImprintKey {
             Self::Predicted(recipe, _) => recipe.touch,
         }
     }
-}
-
-/// An automatic mask's recipe.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum MaskRecipe {
-    /// Imprint above a depth in metres.
-    Threshold(Bits),
-    /// The deepest share of the pixels, in percent.
-    TopPercent(Bits),
-    /// Within a distance (metres) of the CAD model at the true pose.
-    Cad(Bits),
-    /// A mask model, by its bundle's identity.
-    Unet(Arc<str>),
-    /// The simulator's truth.
-    Truth,
 }
 
 /// An automatic mask of one imprint.
@@ -259,7 +229,7 @@ pub struct BasinKey {
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct EnsembleKey {
     /// At least one; they differ in their seeds.
-    pub recipes: Vec<Recipe>,
+    pub recipes: Vec<PredictionKey>,
     /// How they become metres.
     pub shift: ShiftMode,
 }
@@ -276,17 +246,17 @@ pub enum Request {
     /// The predictions of a touch that lie on the disk from before.
     Stored(TouchKey),
     /// The prediction that a pane needs because the one of the other finger was made.
-    Prediction(Recipe),
+    Prediction(PredictionKey),
     /// A prediction with one of several seeds.
-    Seed(Recipe),
+    Seed(PredictionKey),
     /// Mean and spread of several predictions.
     Ensemble(EnsembleKey),
     /// A prediction in metres (of a raw prediction that exists).
-    Imprint(Recipe, ShiftMode),
+    Imprint(PredictionKey, ShiftMode),
     /// A prediction against the measurement.
-    Comparison(Recipe, ShiftMode),
+    Comparison(PredictionKey, ShiftMode),
     /// The depth chain of a prediction, stage by stage.
-    Ledger(Recipe, ShiftMode),
+    Ledger(PredictionKey, ShiftMode),
     /// What a GelSlim image leaves open.
     Ambiguity(TouchKey),
     /// An automatic mask.

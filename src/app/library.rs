@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
 use super::document::Review;
-use super::error::TaskError;
 use super::keys::{DatasetSeq, PairKey};
 use super::services::DataSource;
 use crate::domain::dataset::{Index, PairEntry, PairId};
-use crate::domain::diffusion::GenerateConfig;
+use crate::work::bundles::{BundleInfo, BundleKind};
+use crate::work::error::TaskError;
 
 /// What can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -90,43 +90,6 @@ impl OpenDataset {
     pub fn key(&self, pair: PairId) -> PairKey {
         PairKey { dataset: self.seq, pair }
     }
-}
-
-/// A model bundle that was found.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BundleInfo {
-    /// Its identity: the digest of its manifest and files.
-    pub id: Arc<str>,
-    /// The name on screen.
-    pub name: String,
-    /// What it does.
-    pub kind: BundleKind,
-    /// Its folder.
-    pub folder: PathBuf,
-    /// What can be chosen, if it is a generator.
-    pub generator: Option<GeneratorInfo>,
-}
-
-/// The choices that a generator's bundle leaves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GeneratorInfo {
-    /// What it recommends.
-    pub defaults: GenerateConfig,
-    /// The steps of its training: no more can be taken.
-    pub training_steps: usize,
-    /// Whether it was trained for guidance.
-    pub guided: bool,
-}
-
-/// What a bundle does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum BundleKind {
-    /// GelSlim image to Soft Bubble imprint.
-    Generator,
-    /// Imprint to contact mask.
-    Mask,
-    /// Imprint to tool.
-    Classifier,
 }
 
 /// A folder that is followed.

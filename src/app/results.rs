@@ -4,24 +4,24 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use glam::DVec3;
-
 use super::inspect::Inspection;
 use super::keys::{
-    BasinKey, CloudKey, EnsembleKey, ImprintSource, MaskKey, PairKey, PoseKey, Recipe, RunKey, ShiftMode, TouchKey,
+    BasinKey, CloudKey, EnsembleKey, ImprintSource, MaskKey, PairKey, PoseKey, PredictionKey, RunKey, ShiftMode,
+    TouchKey,
 };
-use super::services::{Generated, NamedTool};
 use crate::domain::align::basin::Basin;
-use crate::domain::align::reason::{Reason, ReasonCounts};
-use crate::domain::align::{AlignReport, Directions, PointFit, TraceStep};
 use crate::domain::ambiguity::Ambiguity;
-use crate::domain::ensemble::Spread;
-use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Grid, Mask};
-use crate::domain::metrics::Split;
-use crate::domain::postprocess::{ChainReading, Ledger};
-use crate::domain::sample::{Sample, Scale};
-use crate::domain::sensor::Finger;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::sample::Sample;
+use crate::work::cloud::Clouds;
+use crate::work::compare::Comparison;
+use crate::work::ensemble::Ensemble;
+use crate::work::job::PreviewPicture;
+use crate::work::layers::LayerResult;
+use crate::work::ledger::LedgerResult;
+use crate::work::models::Prediction;
+use crate::work::pose::PoseResult;
+use crate::work::tool::NamedTool;
 
 /// Values by recipe; the least recently used go first when the budget is exceeded.
 ///
@@ -113,191 +113,13 @@ impl<K: Ord + Clone, V> Cache<K, V> {
     }
 }
 
-/// What the generator made, before any shift.
-#[derive(Clone, Debug)]
-pub struct Prediction {
-    /// How it was made: the seed is in here.
-    pub recipe: Recipe,
-    /// The generator's own output, with the ways to metres.
-    pub output: Generated,
-    /// Time it took, seconds.
-    pub seconds: f64,
-}
-
 /// A prediction as it looks on the way.
 #[derive(Clone, Debug)]
 pub struct Preview {
     /// What is being made.
-    pub recipe: Recipe,
-    /// Steps done.
-    pub step: u32,
-    /// Steps in all.
-    pub of: u32,
-    /// As the model sees it now, metres, as large as the bubble image.
-    pub depth: DepthMap,
-}
-
-/// Several predictions of one touch against each other.
-#[derive(Clone, Debug)]
-pub struct Ensemble {
-    /// Around their mean, metres.
-    pub spread: Spread,
-    /// Mean over them of the spread of the decoder's channels, metres; `None` for a decoder of one channel.
-    pub channels: Option<DepthMap>,
-}
-
-impl Ensemble {
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        4 * (2 * self.spread.mean.len() + self.channels.as_ref().map_or(0, Grid::len))
-    }
-}
-
-/// A prediction against the measurement of the same touch.
-#[derive(Clone, Debug)]
-pub struct Comparison {
-    /// Predicted minus measured, metres; NaN where either is.
-    pub error: DepthMap,
-    /// Peak signal-to-noise ratio as the lab computes it, decibels; `None` if it is not defined.
-    pub psnr_db: Option<f64>,
-    /// Structural similarity as the lab computes it; `None` if it is not defined.
-    pub ssim: Option<f64>,
-    /// Mean absolute error, metres; NaN without a pixel to compare.
-    pub mae_m: f64,
-    /// Whether PSNR and SSIM are of metres, or (assumed scale) of images stretched to 0..1 each.
-    pub scale: Scale,
-    /// The same figures inside and outside the GelSlim's footprint, errors in metres; `None` where nobody asked.
-    pub split: Option<Split>,
-}
-
-/// The depth chain of a prediction.
-#[derive(Clone, Debug)]
-pub struct LedgerResult {
-    /// Every stage, the result against the truth, and what is implausible.
-    pub ledger: Ledger,
-    /// The same picture in every way to metres.
-    pub readings: Vec<ChainReading>,
-}
-
-/// The surface points of both fingers in the grasp frame.
-#[derive(Clone, Debug, Default)]
-pub struct Clouds {
-    /// By [`Finger::index`].
-    pub fingers: [Option<FingerCloud>; 2],
-}
-
-/// The surface points of one finger, one per pixel with a measurement, row by row.
-#[derive(Clone, Debug, Default)]
-pub struct FingerCloud {
-    /// Positions, metres, grasp frame.
-    pub points: Vec<DVec3>,
-    /// The raw bubble pixel `(x, y)` of each point.
-    pub pixels: Vec<[u16; 2]>,
-    /// Whether each point is a contact point.
-    pub contact: Vec<bool>,
-}
-
-impl Clouds {
-    /// The cloud of one finger.
-    pub fn finger(&self, finger: Finger) -> Option<&FingerCloud> {
-        self.fingers[finger.index()].as_ref()
-    }
-
-    /// The contact points of both fingers, right first: what is registered.
-    pub fn contact_points(&self) -> Vec<DVec3> {
-        let fingers = self.fingers.iter().flatten();
-        fingers
-            .flat_map(|f| f.points.iter().zip(&f.contact).filter(|(_, contact)| **contact).map(|(p, _)| *p))
-            .collect()
-    }
-
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        self.fingers.iter().flatten().map(|f| f.points.len() * 32).sum()
-    }
-}
-
-impl FingerCloud {
-    /// The index of the point at a raw bubble pixel. Points are in row order, so this is a binary search.
-    pub fn at_pixel(&self, x: usize, y: usize) -> Option<usize> {
-        self.pixels.binary_search_by_key(&(y, x), |p| (p[1].into(), p[0].into())).ok()
-    }
-}
-
-/// A registered pose.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PoseResult {
-    /// The tool in the hand.
-    pub grasp_from_object: PlanarPose,
-    /// The angle that the lab reports: of `object_from_grasp`, radians.
-    pub angle_rad: f64,
-    /// The true angle in the same sense, where known.
-    pub truth_rad: Option<f64>,
-    /// Size of the angle's error, where the truth is known.
-    pub error_rad: Option<f64>,
-    /// Root mean square of the residuals, metres.
-    pub rms_m: f64,
-    /// Contact points registered.
-    pub num_points: usize,
-    /// Why it stopped, in words.
-    pub stop: String,
-    /// Whether it stopped because nothing moved any more.
-    pub converged: bool,
-    /// Time it took, milliseconds.
-    pub ms: f64,
-    /// Everything the registration says about itself; with trace and fits only in [`Results::runs`].
-    pub report: AlignReport,
-}
-
-impl PoseResult {
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        size_of::<Self>()
-            + self.report.trace.len() * size_of::<TraceStep>()
-            + self.report.fits.len() * size_of::<PointFit>()
-    }
-}
-
-/// What the layers show of one registration.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LayerResult {
-    /// The registered pose that they are of, `grasp_from_object`.
-    pub grasp_from_object: PlanarPose,
-    /// The reason of every pixel, by [`Finger::index`].
-    pub reasons: [Option<Grid<Reason>>; 2],
-    /// Residual (metres) and weight of every contact point, by [`Finger::index`], in the order of the cloud.
-    pub fits: [Vec<PointFit>; 2],
-    /// Pixels per reason, by [`Finger::index`].
-    pub counts: [ReasonCounts; 2],
-    /// Residuals of the contact points of both fingers by size: shares of [`LayerResult::range_m`].
-    pub histogram: Vec<u32>,
-    /// Contact points with a larger residual than the range.
-    pub above: u32,
-    /// Largest residual of the histogram and of the heat map, metres.
-    pub range_m: f64,
-    /// Width of the narrowest kernel, metres; `None` for an engine without one.
-    pub kernel_m: Option<f64>,
-    /// Distances in both directions; `None` without points on one side.
-    pub directions: Option<Directions>,
-}
-
-impl LayerResult {
-    /// Residual, weight and reason at a raw bubble pixel; the fit only where the pixel is a contact point.
-    pub fn at(&self, finger: Finger, cloud: &FingerCloud, pixel: [u16; 2]) -> Option<(Reason, Option<PointFit>)> {
-        let (x, y) = (usize::from(pixel[0]), usize::from(pixel[1]));
-        let reason = *self.reasons[finger.index()].as_ref()?.get(x, y)?;
-        let fit = cloud.at_pixel(x, y).filter(|at| cloud.contact.get(*at) == Some(&true)).and_then(|at| {
-            let before = cloud.contact[..at].iter().filter(|c| **c).count();
-            self.fits[finger.index()].get(before).copied()
-        });
-        Some((reason, fit))
-    }
-
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        let pixels: usize = self.reasons.iter().flatten().map(Grid::len).sum();
-        pixels + self.fits.iter().map(|f| f.len() * size_of::<PointFit>()).sum::<usize>() + size_of::<Self>()
-    }
+    pub recipe: PredictionKey,
+    /// How it looks.
+    pub picture: PreviewPicture,
 }
 
 /// All caches.
@@ -308,15 +130,15 @@ pub struct Results {
     /// Small pictures of the measured imprint (right finger, else left).
     pub thumbnails: Cache<PairKey, DepthMap>,
     /// Raw predictions.
-    pub predictions: Cache<Recipe, Prediction>,
+    pub predictions: Cache<PredictionKey, Prediction>,
     /// Predictions in metres, as large as the bubble image.
-    pub imprints: Cache<(Recipe, ShiftMode), DepthMap>,
+    pub imprints: Cache<(PredictionKey, ShiftMode), DepthMap>,
     /// Several predictions of one touch.
     pub ensembles: Cache<EnsembleKey, Ensemble>,
     /// Predictions against measurements.
-    pub comparisons: Cache<(Recipe, ShiftMode), Comparison>,
+    pub comparisons: Cache<(PredictionKey, ShiftMode), Comparison>,
     /// Depth chains.
-    pub ledgers: Cache<(Recipe, ShiftMode), LedgerResult>,
+    pub ledgers: Cache<(PredictionKey, ShiftMode), LedgerResult>,
     /// What GelSlim images leave open.
     pub ambiguities: Cache<TouchKey, Option<Ambiguity>>,
     /// Automatic masks.
@@ -340,9 +162,9 @@ pub struct Results {
     /// Touches whose predictions from before were looked for on the disk.
     pub looked_up: BTreeSet<TouchKey>,
     /// The prediction shown for each touch: the last one generated, or the one chosen.
-    pub chosen: BTreeMap<TouchKey, Recipe>,
+    pub chosen: BTreeMap<TouchKey, PredictionKey>,
     /// All predictions made for each touch, oldest first.
-    pub made: BTreeMap<TouchKey, Vec<Recipe>>,
+    pub made: BTreeMap<TouchKey, Vec<PredictionKey>>,
     /// The last cloud and pose of a pair and imprint: shown dimmed while the next is computed.
     pub latest: BTreeMap<(PairKey, ImprintSource), (Option<CloudKey>, Option<PoseKey>)>,
     /// The last recorded registration, for the same purpose.

@@ -10,13 +10,14 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::apply::apply;
 use super::command::{Command, UiRequest};
-use super::jobs::{Cancel, Lane, PreviewWish};
+use super::jobs::{Lane, PreviewWish};
 use super::keys::{DatasetSeq, Request, TouchKey};
 use super::library::Place;
 use super::results::Preview;
 use super::services::SharedServices;
 use super::state::State;
-use super::tasks::{Progress, Ticket};
+use super::tasks::Ticket;
+use crate::work::job::{Cancel, Progress};
 use lanes::{Event, Lanes};
 
 /// The latest picture on the way of each touch, with the job that made it.

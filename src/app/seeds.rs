@@ -1,12 +1,13 @@
 //! Several seeds of one touch: which, what is there of them, and what is missing.
 
 use super::command::Pane;
-use super::keys::{CloudKey, EnsembleKey, ImprintKey, MaskKey, MaskVersion, PoseKey, Recipe, Request};
-use super::results::{Ensemble, PoseResult};
+use super::keys::{CloudKey, EnsembleKey, ImprintKey, MaskKey, MaskVersion, PoseKey, PredictionKey, Request};
 use super::state::{Absent, Lookup, State};
 use crate::domain::ensemble::seeds;
 use crate::domain::grid::DepthMap;
 use crate::domain::sensor::Finger;
+use crate::work::ensemble::Ensemble;
+use crate::work::pose::PoseResult;
 
 /// Fewest and most seeds of an ensemble.
 pub const COUNT: std::ops::RangeInclusive<usize> = 2..=16;
@@ -49,26 +50,26 @@ impl State {
     ///
     /// # Errors
     /// Why nothing can be generated.
-    pub fn seed_recipes(&self, finger: Finger) -> Result<Vec<Recipe>, Absent> {
+    pub fn seed_recipes(&self, finger: Finger) -> Result<Vec<PredictionKey>, Absent> {
         self.can_generate()?;
         let touch = self.touch_key(finger).ok_or(Absent::NothingSelected)?;
         if self.sample().ready().is_some() && self.gelslim(finger).ready().is_none() {
             return Err(Absent::NoGelSlim);
         }
         let first = self.recipe(touch).ok_or(Absent::NoGenerator)?;
-        let recipe = |seed| Recipe { seed, ..first.clone() };
+        let recipe = |seed| PredictionKey { seed, ..first.clone() };
         Ok(seeds(first.seed, self.seeds.count).into_iter().map(recipe).collect())
     }
 
     /// The imprint of one seed in metres, if it is there.
-    pub fn seed_imprint(&self, recipe: &Recipe) -> Option<&DepthMap> {
+    pub fn seed_imprint(&self, recipe: &PredictionKey) -> Option<&DepthMap> {
         self.results.imprints.get(&(recipe.clone(), self.settings.shift)).map(|imprint| &**imprint)
     }
 
     /// The ensemble of what is there of one finger; `None` before the first seed.
     fn ensemble_key(&self, finger: Finger) -> Option<EnsembleKey> {
-        let there = |r: &Recipe| self.results.predictions.contains(r) && self.seed_imprint(r).is_some();
-        let recipes: Vec<Recipe> = self.seed_recipes(finger).ok()?.into_iter().filter(there).collect();
+        let there = |r: &PredictionKey| self.results.predictions.contains(r) && self.seed_imprint(r).is_some();
+        let recipes: Vec<PredictionKey> = self.seed_recipes(finger).ok()?.into_iter().filter(there).collect();
         (!recipes.is_empty()).then_some(EnsembleKey { recipes, shift: self.settings.shift })
     }
 

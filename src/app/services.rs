@@ -3,7 +3,6 @@
 //! The studio and the command line use [`DataSource`] and [`Services`] as [`live`] implements them over `io` and `infer`.
 
 pub mod live;
-mod predictions;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,20 +10,21 @@ use std::sync::Arc;
 
 use super::command::Opened;
 use super::document::PairLabels;
-use super::error::TaskError;
-use super::jobs::JobCx;
-use super::keys::{Recipe, ShiftMode, TouchKey};
-use super::library::{BundleInfo, Place};
-use super::results::Prediction;
-use super::settings::{RuntimeChoice, Settings};
+use super::keys::{PredictionKey, TouchKey};
+use super::library::Place;
+use super::settings::Settings;
 use crate::domain::dataset::{Index, PairId, Problem};
+use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::mesh::TriMesh;
-use crate::domain::pose::ToolModel;
-use crate::domain::postprocess::{DepthChain, RawPrediction};
 use crate::domain::sample::Sample;
+use crate::infer::engine::EngineChoice;
 use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
+use crate::work::bundles::BundleInfo;
+use crate::work::error::TaskError;
+use crate::work::job::JobCx;
+use crate::work::models::{Prediction, Wanted};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
@@ -82,17 +82,6 @@ pub trait DataSource: Send + Sync {
     ) -> Result<String, TaskError>;
 }
 
-/// A prediction to be made. All of one call have the same bundle, runtime and choices but for the seed.
-#[derive(Clone, Debug)]
-pub struct GenerateItem<'a> {
-    /// What to make.
-    pub recipe: Recipe,
-    /// The condition.
-    pub difference: &'a RgbGrid,
-    /// `[width, height]` of the bubble image; `[0, 0]` where there is none.
-    pub size: [usize; 2],
-}
-
 /// A data set whose folder is followed.
 pub trait Following: Send {
     /// The next touch that arrived since the last call; returns soon if there is none.
@@ -118,28 +107,6 @@ impl std::fmt::Debug for Followed {
     }
 }
 
-/// A generator's own output, with the ways to metres.
-#[derive(Clone, Debug)]
-pub struct Generated {
-    /// The decoder's picture.
-    pub raw: RawPrediction,
-    /// Per range mapping the steps to metres, or why it cannot be done.
-    pub chains: BTreeMap<ShiftMode, Result<DepthChain, String>>,
-    /// The runtime that made it.
-    pub runtime: String,
-    /// What it took, seconds, where it was made earlier and only read now.
-    pub kept: Option<f64>,
-}
-
-/// A tool's name and its CAD model with what the registration derives from it.
-#[derive(Clone, Debug)]
-pub struct NamedTool {
-    /// The tool's name.
-    pub name: String,
-    /// The CAD model, ready for registration.
-    pub model: ToolModel,
-}
-
 /// Files and models, as the lanes use them.
 pub trait Services: Send + Sync {
     /// Reads the index of a data set.
@@ -156,22 +123,24 @@ pub trait Services: Send + Sync {
     ///
     /// # Errors
     /// If the model cannot be loaded or run, or the job was told to stop.
-    fn generate(
+    fn predict(
         &self,
         bundle: &BundleInfo,
-        items: &[GenerateItem<'_>],
+        engine: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[Wanted<'_>],
         cx: &JobCx,
-    ) -> Result<Vec<Generated>, TaskError>;
+    ) -> Result<Vec<Prediction>, TaskError>;
 
     /// What was made of a touch before and is kept on the disk, oldest first, with the recipes that `bundles` and
     /// `runtime` give it now. Never fails: what cannot be read is not there.
     fn stored(
         &self,
         bundles: &[BundleInfo],
-        runtime: RuntimeChoice,
+        runtime: EngineChoice,
         touch: TouchKey,
         difference: &RgbGrid,
-    ) -> Vec<Prediction> {
+    ) -> Vec<(PredictionKey, Prediction)> {
         let _ = (bundles, runtime, touch, difference);
         Vec::new()
     }
@@ -180,8 +149,7 @@ pub trait Services: Send + Sync {
     ///
     /// # Errors
     /// If the model cannot be loaded or run.
-    fn mask_by_model(&self, bundle: &BundleInfo, runtime: RuntimeChoice, imprint: &DepthMap)
-    -> Result<Mask, TaskError>;
+    fn mask_by_model(&self, bundle: &BundleInfo, runtime: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError>;
 
     /// The stored settings (defaults where there are none), and what was wrong if they were set aside.
     fn load_settings(&self) -> (Settings, Option<TaskError>);

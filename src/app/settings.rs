@@ -6,9 +6,11 @@ use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
 use super::keys::{PoseEngine, Preset, Sampler, ShiftMode, Spacing};
-use super::library::{BundleInfo, Place};
+use super::library::Place;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
 use crate::domain::postprocess::RefitShift;
+use crate::infer::engine::EngineChoice;
+use crate::work::bundles::BundleInfo;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
 pub const SETTINGS_VERSION: u32 = 1;
@@ -47,7 +49,7 @@ pub struct Settings {
     /// The registration.
     pub pose_engine: PoseEngine,
     /// The runtime that runs models.
-    pub runtime: RuntimeChoice,
+    pub runtime: EngineChoice,
     /// What the predictions kept on the disk may take, MiB; 0 keeps none.
     pub cache_mib: u32,
     /// Whether the 3D views of prediction and measurement move together.
@@ -85,7 +87,7 @@ impl Default for Settings {
             generate: GenerateSettings::default(),
             mask: MaskSettings::default(),
             pose_engine: PoseEngine::default(),
-            runtime: RuntimeChoice::default(),
+            runtime: EngineChoice::default(),
             cache_mib: 512,
             cameras_linked: true,
             mask_visible: true,
@@ -421,30 +423,6 @@ impl MaskSource {
             Self::Cad => "Pixels whose membrane point lies near the CAD model at the true pose (the lab's labels)",
             Self::Unet => "What the mask model predicts from the imprint",
             Self::Truth => "What the simulator knows",
-        }
-    }
-}
-
-/// Which runtime runs models.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum RuntimeChoice {
-    /// ONNX Runtime where its library is found, else rten.
-    #[default]
-    Auto,
-    /// rten: always there.
-    Rten,
-    /// ONNX Runtime.
-    Ort,
-}
-
-impl RuntimeChoice {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "Automatic",
-            Self::Rten => "rten",
-            Self::Ort => "ONNX Runtime",
         }
     }
 }

@@ -7,7 +7,6 @@ use glam::DVec3;
 use super::action::Action;
 use super::command::{Hover, Pane};
 use super::document::Document;
-use super::error::TaskError;
 use super::evaluation::TableState;
 use super::history::History;
 use super::inspect::Inspect;
@@ -20,6 +19,7 @@ use super::tasks::{Log, Tasks};
 use super::workbench::Workbench;
 use crate::domain::dataset::{PairEntry, PairId};
 use crate::domain::sensor::Finger;
+use crate::work::error::TaskError;
 
 /// Everything the studio shows.
 #[derive(Debug, Default)]

@@ -2,30 +2,13 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use super::error::{TaskError, TaskErrorKind};
-use super::keys::{DatasetSeq, Recipe, Request};
+use super::keys::{DatasetSeq, PredictionKey, Request};
+use crate::work::error::{TaskError, TaskErrorKind};
+use crate::work::job::Progress;
 
 /// The name of a running job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Ticket(pub u64);
-
-/// How far a job is.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Progress {
-    /// Steps done.
-    pub done: u64,
-    /// Steps in all; 0 = unknown.
-    pub total: u64,
-    /// What is being done now, e.g. `step 12 of 20`.
-    pub text: String,
-}
-
-impl Progress {
-    /// Share done, 0..1; `None` if unknown.
-    pub fn fraction(&self) -> Option<f32> {
-        (self.total > 0).then(|| self.done.min(self.total) as f32 / self.total as f32)
-    }
-}
 
 /// A job that a person started.
 #[derive(Clone, Debug)]
@@ -35,7 +18,7 @@ pub struct Task {
     /// How far it is.
     pub progress: Progress,
     /// The predictions it makes, if it makes any: one per finger.
-    pub recipes: Vec<Recipe>,
+    pub recipes: Vec<PredictionKey>,
     /// The data set it opens, if it opens one.
     pub opening: Option<DatasetSeq>,
     /// Whether it was told to stop and has not stopped yet.
@@ -61,7 +44,7 @@ impl Tasks {
     }
 
     /// The task that generates `recipe`.
-    pub fn generating(&self, recipe: &Recipe) -> Option<(Ticket, &Task)> {
+    pub fn generating(&self, recipe: &PredictionKey) -> Option<(Ticket, &Task)> {
         self.running.iter().find(|(_, task)| task.recipes.contains(recipe)).map(|(t, task)| (*t, task))
     }
 
@@ -75,7 +58,7 @@ impl Tasks {
         self.running.is_empty() && self.demanded.is_empty()
     }
 
-    pub(super) fn start(&mut self, title: String, recipes: Vec<Recipe>) -> Ticket {
+    pub(super) fn start(&mut self, title: String, recipes: Vec<PredictionKey>) -> Ticket {
         self.last_ticket += 1;
         let ticket = Ticket(self.last_ticket);
         self.running

@@ -7,11 +7,9 @@ use std::sync::Arc;
 use super::command::Pane;
 use super::inspect::INSPECT_PANES;
 use super::keys::{
-    CloudKey, ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, PairKey, PoseKey, Recipe, Request, TouchKey,
+    CloudKey, ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, PairKey, PoseKey, PredictionKey, Request,
+    TouchKey,
 };
-use super::library::{BundleInfo, BundleKind};
-use super::results::{Clouds, Comparison, PoseResult};
-use super::services::NamedTool;
 use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use super::workbench::PoseOf;
@@ -19,6 +17,11 @@ use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
 use crate::domain::sensor::Finger;
 use crate::domain::units;
+use crate::work::bundles::{BundleInfo, BundleKind};
+use crate::work::cloud::Clouds;
+use crate::work::compare::Comparison;
+use crate::work::pose::PoseResult;
+use crate::work::tool::NamedTool;
 use strum::IntoEnumIterator as _;
 
 /// Neighbours loaded ahead on each side of the selection.
@@ -66,7 +69,7 @@ impl State {
     }
 
     /// The prediction shown for one finger, if one was made.
-    pub fn chosen(&self, finger: Finger) -> Option<&Recipe> {
+    pub fn chosen(&self, finger: Finger) -> Option<&PredictionKey> {
         self.results.chosen.get(&self.touch_key(finger)?)
     }
 
@@ -523,7 +526,7 @@ impl Wanted<'_> {
         if !state.settings.generate.both_fingers || !looked_up || state.chosen(finger).is_some() {
             return;
         }
-        let recipe = Recipe { touch, ..made.clone() };
+        let recipe = PredictionKey { touch, ..made.clone() };
         let under_way = state.tasks.generating(&recipe).is_some();
         if state.library.bundle(&recipe.bundle).is_some() && state.gelslim(finger).ready().is_some() && !under_way {
             self.ask(state.results.predictions.contains(&recipe), Request::Prediction(recipe));

@@ -7,11 +7,12 @@ use strum::EnumIter;
 
 use super::command::Pane;
 use super::keys::{ImprintSource, PairKey, PoseKey, Request, RunKey};
-use super::results::{LayerResult, PoseResult};
 use super::state::{Lookup, State};
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::{AcceptedPose, HandAxis, HandCost, HandPose, PoseDifference};
 use crate::domain::sensor::Finger;
+use crate::work::layers::LayerResult;
+use crate::work::pose::PoseResult;
 
 /// What colours the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]

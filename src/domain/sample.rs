@@ -32,6 +32,16 @@ pub enum Scale {
     Assumed,
 }
 
+impl Scale {
+    /// The name in files.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Measured => "measured",
+            Self::Assumed => "assumed",
+        }
+    }
+}
+
 /// What one finger felt, with each sensor.
 #[derive(Clone, Debug, Default)]
 pub struct FingerTouch {

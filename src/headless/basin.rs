@@ -18,6 +18,7 @@ use crate::domain::inspect::basin_map;
 use crate::domain::pose::{Engine, FingerInput, contact_cloud, register};
 use crate::domain::sensor::Finger;
 use crate::domain::units::{angle_error, fixed, mm, wrap_angle};
+use crate::work::job::JobCx;
 
 /// Arguments of `basin`.
 #[derive(Debug, Args)]
@@ -103,7 +104,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let mut predictor = Predictor::new(&args.model);
     let predicted = args.imprint == Imprint::Predicted;
     let imprints = if predicted {
-        predictor.imprints(&sample)?
+        predictor.imprints(&sample, &JobCx::unwatched())?
     } else {
         Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
     };

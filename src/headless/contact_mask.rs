@@ -3,13 +3,13 @@
 use clap::{Args, ValueEnum};
 
 use super::predict::Predictor;
-use crate::app::jobs::compute;
-use crate::app::keys::MaskRecipe;
 use crate::domain::contact::LAB_CAD_DISTANCE_M;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::pose::ToolModel;
 use crate::domain::sample::FingerTouch;
+use crate::work::mask;
+use crate::work::mask::MaskRecipe;
 
 /// Where masks come from.
 #[derive(Debug, Clone, Copy, Args)]
@@ -70,5 +70,5 @@ pub(super) fn contact_mask(
         MaskFrom::Truth => MaskRecipe::Truth,
         MaskFrom::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
     };
-    compute::mask(&recipe, imprint, Some(touch), tool, truth).map_err(|err| anyhow::anyhow!("{err}"))
+    mask::mask(&recipe, imprint, Some(touch), tool, truth).map_err(|err| anyhow::anyhow!("{err}"))
 }

@@ -10,13 +10,13 @@ use strum::IntoEnumIterator as _;
 use super::contact_mask::MaskFrom;
 use super::predict::{RuntimeArg, ShiftArg, sampler};
 use super::{Common, Output, ToolArgs, VerbResult};
-use crate::app::jobs::evaluate::{Evaluation, MaskBy, Report, Setup, evaluate, rows};
-use crate::app::jobs::{Cancel, JobCx};
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Row, paper_rows};
 use crate::domain::pose::Engine;
 use crate::infer::bundle::{Bundle, Found, default_roots, find};
 use crate::io::atomic;
+use crate::work::evaluate::{Evaluation, MaskBy, Report, Setup, evaluate, rows};
+use crate::work::job::{Cancel, JobCx};
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -111,7 +111,7 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let setup = setup(args)?;
     let output = Arc::new(Output::new(args.common, "evaluating", 0));
     let bar = output.clone();
-    let watch = move |p: crate::app::tasks::Progress| {
+    let watch = move |p: crate::work::job::Progress| {
         bar.set(p.done as usize, p.total as usize);
         bar.message(&p.text);
     };

@@ -1,7 +1,6 @@
 //! `touch2touch generate`: predicted imprints of a whole dataset, beside the measured ones.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -9,8 +8,6 @@ use serde::Serialize;
 use super::predict::{ModelArgs, Predictor};
 use super::seeds::{self, SeedArgs, SeedFigures};
 use super::{Common, Output, VerbResult};
-use crate::app::jobs::compute;
-use crate::app::results::Comparison;
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Mask};
@@ -19,6 +16,9 @@ use crate::domain::sensor::Finger;
 use crate::domain::{metrics, resample};
 use crate::io::dataset::{Dataset, assumed_metres};
 use crate::io::images;
+use crate::work::compare::{self, Comparison};
+use crate::work::imprint::imprint_of;
+use crate::work::job::JobCx;
 
 /// Arguments of `generate`.
 #[derive(Debug, Args)]
@@ -185,21 +185,17 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                 touches.push((finger, touch, &gelslim.difference));
             }
             let differences: Vec<_> = touches.iter().map(|(_, _, difference)| *difference).collect();
-            let shift = predictor.shift();
-            predictor.generator()?;
-            let start = Instant::now();
-            let predictions = predictor.predict(&differences)?;
-            let seconds = start.elapsed().as_secs_f64() / predictions.len().max(1) as f64;
-            for ((finger, touch, difference), predicted) in touches.into_iter().zip(predictions) {
-                let imprint = predictor.generator()?.depth(&predicted.raw, shift)?;
+            let predictions = predictor.predict(&differences, &JobCx::unwatched())?;
+            for ((finger, touch, _), predicted) in touches.into_iter().zip(predictions) {
+                let imprint = imprint_of(&predicted, predictor.shift(), &sample, finger)?;
                 write(&args.out, &name, finger, &imprint)?;
-                let kept = predicted.kept;
+                let (seconds, kept) = (predicted.seconds, predicted.kept);
                 let ambiguity = touch.gelslim.as_ref().and_then(|g| ambiguity(&g.difference));
                 let mut pair =
                     Pair { name: name.clone(), finger: finger.name(), ambiguity, seconds, kept, ..Pair::default() };
                 score(&dataset, id, (finger, &sample), &imprint, &mut pair)?;
                 if args.ensemble.seeds > 1 {
-                    let found = seeds::predict(&mut predictor, difference, args.ensemble.seeds)?;
+                    let found = seeds::predict(&mut predictor, &sample, finger, args.ensemble.seeds)?;
                     let mut of_mean = Pair::default();
                     score(&dataset, id, (finger, &sample), &found.spread.mean, &mut of_mean)?;
                     let scores = (of_mean.psnr_db, of_mean.ssim);
@@ -221,8 +217,8 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let report = Report {
         mean: mean(&pairs),
         convention: convention(scale),
-        bundle: predictor.bundle_name().to_owned(),
-        runtime: predictor.generator()?.engine().label(),
+        bundle: predictor.bundle()?.name.clone(),
+        runtime: predictor.engine_label()?,
         sampler: config.sampler.key(),
         steps: config.steps,
         seed: config.seed,
@@ -270,7 +266,7 @@ fn score(
 
 /// The figures as the studio computes them.
 fn compared(predicted: &DepthMap, measured: &DepthMap, scale: Scale, seen: &Mask) -> anyhow::Result<Comparison> {
-    compute::compare_parts(predicted, measured, scale, seen).map_err(|err| anyhow::anyhow!("{err}"))
+    compare::compare_parts(predicted, measured, scale, seen).map_err(|err| anyhow::anyhow!("{err}"))
 }
 
 fn take(pair: &mut Pair, found: &Comparison) {

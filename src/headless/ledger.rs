@@ -7,18 +7,15 @@ use serde::Serialize;
 
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::app::jobs::compute::LAB_PEAK_M;
-use crate::app::jobs::ledger::reading_chains;
 use crate::domain::ambiguity::{Ambiguity, ambiguity};
 use crate::domain::colormap::{ColorMap, NAN_COLOR, Range};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::metrics::Line;
-use crate::domain::postprocess::{
-    ChainReading, Flag, Histogram, Ledger, Mapping, Orientation, Shift, Stats, ledger, readings,
-};
+use crate::domain::postprocess::{ChainReading, Flag, Histogram, Ledger, Orientation, Stats};
 use crate::domain::sensor::Finger;
 use crate::domain::units::{fixed, mm};
 use crate::io::images;
+use crate::work::ledger::{LedgerResult, of_prediction};
 
 /// Arguments of `ledger`.
 #[derive(Debug, Args)]
@@ -131,16 +128,10 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let mut predictor = Predictor::new(&args.model);
     let config = predictor.config()?;
     let shift = predictor.shift();
-    let raw = predictor.predict_one(&gelslim.difference)?;
-    let spec = predictor.generator()?.spec();
-    let mut chain = spec.depth_chain(shift)?;
-    let mut shift_name = shift.label();
-    if let Some(MappingArg::Correct) = args.mapping {
-        (chain.mapping, chain.shift, shift_name) = (Mapping::Correct, Shift::None, "Correct mapping");
-    }
-    let modes = reading_chains(shift, |mode| spec.depth_chain(mode).ok());
-    let found = ledger(&chain, &raw, truth)?;
-    let readings = readings(&chain, &modes, &raw, truth, LAB_PEAK_M);
+    let made = predictor.predict_one(&gelslim.difference)?;
+    let correct = matches!(args.mapping, Some(MappingArg::Correct));
+    let shift_name = if correct { "Correct mapping" } else { shift.label() };
+    let LedgerResult { ledger: found, readings } = of_prediction(&made, shift, correct, truth)?;
     if let Some(out) = &args.out {
         std::fs::create_dir_all(out)
             .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;
@@ -149,12 +140,12 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let report = Report {
         pair: name,
         finger: finger.name(),
-        bundle: predictor.bundle_name().to_owned(),
-        bundle_hash: predictor.bundle_hash().to_owned(),
+        bundle: predictor.bundle()?.name.clone(),
+        bundle_hash: made.bundle.to_string(),
         shift: shift_name,
         steps: config.steps,
         seed: config.seed,
-        scale: super::scale_name(sample.scale),
+        scale: sample.scale.key(),
         against_truth: found.against.as_ref().map(|a| AgainstReport {
             pixels: a.joint.pixels,
             line: a.joint.line,

@@ -25,6 +25,7 @@ use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
 use crate::io::masks::MaskStore;
+use crate::work::job::JobCx;
 
 /// Arguments of `pose`.
 #[derive(Debug, Args)]
@@ -301,7 +302,7 @@ fn pose_cases(
 ) -> anyhow::Result<Vec<Case>> {
     let predicted = imprint == "predicted";
     let imprints: [Option<DepthMap>; 2] = if predicted {
-        predictor.imprints(sample)?
+        predictor.imprints(sample, &JobCx::unwatched())?
     } else {
         Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
     };

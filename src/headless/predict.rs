@@ -1,8 +1,6 @@
 //! The options and models that `generate` and `pose` share. Models are loaded when first needed.
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
@@ -10,16 +8,16 @@ use strum::IntoEnumIterator as _;
 
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
-use crate::domain::postprocess::{RawPrediction, RefitShift, ShiftMode};
+use crate::domain::postprocess::{DepthChain, RefitShift, ShiftMode};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
-use crate::infer::bundle::{Bundle, default_roots, find};
-use crate::infer::engine::EngineChoice;
-use crate::infer::generator::Generator;
-use crate::infer::mask::MaskModel;
-use crate::infer::recipe::{Recipe, input_digest};
-use crate::infer::store::Store;
+use crate::infer::engine::{EngineChoice, resolve};
 use crate::io::statistics::ShiftStatistics;
+use crate::work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
+use crate::work::error::TaskError;
+use crate::work::imprint::{chain_of, imprint, imprint_of};
+use crate::work::job::JobCx;
+use crate::work::models::{Models, Prediction, Wanted};
 
 /// Which models, and how they are run.
 #[derive(Debug, Clone, Args)]
@@ -145,72 +143,49 @@ impl RuntimeArg {
     }
 }
 
-/// The bundle in the named folder, else the first one found that fits.
-pub(super) fn find_bundle(named: Option<&PathBuf>, kind: &str, fits: fn(&Bundle) -> bool) -> anyhow::Result<Bundle> {
-    if let Some(dir) = named {
-        return Ok(Bundle::open(dir)?);
-    }
-    let found = find(&default_roots());
-    found.bundles.into_iter().find(fits).ok_or_else(|| {
-        let refused: Vec<String> =
-            found.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
-        anyhow::anyhow!("no {kind} bundle was found; name one with an option{}", refused.concat())
-    })
-}
-
-/// The models of one run of the program.
+/// The models of one run of the program, as the arguments want them.
 pub(super) struct Predictor {
     args: ModelArgs,
-    bundle_name: String,
-    bundle_hash: String,
+    models: Models,
+    found: Option<FoundBundles>,
+    generator: Option<BundleInfo>,
+    mask_model: Option<BundleInfo>,
     refit: Option<RefitShift>,
-    generator: Option<Generator>,
-    mask_model: Option<MaskModel>,
-    store: Option<Store>,
-}
-
-/// A predicted picture, and whether it was made before.
-pub(super) struct Made {
-    pub(super) raw: RawPrediction,
-    pub(super) kept: bool,
 }
 
 impl Predictor {
-    /// Nothing is loaded yet.
+    /// Nothing is looked for yet.
     pub(super) fn new(args: &ModelArgs) -> Self {
         let store = if args.no_cache { None } else { super::cache::store() };
         Self {
             args: args.clone(),
-            bundle_name: String::new(),
-            bundle_hash: String::new(),
-            refit: None,
+            models: Models::new(store),
+            found: None,
             generator: None,
             mask_model: None,
-            store,
+            refit: None,
         }
     }
 
-    fn choice(&self) -> EngineChoice {
-        self.args.runtime.choice()
+    fn take(&mut self, kind: BundleKind, named: Option<PathBuf>) -> Result<BundleInfo, TaskError> {
+        self.found.get_or_insert_with(|| bundles::find(&[])).take(kind, named.as_deref())
     }
 
-    /// The generator, loaded at the first call.
-    pub(super) fn generator(&mut self) -> anyhow::Result<&mut Generator> {
+    /// The generator's bundle, looked for at the first call.
+    pub(super) fn bundle(&mut self) -> anyhow::Result<&BundleInfo> {
         if self.generator.is_none() {
-            let bundle = find_bundle(self.args.bundle.as_ref(), "generator", |b| b.generator().is_some())?;
+            let bundle = self.take(BundleKind::Generator, self.args.bundle.clone())?;
             self.refit = self.read_refit(&bundle)?;
-            self.bundle_name = bundle.name().to_owned();
-            self.bundle_hash = bundle.hash().to_owned();
-            self.generator = Some(Generator::open(&bundle, self.choice())?);
+            self.generator = Some(bundle);
         }
-        Ok(self.generator.as_mut().expect("it was just loaded"))
+        Ok(self.generator.as_ref().expect("it was just found"))
     }
 
     /// The statistics for the refit shift, which must be of this bundle.
-    fn read_refit(&self, bundle: &Bundle) -> anyhow::Result<Option<RefitShift>> {
+    fn read_refit(&self, bundle: &BundleInfo) -> anyhow::Result<Option<RefitShift>> {
         match (&self.args.stats, self.args.shift) {
             (Some(file), AnyShiftArg::Refit) => {
-                Ok(Some(ShiftStatistics::read(file)?.shift_for(bundle.name(), bundle.hash())?))
+                Ok(Some(ShiftStatistics::read(file)?.shift_for(&bundle.name, &bundle.id)?))
             }
             (None, AnyShiftArg::Refit) => {
                 anyhow::bail!("--shift refit needs --stats FILE; make the file with `touch2touch stats`")
@@ -220,22 +195,22 @@ impl Predictor {
         }
     }
 
-    /// The hash of the generator's bundle; empty before it is loaded.
-    pub(super) fn bundle_hash(&self) -> &str {
-        &self.bundle_hash
+    /// The engine that runs the models.
+    pub(super) fn engine(&self) -> EngineChoice {
+        self.args.runtime.choice()
     }
 
-    /// The name of the generator's bundle; empty before it is loaded.
-    pub(super) fn bundle_name(&self) -> &str {
-        &self.bundle_name
+    /// The engine's name for people.
+    pub(super) fn engine_label(&self) -> anyhow::Result<&'static str> {
+        Ok(resolve(self.engine())?.label())
     }
 
     /// The bundle's defaults with what the command line says instead.
     pub(super) fn config(&mut self) -> anyhow::Result<GenerateConfig> {
         let args = self.args.clone();
-        let generator = self.generator()?;
-        let spec = generator.spec();
-        let preset = args.preset.config(spec.defaults, spec.schedule.training_steps());
+        let bundle = self.bundle()?;
+        let Some(info) = bundle.generator else { anyhow::bail!("the bundle {} is no generator", bundle.name) };
+        let preset = args.preset.config(info.defaults, info.training_steps);
         let spacing = args.spacing.map(|spacing| match spacing {
             SpacingArg::Trailing => Spacing::Trailing,
             SpacingArg::Lab => Spacing::Lab,
@@ -249,56 +224,48 @@ impl Predictor {
             guidance: args.guidance.unwrap_or(preset.guidance),
         };
         // Said once, before the first pair, rather than for every pair.
-        generator.check_guidance(&config)?;
+        bundle.check_guidance(config.guidance)?;
         Ok(config)
     }
 
     /// Predictions of GelSlim difference images, all in one batch, in their order. What was made before is not made
     /// again.
-    pub(super) fn predict(&mut self, differences: &[&RgbGrid]) -> anyhow::Result<Vec<Made>> {
+    pub(super) fn predict(&mut self, differences: &[&RgbGrid], cx: &JobCx) -> anyhow::Result<Vec<Prediction>> {
         let config = self.config()?;
-        let store = self.store.take();
-        let made = self.predict_with(store.as_ref(), differences, &config);
-        self.store = store;
-        made
+        let wanted = |difference| Wanted { difference, seed: config.seed, size: [0, 0] };
+        let wanted: Vec<Wanted<'_>> = differences.iter().copied().map(wanted).collect();
+        self.predict_wanted(&wanted, cx)
+    }
+
+    /// One image with several seeds, all in one batch.
+    pub(super) fn predict_seeds(&mut self, difference: &RgbGrid, seeds: &[u64]) -> anyhow::Result<Vec<Prediction>> {
+        let wanted = |&seed: &u64| Wanted { difference, seed, size: [0, 0] };
+        self.predict_wanted(&seeds.iter().map(wanted).collect::<Vec<_>>(), &JobCx::unwatched())
+    }
+
+    fn predict_wanted(&mut self, wanted: &[Wanted<'_>], cx: &JobCx) -> anyhow::Result<Vec<Prediction>> {
+        let config = self.config()?;
+        let bundle = self.bundle()?.clone();
+        Ok(self.models.predict(&bundle, self.engine(), &config, wanted, cx)?)
     }
 
     /// The prediction of one GelSlim difference image, as [`Self::predict`].
-    pub(super) fn predict_one(&mut self, difference: &RgbGrid) -> anyhow::Result<RawPrediction> {
-        let mut made = self.predict(&[difference])?;
-        made.pop().map(|made| made.raw).ok_or_else(|| anyhow::anyhow!("the generator gave no prediction"))
+    pub(super) fn predict_one(&mut self, difference: &RgbGrid) -> anyhow::Result<Prediction> {
+        let made = self.predict(&[difference], &JobCx::unwatched())?.pop();
+        made.ok_or_else(|| anyhow::anyhow!("the generator gave no prediction"))
     }
 
-    fn predict_with(
-        &mut self,
-        store: Option<&Store>,
-        differences: &[&RgbGrid],
-        config: &GenerateConfig,
-    ) -> anyhow::Result<Vec<Made>> {
-        let generator = self.generator()?;
-        let key = |difference: &RgbGrid| generator.recipe(input_digest(difference), config);
-        let keys: Vec<Recipe> = differences.iter().map(|difference| key(difference)).collect();
-        let mut found: Vec<Option<Made>> = keys
-            .iter()
-            .map(|key| store.and_then(|store| store.get(key)).map(|stored| Made { raw: stored.raw, kept: true }))
-            .collect();
-        let fresh: Vec<usize> = (0..keys.len()).filter(|at| found[*at].is_none()).collect();
-        let images: Vec<&RgbGrid> = fresh.iter().map(|at| differences[*at]).collect();
-        let start = Instant::now();
-        let made = generator.generate_batch(&images, config, &mut |_| ControlFlow::Continue(()))?;
-        let each = start.elapsed().as_secs_f64() / fresh.len().max(1) as f64;
-        for (at, raw) in fresh.into_iter().zip(made) {
-            if let Some(store) = store
-                && let Err(err) = store.put(&keys[at], &raw, each)
-            {
-                log::warn!("a prediction could not be kept: {err}: {}", store.folder().display());
-            }
-            found[at] = Some(Made { raw, kept: false });
+    /// Loads the models that a touch needs and runs them once; see [`Models::warm_up`].
+    pub(super) fn warm_up(&mut self, with_mask: bool) -> anyhow::Result<()> {
+        let (config, bundle) = (self.config()?, self.bundle()?.clone());
+        let made = self.models.warm_up(&bundle, self.engine(), &config)?;
+        if with_mask {
+            self.mask(&imprint(&made, self.shift(), [0, 0])?)?;
         }
-        Ok(found.into_iter().flatten().collect())
+        Ok(())
     }
 
-    /// The reading of the decoder's output; call it after [`Self::generator`].
+    /// The reading of the decoder's output; call it after [`Self::bundle`].
     pub(super) fn shift(&self) -> ShiftMode {
         match self.args.shift {
             AnyShiftArg::Refit => ShiftMode::Refit(self.refit.expect("read with the bundle")),
@@ -308,32 +275,33 @@ impl Predictor {
         }
     }
 
-    /// Predicted imprints (metres, raw orientation) of the fingers that have a GelSlim image.
-    pub(super) fn imprints(&mut self, sample: &Sample) -> anyhow::Result<[Option<DepthMap>; 2]> {
-        let shift = self.shift();
+    /// The way to metres that a bundle offers for a reading, or why it offers none.
+    pub(super) fn chain(&mut self, mode: ShiftMode) -> anyhow::Result<DepthChain> {
+        let bundle = self.bundle()?.clone();
+        let chains = self.models.chains(&bundle)?;
+        Ok(chain_of(&chains, &bundle.id, mode)?)
+    }
+
+    /// Predicted imprints (metres, raw orientation) of the fingers that have a GelSlim image, as large as the bubble
+    /// images.
+    pub(super) fn imprints(&mut self, sample: &Sample, cx: &JobCx) -> anyhow::Result<[Option<DepthMap>; 2]> {
         let gelslim = |finger| sample.finger(finger).and_then(|t| t.gelslim.as_ref());
         let fingers: Vec<Finger> = Finger::BOTH.into_iter().filter(|finger| gelslim(*finger).is_some()).collect();
         let differences: Vec<&RgbGrid> = fingers.iter().filter_map(|f| Some(&gelslim(*f)?.difference)).collect();
-        let made = self.predict(&differences)?;
+        let made = self.predict(&differences, cx)?;
         let mut out = [None, None];
         for (finger, made) in fingers.into_iter().zip(made) {
-            out[finger.index()] = Some(self.generator()?.depth(&made.raw, shift)?);
+            out[finger.index()] = Some(imprint_of(&made, self.shift(), sample, finger)?);
         }
         Ok(out)
     }
 
-    /// Loads the mask model, if it is not there yet.
-    pub(super) fn load_mask_model(&mut self) -> anyhow::Result<&mut MaskModel> {
-        if self.mask_model.is_none() {
-            let named = self.args.mask_bundle.as_ref();
-            let bundle = find_bundle(named, "mask model", |b| b.mask_unet().is_some())?;
-            self.mask_model = Some(MaskModel::open(&bundle, self.choice())?);
-        }
-        Ok(self.mask_model.as_mut().expect("it was just loaded"))
-    }
-
     /// The mask model's contact mask of an imprint.
     pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<Mask> {
-        Ok(self.load_mask_model()?.predict(imprint)?)
+        if self.mask_model.is_none() {
+            self.mask_model = Some(self.take(BundleKind::Mask, self.args.mask_bundle.clone())?);
+        }
+        let bundle = self.mask_model.clone().expect("it was just found");
+        Ok(self.models.mask(&bundle, self.engine(), imprint)?)
     }
 }

@@ -1,20 +1,23 @@
 //! Several seeds of one touch: what `generate --seeds` and `pose --seeds` share.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 use serde::Serialize;
 
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::Predictor;
-use crate::domain::ensemble::{AngleFan, Spread, channel_spread, seeds};
-use crate::domain::grid::{DepthMap, RgbGrid};
+use crate::domain::ensemble::{AngleFan, Spread, seeds};
+use crate::domain::grid::DepthMap;
 use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
 use crate::io::{images, npz};
+use crate::work::ensemble::{Ensemble, ensemble};
+use crate::work::imprint::imprint_of;
+use crate::work::models::Prediction;
 
 /// How many seeds.
 #[derive(Debug, Clone, Copy, Args)]
@@ -36,7 +39,7 @@ pub(super) struct FanArgs {
 /// The predictions of one finger.
 pub(super) struct FingerSeeds {
     /// Metres, one per seed.
-    pub imprints: Vec<DepthMap>,
+    pub imprints: Vec<Arc<DepthMap>>,
     /// Around their mean.
     pub spread: Spread,
     /// Mean over the seeds of the spread of the decoder's channels, metres; `None` with a single channel.
@@ -44,19 +47,21 @@ pub(super) struct FingerSeeds {
 }
 
 /// Predicts one touch with every seed, in one batch.
-pub(super) fn predict(predictor: &mut Predictor, difference: &RgbGrid, count: u16) -> anyhow::Result<FingerSeeds> {
-    let config = predictor.config()?;
+pub(super) fn predict(
+    predictor: &mut Predictor,
+    sample: &Sample,
+    finger: Finger,
+    count: u16,
+) -> anyhow::Result<FingerSeeds> {
+    let gelslim = sample.finger(finger).and_then(|t| t.gelslim.as_ref());
+    let difference = &gelslim.ok_or_else(|| anyhow::anyhow!("no GelSlim image"))?.difference;
+    let list = seeds(predictor.config()?.seed, count.into());
+    let made: Vec<Arc<Prediction>> = predictor.predict_seeds(difference, &list)?.into_iter().map(Arc::new).collect();
     let shift = predictor.shift();
-    let generator = predictor.generator()?;
-    let list = seeds(config.seed, count.into());
-    let raw = generator.generate_seeds(difference, &list, &config, &mut |_| ControlFlow::Continue(()))?;
-    let chain = generator.spec().depth_chain(shift)?;
-    let imprints = raw.iter().map(|raw| chain.run(raw)).collect::<Result<Vec<_>, _>>()?;
-    let apart = raw.iter().map(|raw| channel_spread(raw, &chain)).collect::<Result<Option<Vec<_>>, _>>()?;
-    let mean = |maps: Vec<DepthMap>| Spread::of(&maps.iter().collect::<Vec<_>>()).map(|s| s.mean);
-    let spread = Spread::of(&imprints.iter().collect::<Vec<_>>());
-    let spread = spread.ok_or_else(|| anyhow::anyhow!("the generator gave no prediction"))?;
-    Ok(FingerSeeds { imprints, spread, channels: apart.and_then(mean) })
+    let imprint = |made: &Arc<Prediction>| imprint_of(made, shift, sample, finger).map(Arc::new);
+    let imprints = made.iter().map(imprint).collect::<Result<Vec<_>, _>>()?;
+    let Ensemble { spread, channels } = ensemble(&made, &imprints, shift)?;
+    Ok(FingerSeeds { imprints, spread, channels })
 }
 
 /// Figures of the seeds of one touch.
@@ -155,8 +160,8 @@ pub(super) fn fan(
 ) -> anyhow::Result<PoseFan> {
     let mut fingers: [Option<FingerSeeds>; 2] = [None, None];
     for finger in Finger::BOTH {
-        if let Some(gelslim) = sample.finger(finger).and_then(|t| t.gelslim.as_ref()) {
-            fingers[finger.index()] = Some(predict(predictor, &gelslim.difference, count)?);
+        if sample.finger(finger).is_some_and(|t| t.gelslim.is_some()) {
+            fingers[finger.index()] = Some(predict(predictor, sample, finger, count)?);
         }
     }
     let source = match args.mask {
@@ -178,7 +183,7 @@ pub(super) fn fan(
     };
     let mut angles = Vec::new();
     for i in 0..usize::from(count) {
-        angles.push(angle(fingers.each_ref().map(|f| Some(&f.as_ref()?.imprints[i])))?);
+        angles.push(angle(fingers.each_ref().map(|f| Some(&*f.as_ref()?.imprints[i])))?);
     }
     let of_mean = angle(fingers.each_ref().map(|f| Some(&f.as_ref()?.spread.mean)))?;
     let fan = AngleFan::of(&angles.iter().flatten().copied().collect::<Vec<_>>());

@@ -9,14 +9,14 @@ use serde::Serialize;
 use super::generate::FingerArg;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::app::error::TaskError;
-use crate::app::jobs::{Cancel, JobCx, statistics};
 use crate::domain::dataset::PairId;
 use crate::domain::postprocess::ShiftMode;
-use crate::domain::sample::Scale;
 use crate::domain::units::{fixed, mm};
-use crate::io::masks::now_unix_s;
-use crate::io::statistics::{Provenance, ShiftStatistics, utc_text};
+use crate::io::statistics::ShiftStatistics;
+use crate::work::error::TaskError;
+use crate::work::job::{Cancel, JobCx};
+use crate::work::models::Wanted;
+use crate::work::statistics::{StatisticsSetup, statistics};
 
 /// Arguments of `stats`.
 #[derive(Debug, Args)]
@@ -56,49 +56,28 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
         super::spread(dataset.index.pairs.len(), args.limit).into_iter().map(|i| PairId(i as u32)).collect();
     let output = Arc::new(Output::new(args.common, "predicting", ids.len()));
     let mut predictor = Predictor::new(&args.model);
-    let config = predictor.config()?;
-    let chain = predictor.generator()?.spec().depth_chain(ShiftMode::Raw)?;
-    let engine = predictor.generator()?.engine().label();
-    let scale = std::cell::Cell::new(Scale::Measured);
+    let setup = StatisticsSetup {
+        pairs: ids,
+        fingers: args.finger.fingers().to_vec(),
+        config: predictor.config()?,
+        bundle: predictor.bundle()?.clone(),
+        dataset: dataset.title.clone(),
+    };
+    let chain = predictor.chain(ShiftMode::Raw)?;
     let bar = output.clone();
     let cx = JobCx::new(Cancel::default(), Arc::new(move |p| bar.set(p.done as usize, p.total as usize)));
-    let pass = statistics::pass(
-        &ids,
-        args.finger.fingers(),
-        |id| {
-            let sample = dataset.load(id).map_err(|err| TaskError::from_error("Load", &err))?;
-            scale.set(sample.scale);
-            Ok(Arc::new(sample))
-        },
-        |id, finger, difference| {
-            let name = &dataset.index.pairs[id.0 as usize].name;
-            let what = format!("{name} {}", finger.name());
-            let raw = predictor.predict_one(difference).map_err(|err| TaskError::new(&what, err))?;
-            Ok((raw, chain.clone()))
-        },
-        &cx,
-    )
-    .map_err(|err| anyhow::anyhow!("{err}"))?;
+    let load = |id| dataset.load(id).map(Arc::new).map_err(|err| TaskError::from_error("Load", &err));
+    let predict = |wanted: Wanted<'_>, _: &JobCx| {
+        predictor.predict_one(wanted.difference).map_err(|err| TaskError::new("Predict", err))
+    };
+    let (statistics, failed) = statistics(&setup, load, predict, &cx)?;
     drop(cx);
-    for failure in &pass.failed {
+    for failure in &failed {
         output.note(&failure.to_string());
     }
-    let provenance = Provenance {
-        bundle: predictor.bundle_name().to_owned(),
-        bundle_hash: predictor.bundle_hash().to_owned(),
-        dataset: dataset.title.clone(),
-        seed: config.seed,
-        steps: config.steps,
-        sampler: config.sampler.key().into(),
-        eta: config.eta,
-        engine: engine.into(),
-        scale: super::scale_name(scale.get()).into(),
-        made: utc_text(now_unix_s()),
-    };
-    let statistics = ShiftStatistics::new(provenance, &pass.fit).expect("a pass without a pixel is an error");
     statistics.write(&args.out)?;
     let [gain, offset_m] = statistics.stats.affine(chain.range.max_m);
-    let failed: Vec<String> = pass.failed.iter().map(ToString::to_string).collect();
+    let failed: Vec<String> = failed.iter().map(ToString::to_string).collect();
     let complete = failed.is_empty();
     let report = Report { file: args.out.display().to_string(), failed, gain, offset_m, statistics };
     let output = Arc::into_inner(output).expect("the job that shared it is over");

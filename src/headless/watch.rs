@@ -6,8 +6,6 @@ mod summary;
 mod write;
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
 use async_signal::{Signal, Signals};
@@ -23,6 +21,7 @@ use crate::domain::dataset::{PairId, Problem};
 use crate::domain::sample::BubbleCamera;
 use crate::io::dataset::{Dataset, cameras_of};
 use crate::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
+use crate::work::job::Cancel;
 use one::{Done, Worker};
 use summary::Summary;
 use write::Save;
@@ -96,7 +95,7 @@ impl Source {
 
 pub(super) fn run(args: &WatchArgs) -> VerbResult {
     let output = Output::new(args.common, "watching", 0);
-    let stop = Arc::new(AtomicBool::new(false));
+    let stop = Cancel::default();
     take_signals(stop.clone())?;
     if matches!(args.mask.mask, MaskFrom::Cad | MaskFrom::Truth) {
         anyhow::bail!("--mask {} needs the true pose, which a new touch does not have", args.mask.mask.key());
@@ -125,7 +124,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
 
     let mut summary = Summary::default();
     let mut unreadable = None;
-    while !stop.load(Ordering::Relaxed) {
+    while !stop.is_cancelled() {
         let Some(ready) = follower.poll(Instant::now()) else {
             let why = follower.unreadable().map(str::to_owned);
             if why != unreadable {
@@ -153,15 +152,16 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
 }
 
 /// From now on Ctrl-C sets `stop` instead of ending the program in the middle of a touch; a second one ends it.
-fn take_signals(stop: Arc<AtomicBool>) -> anyhow::Result<()> {
+fn take_signals(stop: Cancel) -> anyhow::Result<()> {
     let wanted: &[Signal] = if cfg!(unix) { &[Signal::Int, Signal::Term] } else { &[Signal::Int] };
     let signals =
         Signals::new(wanted).map_err(|err| anyhow::anyhow!("cannot take care of Ctrl-C and its kind: {err}"))?;
     std::thread::Builder::new().name("signals".into()).spawn(move || {
         for _ in futures_lite::stream::block_on(signals) {
-            if stop.swap(true, Ordering::Relaxed) {
+            if stop.is_cancelled() {
                 std::process::exit(130);
             }
+            stop.cancel();
         }
     })?;
     Ok(())

@@ -39,7 +39,9 @@ impl EngineKind {
 }
 
 /// The user's choice of engine.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, strum::EnumIter,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum EngineChoice {
     /// ONNX Runtime if its library is found, else rten.
@@ -49,6 +51,17 @@ pub enum EngineChoice {
     Rten,
     /// ONNX Runtime, or an error.
     Ort,
+}
+
+impl EngineChoice {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "Automatic",
+            Self::Rten => "rten",
+            Self::Ort => "ONNX Runtime",
+        }
+    }
 }
 
 /// Why there is no engine or no graph.

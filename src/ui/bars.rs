@@ -214,7 +214,7 @@ fn engine(cx: &Cx<'_>, ui: &mut Ui) {
     }
     let made = cx.state.chosen(cx.state.selection.finger).and_then(|r| cx.state.results.predictions.get(r));
     let text = match made {
-        Some(prediction) => prediction.output.runtime.clone(),
+        Some(prediction) => prediction.engine.clone(),
         None => cx.state.settings.runtime.name().to_owned(),
     };
     ui.label(caption(text, cx.p)).on_hover_text("The runtime that runs the models");

@@ -8,11 +8,11 @@ use super::theme::{SMALL, caption, section, value};
 use super::widget::progress;
 use crate::app::action::Action;
 use crate::app::command::Command;
-use crate::app::keys::{Preset, Recipe, Sampler, ShiftMode};
-use crate::app::library::{BundleInfo, BundleKind};
+use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::domain::diffusion::GUIDANCE;
 use crate::domain::sensor::Finger;
+use crate::work::bundles::{BundleInfo, BundleKind};
 
 /// Width of the captions at the left.
 const LABEL: f32 = 60.0;
@@ -261,7 +261,7 @@ fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
     let finger = cx.state.selection.finger;
     let Some(touch) = cx.state.touch_key(finger) else { return };
-    let made: Vec<Recipe> = cx.state.results.made.get(&touch).cloned().unwrap_or_default();
+    let made: Vec<PredictionKey> = cx.state.results.made.get(&touch).cloned().unwrap_or_default();
     ui.label(section(&format!("Results, {} finger", finger.name()), cx.p));
     if made.is_empty() {
         ui.label(caption("None yet for this touch.", cx.p));
@@ -279,13 +279,13 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             .and_then(|c| c.psnr_db)
             .map_or(String::new(), |v| format!("{v:.1} dB"));
         let made = cx.state.results.predictions.get(recipe);
-        let seconds = made.map_or(String::new(), |p| match p.output.kept {
-            Some(_) => "kept".to_owned(),
-            None => format!("{:.1} s", p.seconds),
+        let seconds = made.map_or(String::new(), |p| match p.kept {
+            true => "kept".to_owned(),
+            false => format!("{:.1} s", p.seconds),
         });
-        let took = made.map_or(String::new(), |p| match p.output.kept {
-            Some(seconds) => format!("Made earlier in {seconds:.1} s and kept on the disk"),
-            None => format!("Made in {:.2} s", p.seconds),
+        let took = made.map_or(String::new(), |p| match p.kept {
+            true => format!("Made earlier in {:.1} s and kept on the disk", p.seconds),
+            false => format!("Made in {:.2} s", p.seconds),
         });
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
@@ -317,11 +317,11 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// Shows a prediction, and that of the other finger made with the same settings, if there is one.
-fn choose(cx: &mut Cx<'_>, recipe: &Recipe) {
+fn choose(cx: &mut Cx<'_>, recipe: &PredictionKey) {
     cx.push(Command::Choose(recipe.clone()));
     for finger in Finger::BOTH {
         let Some(touch) = cx.state.touch_key(finger) else { continue };
-        let other = Recipe { touch, ..recipe.clone() };
+        let other = PredictionKey { touch, ..recipe.clone() };
         if other != *recipe && cx.state.results.predictions.contains(&other) {
             cx.push(Command::Choose(other));
         }

@@ -11,7 +11,6 @@ use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary,
 use super::widget::texture::{Histogram, depth_image, difference_gain, mask_image, outline, rgb_image};
 use super::widget::{brush_cursor, empty};
 use crate::app::command::{Command, Hover, Pane};
-use crate::app::error::TaskError;
 use crate::app::keys::{ImprintSource, MaskVersion, ShiftMode};
 use crate::app::results::Preview;
 use crate::app::settings::{ColourMap, ColourRange, MaskTool};
@@ -22,6 +21,7 @@ use crate::domain::sample::Scale;
 use crate::domain::sensor::{Finger, gelslim_footprint_in_bubble};
 use crate::domain::units;
 use crate::domain::upright::Turn;
+use crate::work::error::TaskError;
 
 /// The colours of the mask and of contact points, everywhere: apart from every colour of the maps.
 pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
@@ -424,7 +424,7 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger, preview: &Arc<Pre
     let label = format!("{} {}, preview", super::pane::title(pane), finger.name());
     let canvas = ImageCanvas {
         label: &label,
-        size: preview.depth.size(),
+        size: preview.picture.depth.size(),
         rotated: false,
         primary: Primary::Pan,
         background: cx.p.canvas,
@@ -433,9 +433,9 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger, preview: &Arc<Pre
     cx.local.bubble_view = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let (map, range) = (map_of(cx.state), range_of(cx.state));
-    let key = (&preview.recipe, preview.step, map, range.lo.to_bits(), range.hi.to_bits());
+    let key = (&preview.recipe, preview.picture.step, map, range.lo.to_bits(), range.hi.to_bits());
     let picture = cx.local.textures.get(ui.ctx(), (pane, finger), key, squares, || {
-        (depth_image(&preview.depth, map, range), Histogram::of(preview.depth.as_slice()))
+        (depth_image(&preview.picture.depth, map, range), Histogram::of(preview.picture.depth.as_slice()))
     });
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
     output.paint(texture, Color32::WHITE);
@@ -443,11 +443,11 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger, preview: &Arc<Pre
         output.dashed_rect(gelslim_footprint_in_bubble(finger), Color32::from_gray(235));
     }
     if let Some(px) = output.hovered {
-        readout(cx, &output, pane, finger, &preview.depth, px);
+        readout(cx, &output, pane, finger, &preview.picture.depth, px);
         hover(cx, finger, px);
     }
     output.caption(Align2::LEFT_TOP, &finger_text(cx.state, finger), cx.p.strong_on_image());
-    let text = format!("preview, step {} of {}", preview.step, preview.of);
+    let text = format!("preview, step {} of {}", preview.picture.step, preview.picture.of);
     output.caption(Align2::RIGHT_TOP, &text, super::theme::DARK.caution);
     histogram
 }

@@ -12,7 +12,6 @@ use super::theme::{SMALL, caption, section};
 use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
-use crate::app::results::LayerResult;
 use crate::app::state::Lookup;
 use crate::app::workbench::{Layer, WorkbenchCommand};
 use crate::domain::align::Observability;
@@ -20,6 +19,7 @@ use crate::domain::align::reason::Reason;
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::sensor::Finger;
 use crate::domain::units;
+use crate::work::layers::LayerResult;
 
 /// The colours of residuals: perceptually uniform, and told apart by colour-blind eyes.
 pub(super) const RESIDUAL_MAP: ColorMap = ColorMap::Viridis;

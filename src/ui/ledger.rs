@@ -17,12 +17,12 @@ use super::widget::texture::depth_image;
 use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::keys::{ImprintSource, ShiftMode, shift_tooltip};
-use crate::app::results::LedgerResult;
 use crate::app::state::Lookup;
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::postprocess::{ChainReading, Flag, Severity, Stage, StageRecord};
 use crate::domain::sensor::Finger;
 use crate::domain::units::{fixed, mm};
+use crate::work::ledger::LedgerResult;
 
 /// From this width on the stages stand beside the plots.
 const WIDE: f32 = 620.0;

@@ -11,13 +11,13 @@ use super::theme::{SMALL, caption, section, value};
 use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::keys::{ImprintSource, PoseEngine};
-use crate::app::results::Comparison;
 use crate::app::state::{Absent, Lookup};
 use crate::domain::hand::{HandPose, PoseDifference};
 use crate::domain::postprocess::{Severity, Stage, Stats};
 use crate::domain::sample::Scale;
 use crate::domain::sensor::Finger;
 use crate::domain::units;
+use crate::work::compare::Comparison;
 use strum::IntoEnumIterator as _;
 
 /// The pane.

@@ -17,13 +17,13 @@ use super::scene_view::SceneOutput;
 use super::widget::empty;
 use crate::app::command::{CameraPreset, Command, Hover};
 use crate::app::keys::ImprintSource;
-use crate::app::results::Clouds;
 use crate::app::state::Lookup;
 use crate::app::workbench::WorkbenchCommand;
 use crate::domain::sensor::Finger;
 use crate::domain::units;
 use crate::gpu::pick::nearest_point;
 use crate::gpu::view::{Camera, Preset};
+use crate::work::cloud::Clouds;
 
 pub(super) use gizmo::Gizmo;
 pub(super) use layers::LayerColors;

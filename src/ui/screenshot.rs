@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use eframe::egui::ColorImage;
 
 use crate::app::command::Command;
-use crate::app::error::TaskError;
+use crate::work::error::TaskError;
 
 /// Writes `image` as a PNG into `folder` (or the working directory), and reports where, or why not.
 pub(super) fn save(folder: Option<&Path>, image: &ColorImage) -> Command {

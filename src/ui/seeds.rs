@@ -11,14 +11,15 @@ use super::widget::colorbar::gradient;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
 use crate::app::command::Command;
-use crate::app::keys::{EnsembleKey, ImprintSource, Recipe};
-use crate::app::results::{Ensemble, PoseResult};
+use crate::app::keys::{EnsembleKey, ImprintSource, PredictionKey};
 use crate::app::seeds::{COUNT, SeedsCommand};
 use crate::app::state::Lookup;
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::ensemble::{AngleFan, Dial};
 use crate::domain::grid::DepthMap;
 use crate::domain::units;
+use crate::work::ensemble::Ensemble;
+use crate::work::pose::PoseResult;
 
 /// Between pictures, points.
 const GAP: f32 = 4.0;
@@ -55,7 +56,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
 }
 
-fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[Recipe]) {
+fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey]) {
     let seeds = cx.state.seeds;
     let there = recipes.iter().filter(|r| cx.state.results.predictions.contains(r)).count();
     ui.horizontal(|ui| {
@@ -82,7 +83,7 @@ fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[Recipe]) {
 }
 
 /// The predictions, in the order of their seeds; a click shows one in the other panes.
-fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[Recipe], poses: &[Option<&PoseResult>]) {
+fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], poses: &[Option<&PoseResult>]) {
     let state = cx.state;
     let width = ui.available_width();
     let columns = if width < 420.0 { 4 } else { 8 }.min(recipes.len().max(1));
@@ -153,7 +154,7 @@ fn shade(painter: &Painter, rect: Rect, corner: Align2, text: &str) {
 }
 
 /// Mean, spread of the seeds, spread of the decoder's channels.
-fn maps(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[Recipe], ensemble: &Ensemble) {
+fn maps(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], ensemble: &Ensemble) {
     let width = ui.available_width();
     let size = cell(width, 3);
     let (area, _) = ui.allocate_exact_size(vec2(width, 16.0 + size.y + BAR), Sense::hover());

@@ -7,7 +7,8 @@ use super::cx::Cx;
 use super::theme::{caption, section};
 use crate::app::action::Action;
 use crate::app::command::Command;
-use crate::app::settings::{ColourMap, MAX_CACHE_MIB, RuntimeChoice, Theme};
+use crate::app::settings::{ColourMap, MAX_CACHE_MIB, Theme};
+use crate::infer::engine::EngineChoice;
 
 /// The pane.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -65,7 +66,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.label(RichText::new("Runtime").color(cx.p.weak));
         let combo = egui::ComboBox::from_id_salt("runtime").selected_text(settings.runtime.name());
         let response = combo.show_ui(ui, |ui| {
-            for runtime in RuntimeChoice::iter() {
+            for runtime in EngineChoice::iter() {
                 if ui.selectable_label(runtime == settings.runtime, runtime.name()).clicked() {
                     cx.out.push(Command::SetRuntime(runtime));
                 }

@@ -7,14 +7,11 @@ use std::sync::{Arc, Mutex};
 
 use touch2touch::app::command::{Command, Opened};
 use touch2touch::app::document::{PairLabels, Review};
-use touch2touch::app::error::TaskError;
-use touch2touch::app::jobs::JobCx;
-use touch2touch::app::keys::{Recipe, ShiftMode, TouchKey};
-use touch2touch::app::library::{BundleInfo, BundleKind, GeneratorInfo, Place};
-use touch2touch::app::results::Prediction;
+use touch2touch::app::keys::{PredictionKey, ShiftMode, TouchKey};
+use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
-use touch2touch::app::services::{DataSource, GenerateItem, Generated, Services};
-use touch2touch::app::settings::{RuntimeChoice, Settings};
+use touch2touch::app::services::{DataSource, Services};
+use touch2touch::app::settings::Settings;
 use touch2touch::app::state::State;
 use touch2touch::app::tasks::Level;
 use touch2touch::domain::dataset::{Index, PairEntry, PairId, Problem, Split};
@@ -25,6 +22,11 @@ use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPredi
 use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
 use touch2touch::domain::sim;
+use touch2touch::infer::engine::EngineChoice;
+use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
+use touch2touch::work::error::TaskError;
+use touch2touch::work::job::JobCx;
+use touch2touch::work::models::{Prediction, Wanted};
 
 /// `[width, height]` of the imprints of [`Source`].
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];
@@ -182,7 +184,7 @@ pub(crate) struct Double {
     /// Times the disk was looked through.
     pub(crate) looked_up: AtomicU64,
     /// What lies on the disk.
-    pub(crate) kept: Mutex<Vec<Prediction>>,
+    pub(crate) kept: Mutex<Vec<(PredictionKey, Prediction)>>,
     bundles: bool,
 }
 
@@ -248,21 +250,34 @@ impl Services for Double {
         }
     }
 
-    fn generate(&self, _: &BundleInfo, items: &[GenerateItem<'_>], cx: &JobCx) -> Result<Vec<Generated>, TaskError> {
+    fn predict(
+        &self,
+        bundle: &BundleInfo,
+        _: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[Wanted<'_>],
+        cx: &JobCx,
+    ) -> Result<Vec<Prediction>, TaskError> {
         self.batches.fetch_add(1, Ordering::Relaxed);
-        items.iter().map(|item| self.generate_one(&item.recipe, item.difference, cx)).collect()
+        wanted.iter().map(|item| self.predict_one(bundle, config, item, cx)).collect()
     }
 
-    fn stored(&self, _: &[BundleInfo], _: RuntimeChoice, touch: TouchKey, _: &RgbGrid) -> Vec<Prediction> {
+    fn stored(
+        &self,
+        _: &[BundleInfo],
+        _: EngineChoice,
+        touch: TouchKey,
+        _: &RgbGrid,
+    ) -> Vec<(PredictionKey, Prediction)> {
         self.looked_up.fetch_add(1, Ordering::Relaxed);
         let kept = self.kept.lock().unwrap();
         kept.iter()
-            .filter(|p| p.recipe.touch.pair.pair == touch.pair.pair && p.recipe.touch.finger == touch.finger)
-            .map(|p| Prediction { recipe: Recipe { touch, ..p.recipe.clone() }, ..p.clone() })
+            .filter(|(key, _)| key.touch.pair.pair == touch.pair.pair && key.touch.finger == touch.finger)
+            .map(|(key, prediction)| (PredictionKey { touch, ..key.clone() }, prediction.clone()))
             .collect()
     }
 
-    fn mask_by_model(&self, _: &BundleInfo, _: RuntimeChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
+    fn mask_by_model(&self, _: &BundleInfo, _: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
         Ok(imprint.map(|v| *v > 0.006))
     }
 
@@ -277,22 +292,28 @@ impl Services for Double {
 }
 
 impl Double {
-    fn generate_one(&self, recipe: &Recipe, difference: &RgbGrid, cx: &JobCx) -> Result<Generated, TaskError> {
+    fn predict_one(
+        &self,
+        bundle: &BundleInfo,
+        config: &GenerateConfig,
+        item: &Wanted<'_>,
+        cx: &JobCx,
+    ) -> Result<Prediction, TaskError> {
         self.generated.fetch_add(1, Ordering::Relaxed);
         assert!(!self.panics.load(Ordering::Relaxed), "the model fell over");
-        for step in 0..u64::from(recipe.steps) {
-            cx.progress(step, recipe.steps.into(), "step");
+        for step in 0..u64::from(config.steps) {
+            cx.progress(step, config.steps.into(), "step");
             if step == self.cancel_at.load(Ordering::Relaxed) {
                 cx.cancel.cancel();
             }
             cx.check("Generate")?;
         }
         // Depends on the condition and on the seed, as a real one does.
-        let condition = difference.as_slice().iter().map(|p| p[2]).sum::<f32>() / difference.len() as f32;
+        let condition = item.difference.as_slice().iter().map(|p| p[2]).sum::<f32>() / item.difference.len() as f32;
         let [w, h] = IMPRINT_SIZE;
         let raw = RawPrediction {
             channels: vec![Grid::from_fn(w, h, |x, y| {
-                (((x * y) as f32 + recipe.seed as f32).sin() * 0.5 + 0.1 * condition).clamp(-1.0, 1.0)
+                (((x * y) as f32 + item.seed as f32).sin() * 0.5 + 0.1 * condition).clamp(-1.0, 1.0)
             })],
         };
         let chain = DepthChain {
@@ -306,7 +327,8 @@ impl Double {
         };
         let chains = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse]
             .map(|mode| (mode, chain.clone().with_mode(mode, None).map_err(|err| err.to_string())));
-        Ok(Generated { raw, chains: chains.into(), runtime: "double".into(), kept: None })
+        let (chains, bundle) = (Arc::new(chains.into()), bundle.id.clone());
+        Ok(Prediction { raw, chains, bundle, engine: "double".into(), seconds: 0.0, kept: false })
     }
 }
 

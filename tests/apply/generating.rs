@@ -5,10 +5,9 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 use touch2touch::app::command::{Command, Pane};
-use touch2touch::app::jobs::{Cancel, JobCx, Lane};
-use touch2touch::app::keys::{ImprintSource, Preset, Recipe, Sampler, Spacing};
-use touch2touch::app::library::{BundleInfo, BundleKind, GeneratorInfo};
-use touch2touch::app::results::{Prediction, Preview};
+use touch2touch::app::jobs::Lane;
+use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
+use touch2touch::app::results::Preview;
 use touch2touch::app::settings::GenerateSettings;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::DepthMap;
@@ -16,11 +15,14 @@ use touch2touch::domain::sensor::Finger;
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
+use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
+use touch2touch::work::job::{Cancel, JobCx};
+use touch2touch::work::models::Prediction;
 
 const RIGHT: Finger = Finger::Right;
 const LEFT: Finger = Finger::Left;
 
-fn preview(recipe: &Recipe, step: u32) -> Arc<Preview> {
+fn preview(recipe: &PredictionKey, step: u32) -> Arc<Preview> {
     Arc::new(Preview { recipe: recipe.clone(), step, of: recipe.steps, depth: DepthMap::filled(4, 3, 0.001) })
 }
 
@@ -39,7 +41,7 @@ fn a_finger_that_nobody_looks_at_is_not_generated() {
     bench.send(panes(&[Pane::Predicted, Pane::ScenePredicted]));
     bench.settle();
     let (right, left) = (bench.state.chosen(RIGHT).unwrap().clone(), bench.state.chosen(LEFT).unwrap().clone());
-    assert_eq!(Recipe { touch: left.touch, ..right }, left);
+    assert_eq!(PredictionKey { touch: left.touch, ..right }, left);
     assert_eq!(bench.services.generated(), 2);
     assert!(bench.state.cloud(ImprintSource::Predicted).ready().unwrap().finger(LEFT).is_some());
     // Both on screen are made together, in one call.
@@ -128,9 +130,9 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     let first = bench.state.chosen(RIGHT).unwrap().clone();
     bench.send(Command::GenerateNewSeed);
     bench.settle();
-    let made: Vec<Prediction> = bench.state.results.made[&first.touch]
+    let made: Vec<(PredictionKey, Prediction)> = bench.state.results.made[&first.touch]
         .iter()
-        .map(|r| (**bench.state.results.predictions.get(r).unwrap()).clone())
+        .map(|r| (r.clone(), (**bench.state.results.predictions.get(r).unwrap()).clone()))
         .collect();
     assert_eq!(made.len(), 2);
 

@@ -6,13 +6,10 @@ use std::sync::{Arc, Condvar, Mutex};
 
 use egui_kittest::Harness;
 use touch2touch::app::command::{Command, Opened};
-use touch2touch::app::error::TaskError;
-use touch2touch::app::jobs::{JobCx, compute};
-use touch2touch::app::library::{BundleInfo, BundleKind, GeneratorInfo, Place};
-use touch2touch::app::results::Preview;
+use touch2touch::app::library::Place;
+use touch2touch::app::services::Services;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::app::services::{GenerateItem, Generated, Services};
-use touch2touch::app::settings::{RuntimeChoice, Settings};
+use touch2touch::app::settings::Settings;
 use touch2touch::app::state::State;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
@@ -22,9 +19,15 @@ use touch2touch::domain::postprocess::{
 use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::sensor::bubble;
 use touch2touch::domain::sim;
+use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::ui::{Options, StudioApp};
+use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
+use touch2touch::work::error::TaskError;
+use touch2touch::work::imprint::in_metres;
+use touch2touch::work::job::{JobCx, PreviewPicture};
+use touch2touch::work::models::{Prediction, Wanted};
 
 /// The program's services with a generator that answers at once.
 struct QuickGenerator {
@@ -90,13 +93,15 @@ impl Services for QuickGenerator {
         (vec![info], Vec::new())
     }
 
-    fn generate(
+    fn predict(
         &self,
-        _bundle: &BundleInfo,
-        items: &[GenerateItem<'_>],
+        bundle: &BundleInfo,
+        _engine: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[Wanted<'_>],
         cx: &JobCx,
-    ) -> Result<Vec<Generated>, TaskError> {
-        let steps = items.first().map_or(0, |item| item.recipe.steps);
+    ) -> Result<Vec<Prediction>, TaskError> {
+        let steps = config.steps;
         for step in 0..steps {
             cx.check("Generate")?;
             cx.progress(step.into(), steps.into(), format!("step {} of {steps}", step + 1));
@@ -116,30 +121,27 @@ impl Services for QuickGenerator {
             .map(|mode| (mode, chain.clone().with_mode(mode, Some(stats)).map_err(|e| e.to_string())))
             .collect();
         if let Some(gate) = &self.gate {
-            for item in items {
-                if let Some(shift) = cx.wants_preview(item.recipe.touch, 4) {
-                    let raw = RawPrediction { channels: vec![picture(item.difference, item.recipe.seed)] };
-                    let depth = compute::in_metres(chains[&shift].as_ref().unwrap(), &raw, item.size).unwrap();
-                    cx.preview(Preview { recipe: item.recipe.clone(), step: 4, of: steps, depth });
+            for (at, item) in wanted.iter().enumerate() {
+                if let Some((previews, shift)) = cx.previews().and_then(|p| Some((p, p.wants(at, 4)?))) {
+                    let raw = RawPrediction { channels: vec![picture(item.difference, item.seed)] };
+                    let depth = in_metres(chains[&shift].as_ref().unwrap(), &raw, item.size).unwrap();
+                    previews.show(at, PreviewPicture { step: 4, of: steps, depth });
                 }
             }
             gate.pass();
         }
-        let one = |item: &GenerateItem<'_>| {
+        let chains = Arc::new(chains);
+        let one = |item: &Wanted<'_>| {
             // Three channels around one picture, as three-channel decoders give it.
-            let mean = picture(item.difference, item.recipe.seed);
+            let mean = picture(item.difference, item.seed);
             let raw = RawPrediction { channels: [-0.02, 0.0, 0.02].map(|off| mean.map(|v| v + off)).to_vec() };
-            Generated { raw, chains: chains.clone(), runtime: "double".into(), kept: None }
+            let (chains, bundle) = (chains.clone(), bundle.id.clone());
+            Prediction { raw, chains, bundle, engine: "double".into(), seconds: 0.0, kept: false }
         };
-        Ok(items.iter().map(one).collect())
+        Ok(wanted.iter().map(one).collect())
     }
 
-    fn mask_by_model(
-        &self,
-        bundle: &BundleInfo,
-        runtime: RuntimeChoice,
-        imprint: &DepthMap,
-    ) -> Result<Mask, TaskError> {
+    fn mask_by_model(&self, bundle: &BundleInfo, runtime: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
         self.live.mask_by_model(bundle, runtime, imprint)
     }
 

@@ -6,15 +6,17 @@ use std::sync::Arc;
 use super::super::command::{Command, Computed, Opened};
 use super::super::document::{Document, PairLabels, Stored};
 use super::super::effect::Effect;
-use super::super::error::{TaskError, TaskErrorKind};
-use super::super::keys::{DatasetSeq, ImprintKey, ImprintSource, PairKey, PoseKey, Request, TouchKey};
-use super::super::library::{BundleKind, OpenDataset, Place};
-use super::super::results::Prediction;
+use super::super::jobs::generate::Keyed;
+use super::super::keys::{DatasetSeq, ImprintKey, ImprintSource, PairKey, PoseKey, PredictionKey, Request, TouchKey};
+use super::super::library::{OpenDataset, Place};
 use super::super::state::State;
 use super::super::tasks::{Level, Task, Ticket};
 use super::{cancel_all, follow, inspect, is_selected, masks, preferences, refit, remember, reorder, workbench};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
+use crate::work::bundles::BundleKind;
+use crate::work::error::{TaskError, TaskErrorKind};
+use crate::work::models::Prediction;
 
 pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
     match command {
@@ -63,8 +65,8 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
         }
         Command::Generated(ticket, predictions) => {
             forget(state, ticket);
-            for prediction in predictions {
-                generated(state, prediction);
+            for (key, prediction) in predictions {
+                generated(state, key, prediction);
             }
         }
         // One that comes after its result, or after Cancel, is too late.
@@ -169,15 +171,15 @@ fn store(state: &mut State, request: Request, computed: Computed) {
         }
         (Request::Stored(touch), Computed::Predictions(list)) => stored(state, touch, list),
         (Request::Prediction(_), Computed::Predictions(list)) => {
-            for prediction in list {
-                generated(state, prediction);
+            for (key, prediction) in list {
+                generated(state, key, prediction);
             }
         }
         (Request::Seed(recipe), Computed::Predictions(list)) => {
             let touch = recipe.touch;
             let shown = results.chosen.get(&touch).cloned();
-            for prediction in list {
-                generated(state, prediction);
+            for (key, prediction) in list {
+                generated(state, key, prediction);
             }
             // A seed among several does not push away what is looked at.
             if let Some(shown) = shown.filter(|recipe| state.results.predictions.contains(recipe)) {
@@ -289,13 +291,13 @@ fn forget(state: &mut State, ticket: Ticket) -> Option<Task> {
 }
 
 /// Keeps what was made of a touch before; what fits the settings is shown if nothing is yet, else the last used.
-fn stored(state: &mut State, touch: TouchKey, predictions: Vec<Arc<Prediction>>) {
+fn stored(state: &mut State, touch: TouchKey, predictions: Keyed) {
     state.results.looked_up.insert(touch);
     let shown = state.results.chosen.get(&touch).cloned();
-    let fitting = state.recipe(touch).filter(|recipe| predictions.iter().any(|p| p.recipe == *recipe));
-    for prediction in predictions {
-        if !state.results.predictions.contains(&prediction.recipe) {
-            generated(state, prediction);
+    let fitting = state.recipe(touch).filter(|recipe| predictions.iter().any(|(key, _)| key == recipe));
+    for (key, prediction) in predictions {
+        if !state.results.predictions.contains(&key) {
+            generated(state, key, prediction);
         }
     }
     if let Some(recipe) = shown.or(fitting).filter(|recipe| state.results.predictions.contains(recipe)) {
@@ -303,12 +305,11 @@ fn stored(state: &mut State, touch: TouchKey, predictions: Vec<Arc<Prediction>>)
     }
 }
 
-fn generated(state: &mut State, prediction: Arc<Prediction>) {
-    let recipe = prediction.recipe.clone();
+fn generated(state: &mut State, recipe: PredictionKey, prediction: Arc<Prediction>) {
     if state.library.open.as_ref().map(|open| open.seq) != Some(recipe.touch.pair.dataset) {
         return;
     }
-    let size = prediction.output.raw.channels.iter().map(|c| c.len() * 4).sum();
+    let size = prediction.raw.channels.iter().map(|c| c.len() * 4).sum();
     state.results.predictions.insert(recipe.clone(), prediction, size);
     let made = state.results.made.entry(recipe.touch).or_default();
     made.retain(|r| *r != recipe);

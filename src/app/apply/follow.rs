@@ -1,13 +1,13 @@
 //! Following a folder: what arrives is listed, and the newest is shown and predicted.
 
 use super::super::effect::Effect;
-use super::super::error::TaskError;
 use super::super::keys::Request;
 use super::super::library::Follow;
 use super::super::services::Followed;
 use super::super::state::State;
 use super::super::tasks::Ticket;
 use super::{generate, reorder, select};
+use crate::work::error::TaskError;
 
 /// Starts or stops following the folder that is open.
 pub(super) fn set(state: &mut State, on: bool, effects: &mut Vec<Effect>) {

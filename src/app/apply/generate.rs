@@ -1,12 +1,12 @@
 //! Starting predictions.
 
 use super::super::effect::Effect;
-use super::super::error::TaskError;
-use super::super::keys::Recipe;
-use super::super::library::BundleKind;
+use super::super::keys::PredictionKey;
 use super::super::state::{Absent, State};
 use super::save_settings;
 use crate::domain::sensor::Finger;
+use crate::work::bundles::BundleKind;
+use crate::work::error::TaskError;
 
 /// Starts the predictions of the fingers that are looked at, in one go; one that exists is shown instead.
 pub(super) fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
@@ -43,7 +43,7 @@ fn start(state: &mut State, fingers: &[Finger], effects: &mut Vec<Effect>) {
     let Ok(bundle) = state.bundle(BundleKind::Generator).cloned() else { return };
     let (Some(pair), Some(open)) = (state.pair_key(), &state.library.open) else { return };
     let (source, sample) = (open.source.clone(), state.results.samples.get(&pair).cloned());
-    let mut recipes: Vec<Recipe> = Vec::new();
+    let mut recipes: Vec<PredictionKey> = Vec::new();
     for finger in fingers {
         let Some(recipe) = state.recipe(pair.finger(*finger)) else { continue };
         if state.results.predictions.contains(&recipe) {

@@ -1,9 +1,9 @@
 //! The time machine and the basin map: moving about in what was recorded.
 
-use super::super::error::TaskError;
 use super::super::inspect::{InspectCommand, Pin};
 use super::super::keys::Request;
 use super::super::state::State;
+use crate::work::error::TaskError;
 
 pub(super) fn step(state: &mut State, command: InspectCommand) {
     match command {

@@ -6,7 +6,6 @@ use glam::DVec2;
 
 use super::super::document::{HandMask, Review, Stroke};
 use super::super::effect::Effect;
-use super::super::error::TaskError;
 use super::super::history::{Edit, Gesture};
 use super::super::keys::ImprintSource;
 use super::super::settings::MaskTool;
@@ -16,6 +15,7 @@ use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{self, Patch};
 use crate::domain::sensor::Finger;
+use crate::work::error::TaskError;
 
 /// Whether the selected pair may be edited; says why not.
 pub(super) fn check_editable(state: &mut State, what: &str) -> bool {

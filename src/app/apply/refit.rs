@@ -1,13 +1,13 @@
 //! The refit shift: statistics of the open data set's own predictions.
 
 use super::super::effect::Effect;
-use super::super::error::TaskError;
 use super::super::keys::ShiftMode;
-use super::super::library::BundleKind;
 use super::super::state::State;
 use super::save_settings;
 use crate::domain::sensor::Finger;
 use crate::io::statistics::ShiftStatistics;
+use crate::work::bundles::BundleKind;
+use crate::work::error::TaskError;
 
 /// Name of the job on screen.
 const TITLE: &str = "Shift statistics";

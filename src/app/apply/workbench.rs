@@ -1,13 +1,13 @@
 //! Changing the workbench: layers, poses by hand, measuring.
 
 use super::super::effect::Effect;
-use super::super::error::TaskError;
 use super::super::inspect::InspectCommand;
 use super::super::keys::{ImprintSource, Request, RunKey};
 use super::super::state::State;
 use super::super::workbench::{HandTry, SceneTool, WorkbenchCommand};
 use super::masks;
 use crate::domain::hand::{self, AcceptedPose, HandCost, HandPose};
+use crate::work::error::TaskError;
 
 /// Width of the kernel that costs of poses by hand are counted with, metres: the narrowest of the registration.
 const KERNEL_M: f64 = 1e-3;

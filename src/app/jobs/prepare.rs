@@ -3,15 +3,17 @@
 use std::sync::Arc;
 
 use super::super::command::Computed;
-use super::super::error::TaskError;
 use super::super::inspect::Inspection;
 use super::super::keys::{CloudKey, ImprintKey, MaskRecipe, MaskVersion, PairKey, Request, RunKey, TouchKey};
 use super::super::services::SharedServices;
 use super::super::state::State;
-use super::{JobCx, Lane, compute, generate, inspect, ledger};
+use super::{Lane, generate};
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::footprint_mask;
 use crate::domain::sample::Sample;
+use crate::work::error::TaskError;
+use crate::work::job::JobCx;
+use crate::work::{cloud, compare, ensemble, imprint, layers, ledger, mask, pose, tool};
 
 /// The body of a job.
 pub type Body<T> = Box<dyn FnOnce(&JobCx) -> Result<T, TaskError> + Send>;
@@ -41,7 +43,7 @@ impl Imprint {
     }
 }
 
-fn imprint(state: &State, key: &ImprintKey) -> Option<Imprint> {
+fn imprint_of(state: &State, key: &ImprintKey) -> Option<Imprint> {
     Some(match key {
         ImprintKey::Measured(touch) => Imprint::Measured(state.results.samples.get(&touch.pair)?.clone(), *touch),
         ImprintKey::Predicted(recipe, shift) => {
@@ -88,7 +90,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                         Some(sample) => sample,
                         None => Arc::new(source.load(pair)?),
                     };
-                    Ok(Computed::Depth(Arc::new(compute::thumbnail(&sample))))
+                    Ok(Computed::Depth(Arc::new(imprint::thumbnail(&sample))))
                 }),
             )
         }
@@ -98,7 +100,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             job(
                 Lane::Compute,
                 what,
-                Box::new(move |_| Ok(Computed::Tool(Arc::new(compute::named_tool(&name, source.tool_mesh(&name)?)?)))),
+                Box::new(move |_| Ok(Computed::Tool(Arc::new(tool::named_tool(&name, source.tool_mesh(&name)?)?)))),
             )
         }
         Request::Stored(touch) => {
@@ -113,7 +115,8 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Box::new(move |_| {
                     let gelslim = sample.finger(touch.finger).and_then(|t| t.gelslim.as_ref());
                     let found = gelslim.map(|g| services.stored(&bundles, runtime, touch, &g.difference));
-                    Ok(Computed::Predictions(found.unwrap_or_default().into_iter().map(Arc::new).collect()))
+                    let keyed = found.unwrap_or_default().into_iter().map(|(key, made)| (key, Arc::new(made)));
+                    Ok(Computed::Predictions(keyed.collect()))
                 }),
             )
         }
@@ -125,7 +128,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Models,
                 format!("Generate with {}", bundle.name),
                 Box::new(move |cx| {
-                    let made = generate::generate(&*services, vec![recipe], &bundle, &*source, sample, cx)?;
+                    let made = generate::generate(&*services, vec![recipe], &bundle, &*source, sample, cx, None)?;
                     Ok(Computed::Predictions(made))
                 }),
             )
@@ -139,7 +142,9 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             job(
                 Lane::Compute,
                 "Spread of the seeds".into(),
-                Box::new(move |_| Ok(Computed::Ensemble(Arc::new(compute::ensemble(&predictions, &imprints, shift)?)))),
+                Box::new(move |_| {
+                    Ok(Computed::Ensemble(Arc::new(ensemble::ensemble(&predictions, &imprints, shift)?)))
+                }),
             )
         }
         Request::Imprint(recipe, shift) => {
@@ -152,7 +157,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             job(
                 Lane::Compute,
                 "Prediction in metres".into(),
-                Box::new(move |_| Ok(Computed::Depth(Arc::new(compute::imprint(&prediction, shift, size)?)))),
+                Box::new(move |_| Ok(Computed::Depth(Arc::new(imprint::imprint(&prediction, shift, size)?)))),
             )
         }
         Request::Comparison(recipe, shift) => {
@@ -166,7 +171,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Box::new(move |_| {
                     let measured = measured.get().ok_or_else(gone)?;
                     let seen = footprint_mask(finger, measured.size());
-                    let found = compute::compare_parts(&predicted, measured, sample.scale, &seen)?;
+                    let found = compare::compare_parts(&predicted, measured, sample.scale, &seen)?;
                     Ok(Computed::Comparison(Arc::new(found)))
                 }),
             )
@@ -180,7 +185,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 "Depth chain".into(),
                 Box::new(move |_| {
                     let measured = sample.finger(finger).and_then(|t| t.bubble.as_ref()).map(|b| &b.imprint);
-                    Ok(Computed::Ledger(Arc::new(ledger::of_prediction(&prediction, shift, measured)?)))
+                    Ok(Computed::Ledger(Arc::new(ledger::of_prediction(&prediction, shift, false, measured)?)))
                 }),
             )
         }
@@ -198,7 +203,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             )
         }
         Request::Mask(key) => {
-            let imprint = imprint(state, &key.imprint)?;
+            let imprint = imprint_of(state, &key.imprint)?;
             let touch = key.imprint.touch();
             let sample = results.samples.get(&touch.pair)?.clone();
             if let MaskRecipe::Unet(id) = &key.recipe {
@@ -221,7 +226,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 "Contact mask".into(),
                 Box::new(move |_| {
                     let imprint = imprint.get().ok_or_else(gone)?;
-                    let mask = compute::mask(
+                    let mask = mask::mask(
                         &recipe,
                         imprint,
                         sample.finger(touch.finger),
@@ -242,7 +247,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                     None => None,
                     Some(version) => Some(mask_of(state, imprint_key, version)?),
                 };
-                *slot = Some((imprint(state, imprint_key)?, mask));
+                *slot = Some((imprint_of(state, imprint_key)?, mask));
             }
             let sample = results.samples.get(&pair?)?.clone();
             job(
@@ -252,7 +257,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                     let part = |at: usize| {
                         parts[at].as_ref().and_then(|(imprint, mask)| Some((imprint.get()?, mask.as_deref())))
                     };
-                    Ok(Computed::Cloud(Arc::new(compute::clouds(&sample, [part(0), part(1)])?)))
+                    Ok(Computed::Cloud(Arc::new(cloud::clouds(&sample, [part(0), part(1)])?)))
                 }),
             )
         }
@@ -265,7 +270,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             job(
                 Lane::Compute,
                 "Pose".into(),
-                Box::new(move |_| Ok(Computed::Pose(Arc::new(compute::pose(&clouds, &tool.model, engine, truth)?)))),
+                Box::new(move |_| Ok(Computed::Pose(Arc::new(pose::pose(&clouds, &tool.model, engine, truth)?)))),
             )
         }
         Request::Run(RunKey { pose: key, start }) => {
@@ -278,7 +283,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "Registration, recorded".into(),
                 Box::new(move |_| {
-                    let run = compute::run(&clouds, &tool.model, engine, truth, start, true)?;
+                    let run = pose::run(&clouds, &tool.model, engine, truth, start, true)?;
                     Ok(Computed::Pose(Arc::new(run)))
                 }),
             )
@@ -292,7 +297,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 "Layers of the registration".into(),
                 Box::new(move |_| {
                     let masks = [masks[0].as_deref(), masks[1].as_deref()];
-                    Ok(Computed::Layers(Arc::new(inspect::layers(&clouds, masks, &run)?)))
+                    Ok(Computed::Layers(Arc::new(layers::layers(&clouds, masks, &run)?)))
                 }),
             )
         }
@@ -318,7 +323,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "Basin map".into(),
                 Box::new(move |cx| {
-                    Ok(Computed::Basin(Arc::new(compute::basin(&clouds, &tool.model, engine, plane, cx)?)))
+                    Ok(Computed::Basin(Arc::new(pose::basin(&clouds, &tool.model, engine, plane, cx)?)))
                 }),
             )
         }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 
 use super::super::command::Command;
-use super::super::error::TaskError;
-use super::super::jobs::Cancel;
 use super::super::keys::DatasetSeq;
 use super::super::services::{DataSource, Following};
 use super::lanes::Event;
 use super::{JobId, Runtime, Wake};
 use crate::io::follow::PERIOD;
+use crate::work::error::TaskError;
+use crate::work::job::Cancel;
 
 /// A followed folder.
 pub(super) enum Job {

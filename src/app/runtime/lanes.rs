@@ -9,11 +9,12 @@ use std::thread::JoinHandle;
 use strum::IntoEnumIterator as _;
 
 use super::super::command::Command;
-use super::super::error::TaskError;
+use super::super::jobs::Lane;
 use super::super::jobs::prepare::{Body, RequestJob};
-use super::super::jobs::{Cancel, JobCx, Lane};
 use super::super::keys::Request;
 use super::{JobId, Wake, lock};
+use crate::work::error::TaskError;
+use crate::work::job::{Cancel, JobCx};
 
 /// The end of a job.
 pub(super) struct Event {

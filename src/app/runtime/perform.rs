@@ -4,16 +4,22 @@ use std::sync::Arc;
 
 use super::super::command::{Command, UiRequest};
 use super::super::effect::Effect;
-use super::super::error::TaskError;
 use super::super::evaluation::EvaluateCommand;
-use super::super::jobs::evaluate;
 use super::super::jobs::generate::generate;
 use super::super::jobs::prepare::Body;
-use super::super::jobs::{Cancel, JobCx, Lane, PreviewSink, statistics};
+use super::super::jobs::{Lane, Onlooker, PreviewSink};
 use super::super::results::Preview;
 use super::super::tasks::Ticket;
 use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
+use crate::domain::dataset::PairId;
+use crate::domain::mesh::sampling::spread;
+use crate::domain::sensor::Finger;
+use crate::work::error::TaskError;
+use crate::work::evaluate;
+use crate::work::job::{Cancel, JobCx};
+use crate::work::models::Wanted;
+use crate::work::statistics::{STUDIO_PAIRS, StatisticsSetup, statistics};
 
 impl Runtime {
     pub(super) fn perform(&mut self, effect: Effect, ui: &mut Vec<UiRequest>) {
@@ -49,8 +55,8 @@ impl Runtime {
                         lock(&latest).insert(preview.recipe.touch, (ticket, Arc::new(preview)));
                         wake();
                     });
-                    let cx = cx.clone().with_previews(wish, show);
-                    let made = generate(&*services, recipes, &bundle, &*source, sample, &cx)?;
+                    let onlooker = Some(Onlooker { wish, sink: show });
+                    let made = generate(&*services, recipes, &bundle, &*source, sample, cx, onlooker)?;
                     Ok(Command::Generated(ticket, made))
                 });
                 self.task(Lane::Models, ticket, what, body);
@@ -58,7 +64,20 @@ impl Runtime {
             Effect::Refit { ticket, recipe, bundle, source } => {
                 let services = self.services.clone();
                 let body: Body<Command> = Box::new(move |cx| {
-                    let found = statistics::of_data_set(&*services, &*source, &recipe, &bundle, cx)?;
+                    let pairs = spread(source.index().pairs.len(), STUDIO_PAIRS);
+                    let setup = StatisticsSetup {
+                        pairs: pairs.into_iter().map(|i| PairId(i as u32)).collect(),
+                        fingers: Finger::BOTH.to_vec(),
+                        config: recipe.config(),
+                        dataset: source.title().to_owned(),
+                        bundle,
+                    };
+                    let predict = |wanted: Wanted<'_>, cx: &JobCx| {
+                        let made = services.predict(&setup.bundle, recipe.runtime, &setup.config, &[wanted], cx)?;
+                        made.into_iter().next().ok_or_else(|| TaskError::new("Shift statistics", "no answer"))
+                    };
+                    let load = |pair| source.load(pair).map(Arc::new);
+                    let (found, _) = statistics(&setup, load, predict, cx)?;
                     let saved = services.save_statistics(&found)?;
                     Ok(Command::Refitted(ticket, Box::new(found), saved.map(|file| file.display().to_string())))
                 });

@@ -9,63 +9,56 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::super::command::Opened;
 use super::super::document::{HandMask, PairLabels, Review};
-use super::super::error::TaskError;
-use super::super::jobs::JobCx;
-use super::super::keys::{Revision, TouchKey};
-use super::super::library::{BundleInfo, BundleKind, GeneratorInfo, Place};
-use super::super::results::Prediction;
-use super::super::settings::{RuntimeChoice, SETTINGS_VERSION, Settings};
-use super::{DataSource, Following, GenerateItem, Generated, Services};
+use super::super::keys::{PredictionKey, Revision, TouchKey};
+use super::super::library::Place;
+use super::super::settings::{SETTINGS_VERSION, Settings};
+use super::{DataSource, Following, Services};
 use crate::domain::dataset::{Index, PairId, Problem};
+use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
-use crate::infer::bundle::{self, Bundle, BundleSpec};
 use crate::infer::engine::EngineChoice;
-use crate::infer::generator::Generator;
-use crate::infer::mask::MaskModel;
 use crate::infer::store::{self, Store};
 use crate::io::atomic;
 use crate::io::dataset::Dataset;
 use crate::io::export_unet::{self, ExportConfig, ExportEntry};
 use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
 use crate::io::statistics::ShiftStatistics;
+use crate::work::bundles::{self, BundleInfo};
+use crate::work::error::TaskError;
+use crate::work::job::JobCx;
+use crate::work::models::{KeptPrediction, Models, Prediction, Wanted};
 
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";
 /// Where a settings file that cannot be used is put.
 const BAD_SETTINGS_FILE: &str = "settings.bad.json";
 
-/// A model in memory, with the bundle's identity and the runtime it was loaded for.
-pub(super) type Loaded<T> = Option<((Arc<str>, RuntimeChoice), T)>;
-
 /// The program's services. Models stay loaded between calls.
 #[derive(Debug, Default)]
 pub struct LiveServices {
     config_folder: Option<PathBuf>,
-    /// Predictions kept on the disk.
-    pub(super) store: Option<Mutex<Store>>,
-    pub(super) generator: Mutex<Loaded<Generator>>,
-    mask_model: Mutex<Loaded<MaskModel>>,
+    models: Models,
 }
 
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl LiveServices {
     /// With settings in the user's configuration folder.
     pub fn new() -> Self {
-        let store = store::user_folder().map(|folder| Mutex::new(Store::new(folder, store::DEFAULT_BUDGET)));
-        Self { config_folder: user_config_folder(), store, ..Self::default() }
+        let store = store::user_folder().map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
+        Self { config_folder: user_config_folder(), models: Models::new(store) }
     }
 
     /// With settings and kept predictions in a given folder; `None` keeps none.
     pub fn with_config_folder(folder: Option<PathBuf>) -> Self {
         let kept = folder.as_ref().map(|folder| folder.join("predictions"));
-        let store = kept.map(|folder| Mutex::new(Store::new(folder, store::DEFAULT_BUDGET)));
-        Self { config_folder: folder, store, ..Self::default() }
+        let store = kept.map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
+        Self { config_folder: folder, models: Models::new(store) }
     }
 }
 
@@ -312,56 +305,41 @@ impl Services for LiveServices {
     }
 
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
-        let mut roots = bundle::default_roots();
-        roots.extend_from_slice(folders);
-        let found = bundle::find(&roots);
-        let problems = found
-            .problems
-            .into_iter()
-            .map(|p| {
-                TaskError::new("A model bundle was refused", format!("{} ({})", p.what, p.file.display()))
-                    .with_hint(p.hint)
-            })
-            .collect();
-        (found.bundles.iter().map(info).collect(), problems)
+        let found = bundles::find(folders);
+        let refused = |p: Problem| {
+            let why = format!("{} ({})", p.what, p.file.display());
+            TaskError::new("A model bundle was refused", why).with_hint(p.hint)
+        };
+        (found.bundles, found.problems.into_iter().map(refused).collect())
     }
 
-    fn generate(
+    fn predict(
         &self,
         bundle: &BundleInfo,
-        items: &[GenerateItem<'_>],
+        engine: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[Wanted<'_>],
         cx: &JobCx,
-    ) -> Result<Vec<Generated>, TaskError> {
-        super::predictions::generate(self, bundle, items, cx)
+    ) -> Result<Vec<Prediction>, TaskError> {
+        self.models.predict(bundle, engine, config, wanted, cx)
     }
 
     fn stored(
         &self,
         bundles: &[BundleInfo],
-        runtime: RuntimeChoice,
+        engine: EngineChoice,
         touch: TouchKey,
         difference: &RgbGrid,
-    ) -> Vec<Prediction> {
-        super::predictions::stored(self, bundles, runtime, touch, difference)
+    ) -> Vec<(PredictionKey, Prediction)> {
+        let keyed = |kept: KeptPrediction| {
+            let bundle = kept.prediction.bundle.clone();
+            (PredictionKey::new(touch, bundle, kept.engine, &kept.config), kept.prediction)
+        };
+        self.models.kept(bundles, engine, difference).into_iter().map(keyed).collect()
     }
 
-    fn mask_by_model(
-        &self,
-        bundle: &BundleInfo,
-        runtime: RuntimeChoice,
-        imprint: &DepthMap,
-    ) -> Result<Mask, TaskError> {
-        let what = format!("Mask with {}", bundle.name);
-        let key = (bundle.id.clone(), runtime);
-        let mut loaded = lock(&self.mask_model);
-        if loaded.as_ref().is_none_or(|(k, _)| *k != key) {
-            *loaded = None;
-            let checked = open_bundle(&what, bundle)?;
-            let model = MaskModel::open(&checked, runtime.into()).map_err(|err| TaskError::from_error(&what, &err))?;
-            *loaded = Some((key, model));
-        }
-        let Some((_, model)) = loaded.as_mut() else { return Err(TaskError::new(what, "no model is loaded")) };
-        model.predict(imprint).map_err(|err| TaskError::from_error(what, &err))
+    fn mask_by_model(&self, bundle: &BundleInfo, engine: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
+        self.models.mask(bundle, engine, imprint)
     }
 
     fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {
@@ -397,9 +375,7 @@ impl Services for LiveServices {
 impl LiveServices {
     /// The budget of the kept predictions as the settings say.
     fn keep_at_most(&self, settings: &Settings) {
-        if let Some(store) = &self.store {
-            lock(store).set_budget(u64::from(settings.cache_mib) << 20);
-        }
+        self.models.keep_at_most(u64::from(settings.cache_mib) << 20);
     }
 
     fn read_settings(&self) -> (Settings, Option<TaskError>) {
@@ -439,45 +415,6 @@ fn parse_settings(bytes: &[u8]) -> Result<Settings, String> {
         ));
     }
     serde_json::from_value(value).map_err(|err| err.to_string())
-}
-
-/// What the model shows of a bundle.
-pub fn info(bundle: &Bundle) -> BundleInfo {
-    BundleInfo {
-        id: bundle.hash().into(),
-        name: bundle.name().to_owned(),
-        kind: match bundle.spec() {
-            BundleSpec::Generator(_) => BundleKind::Generator,
-            BundleSpec::MaskUnet(_) => BundleKind::Mask,
-            BundleSpec::ToolClassifier(_) => BundleKind::Classifier,
-        },
-        folder: bundle.dir().to_owned(),
-        generator: bundle.generator().map(|spec| GeneratorInfo {
-            defaults: spec.defaults,
-            training_steps: spec.schedule.training_steps(),
-            guided: spec.guidance.is_some(),
-        }),
-    }
-}
-
-/// Opens a bundle that was found before. It must still be the same: its identity is part of the recipe.
-pub(super) fn open_bundle(what: &str, bundle: &BundleInfo) -> Result<Bundle, TaskError> {
-    let checked = Bundle::open(&bundle.folder).map_err(|err| TaskError::from_error(what, &err))?;
-    if checked.hash() == &*bundle.id {
-        return Ok(checked);
-    }
-    let why = format!("the bundle was changed since it was found ({})", bundle.folder.display());
-    Err(TaskError::new(what, why).with_hint("Start the program again."))
-}
-
-impl From<RuntimeChoice> for EngineChoice {
-    fn from(choice: RuntimeChoice) -> Self {
-        match choice {
-            RuntimeChoice::Auto => Self::Auto,
-            RuntimeChoice::Rten => Self::Rten,
-            RuntimeChoice::Ort => Self::Ort,
-        }
-    }
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! What the panes show of the depth chain, and of what a GelSlim image leaves open.
 
 use super::super::keys::{Request, TouchKey};
-use super::super::results::LedgerResult;
 use super::super::state::{Absent, Lookup, State};
 use super::Wanted;
 use crate::domain::ambiguity::Ambiguity;
 use crate::domain::sensor::Finger;
+use crate::work::ledger::LedgerResult;
 
 impl State {
     /// The depth chain of the prediction shown for one finger.

@@ -16,12 +16,12 @@ use super::figures::quantile;
 use super::front::{self, Axis, FrontPoint};
 use crate::domain::diffusion::{GenerateConfig, Sampler, Spacing};
 use crate::domain::metrics::AngleSummary;
-use crate::headless::predict::find_bundle;
 use crate::headless::{Common, Output, VerbResult};
 use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
 use crate::io::atomic;
+use crate::work::bundles::{self, BundleKind};
 
 /// What everything is measured against.
 const REFERENCE: (Sampler, u32) = (Sampler::Ddim, 200);
@@ -146,10 +146,11 @@ struct Report {
 }
 
 pub(super) fn run(args: &GeneratorArgs) -> VerbResult {
-    let bundle = find_bundle(args.bundle.as_ref(), "generator", |b| b.generator().is_some())?;
+    let found = bundles::find(&[]);
+    let bundle = found.take(BundleKind::Generator, args.bundle.as_deref())?.open("Open the generator")?;
     let spec = bundle.generator().ok_or_else(|| anyhow::anyhow!("{} is not a generator", bundle.name()))?;
     let (defaults, training_steps) = (spec.defaults, spec.schedule.training_steps());
-    let mask_bundle = find_bundle(args.mask_bundle.as_ref(), "mask model", |b| b.mask_unet().is_some())?;
+    let mask_bundle = found.take(BundleKind::Mask, args.mask_bundle.as_deref())?.open("Open the mask model")?;
     let engines = engines(args.engine)?;
     let machine = Machine::now();
     let configs = configs(args, defaults, training_steps);

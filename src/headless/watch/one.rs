@@ -1,10 +1,8 @@
 //! One touch: prediction, masks, pose, files.
 
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Instant, SystemTime};
 
 use serde::Serialize;
@@ -15,17 +13,19 @@ use super::super::predict::Predictor;
 use super::summary::Latency;
 use super::write::{self, FingerResult};
 use super::{Source, WatchArgs};
-use crate::app::jobs::compute;
-use crate::app::keys::MaskRecipe;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{Grid, RgbGrid};
 use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
 use crate::domain::sample::Sample;
-use crate::domain::sensor::{Finger, gelslim};
+use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
-use crate::infer::generator::GenerateError;
+use crate::infer::engine::resolve;
 use crate::io::dataset::{Dataset, read_in_metres};
 use crate::io::follow::Ready;
+use crate::work::imprint::imprint_of;
+use crate::work::job::{Cancel, JobCx};
+use crate::work::mask::MaskRecipe;
+use crate::work::{compare, mask};
 
 /// The models, loaded once, and the tools met so far.
 pub(super) struct Worker<'a> {
@@ -33,7 +33,7 @@ pub(super) struct Worker<'a> {
     predictor: Predictor,
     engine: Engine,
     tools: BTreeMap<String, ToolModel>,
-    stop: Arc<AtomicBool>,
+    stop: Cancel,
     /// Seconds that loading and the first run took.
     pub warm_s: f64,
 }
@@ -103,21 +103,13 @@ impl Done {
 
 impl<'a> Worker<'a> {
     /// Loads the models and runs them once, so that the first touch does not wait for memory and kernels.
-    pub(super) fn new(args: &'a WatchArgs, mut predictor: Predictor, stop: Arc<AtomicBool>) -> anyhow::Result<Self> {
+    pub(super) fn new(args: &'a WatchArgs, mut predictor: Predictor, stop: Cancel) -> anyhow::Result<Self> {
         let engine = match args.engine.0.as_slice() {
             [engine] => *engine,
             _ => anyhow::bail!("--engine all is for `touch2touch pose`; one registration is needed here"),
         };
         let start = Instant::now();
-        let config = predictor.config()?;
-        let blank = RgbGrid::filled(gelslim::WIDTH, gelslim::HEIGHT, [0.0; 3]);
-        let shift = predictor.shift();
-        let generator = predictor.generator()?;
-        let raw = generator.generate_batch(&[&blank, &blank], &config, &mut |_| ControlFlow::Continue(()))?;
-        let imprint = generator.depth(&raw[0], shift)?;
-        if matches!(args.mask.mask, MaskFrom::Unet | MaskFrom::Auto) {
-            predictor.mask(&imprint)?;
-        }
+        predictor.warm_up(matches!(args.mask.mask, MaskFrom::Unet | MaskFrom::Auto))?;
         let warm_s = start.elapsed().as_secs_f64();
         Ok(Self { args, predictor, engine, tools: BTreeMap::new(), stop, warm_s })
     }
@@ -131,13 +123,14 @@ impl<'a> Worker<'a> {
     pub(super) fn recipe(&mut self, tool: Option<&str>) -> anyhow::Result<Value> {
         let config = self.predictor.config()?;
         let shift = self.predictor.shift();
-        let generator = self.predictor.generator()?.recipe(String::new(), &config);
+        let engine = resolve(self.predictor.engine())?;
+        let bundle = self.predictor.bundle()?;
         let mask = match self.args.mask.mask {
             MaskFrom::Threshold => json!({"threshold_mm": self.args.mask.threshold_mm}),
             _ => json!("unet"),
         };
         Ok(json!({
-            "bundle": self.predictor.bundle_name(), "bundle_hash": generator.bundle, "runtime": generator.engine,
+            "bundle": bundle.name, "bundle_hash": *bundle.id, "runtime": engine,
             "sampler": config.sampler, "steps": config.steps, "seed": config.seed, "eta": config.eta,
             "spacing": config.spacing, "guidance": config.guidance, "shift": shift, "mask": mask, "registration": self.engine, "tool": tool,
             "camera": self.args.camera, "version": env!("CARGO_PKG_VERSION"),
@@ -179,7 +172,7 @@ impl<'a> Worker<'a> {
             f.mask = Some(match self.args.mask.mask {
                 MaskFrom::Threshold => {
                     let recipe = MaskRecipe::Threshold((self.args.mask.threshold_mm / 1e3).into());
-                    compute::mask(&recipe, &f.imprint, None, None, None).map_err(|err| anyhow::anyhow!("{err}"))?
+                    mask::mask(&recipe, &f.imprint, None, None, None).map_err(|err| anyhow::anyhow!("{err}"))?
                 }
                 _ => self.predictor.mask(&f.imprint)?,
             });
@@ -201,7 +194,7 @@ impl<'a> Worker<'a> {
             source: source.clone(),
             recipe: recipe.clone(),
             files,
-            scale: super::super::scale_name(sample.scale),
+            scale: sample.scale.key(),
             fingers: fingers.iter().map(|f| figures(sample, f)).collect(),
             pose,
             no_pose,
@@ -224,22 +217,17 @@ impl<'a> Worker<'a> {
         if touched.is_empty() {
             anyhow::bail!("no GelSlim image");
         }
-        let config = self.predictor.config()?;
-        let shift = self.predictor.shift();
-        let stop = self.stop.clone();
-        let mut progress = |_| match stop.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        };
-        let generator = self.predictor.generator()?;
+        let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
         let differences: Vec<&RgbGrid> = touched.iter().map(|(_, difference)| *difference).collect();
-        let raw = match generator.generate_batch(&differences, &config, &mut progress) {
-            Err(GenerateError::Cancelled) => return Ok(None),
+        let made = match self.predictor.predict(&differences, &cx) {
+            Err(_) if self.stop.is_cancelled() => return Ok(None),
             other => other?,
         };
+        let shift = self.predictor.shift();
         let mut out = Vec::new();
-        for ((finger, _), raw) in touched.iter().zip(&raw) {
-            out.push(FingerResult { finger: *finger, imprint: generator.depth(raw, shift)?, mask: None });
+        for ((finger, _), made) in touched.iter().zip(&made) {
+            let imprint = imprint_of(made, shift, sample, *finger)?;
+            out.push(FingerResult { finger: *finger, imprint, mask: None });
         }
         Ok(Some(out))
     }
@@ -306,7 +294,7 @@ fn figures(sample: &Sample, result: &FingerResult) -> FingerFigures {
     let stats = crate::domain::postprocess::Stats::of(&result.imprint);
     let measured = sample.finger(result.finger).and_then(|t| t.bubble.as_ref()).map(|b| &b.imprint);
     let measured = measured.filter(|m| m.size() == result.imprint.size());
-    let compared = measured.and_then(|m| compute::compare(&result.imprint, m, sample.scale).ok());
+    let compared = measured.and_then(|m| compare::compare(&result.imprint, m, sample.scale).ok());
     let count = |mask: &Grid<bool>| mask.as_slice().iter().filter(|&&m| m).count();
     FingerFigures {
         finger: result.finger.name(),

@@ -7,7 +7,6 @@ use glam::{DAffine3, DVec3};
 
 use super::{layers, steps};
 use crate::app::keys::{CloudKey, ImprintSource};
-use crate::app::results::{Clouds, FingerCloud};
 use crate::domain::sensor::Finger;
 use crate::gpu::guides;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
@@ -17,6 +16,7 @@ use crate::gpu::scene::SceneData;
 use crate::ui::cx::{Cx, SceneCloud, SceneMesh, side_color};
 use crate::ui::images::CONTACT;
 use crate::ui::theme::{self, Palette};
+use crate::work::cloud::{Clouds, FingerCloud};
 
 pub(super) fn rgb(c: Color32) -> [f32; 3] {
     [f32::from(c.r()) / 255.0, f32::from(c.g()) / 255.0, f32::from(c.b()) / 255.0]

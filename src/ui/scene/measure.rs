@@ -6,13 +6,13 @@ use glam::DVec3;
 use super::nearest;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
-use crate::app::results::Clouds;
 use crate::app::workbench::{Picked, SceneTool, WorkbenchCommand};
 use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::layers::reason_rgb;
 use crate::ui::scene_view::SceneOutput;
 use crate::ui::theme::{SMALL, caption};
+use crate::work::cloud::Clouds;
 
 /// What a click does.
 pub(super) fn click(cx: &mut Cx<'_>, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {

@@ -9,7 +9,6 @@ use super::build::{AXIS, axes_origin};
 use super::hands;
 use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
-use crate::app::results::PoseResult;
 use crate::app::state::{Absent, Lookup};
 use crate::app::workbench::Layer;
 use crate::domain::align::Rung;
@@ -23,6 +22,7 @@ use crate::ui::images::CONTACT;
 use crate::ui::layers::{RESIDUAL_MAP, reason_rgb};
 use crate::ui::scene_view::SceneOutput;
 use crate::ui::theme::Palette;
+use crate::work::pose::PoseResult;
 
 /// What is written over the picture: angle, stop reason, legend, scale bar, names of the axes.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, output: &SceneOutput) {

@@ -5,11 +5,11 @@ use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 use super::super::super::document::{PairLabels, Review};
-use super::super::super::error::TaskError;
 use super::super::{DataSource, Followed, Following};
 use super::LiveSource;
 use crate::io::follow::{Arrival, Follower};
 use crate::io::masks::MaskStore;
+use crate::work::error::TaskError;
 
 struct LiveFollowing {
     follower: Follower,

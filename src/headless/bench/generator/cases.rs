@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use crate::app::jobs::compute::LAB_PEAK_M;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::{self, AngleSummary};
@@ -12,6 +11,7 @@ use crate::domain::sensor::Finger;
 use crate::domain::sim::{self, SimConfig};
 use crate::domain::units::angle_error;
 use crate::infer::mask::MaskModel;
+use crate::work::compare::LAB_PEAK_M;
 
 /// A grasp of a simulated tool.
 pub(super) struct Case {

@@ -1,10 +1,55 @@
 //! Looking into a registration: the recorded run, and what the layers show of it.
 
-use super::super::error::TaskError;
-use super::super::results::{Clouds, LayerResult, PoseResult};
-use crate::domain::align::PointFit;
-use crate::domain::align::reason::{self, reasons};
-use crate::domain::grid::Mask;
+use super::cloud::{Clouds, FingerCloud};
+use super::error::TaskError;
+use super::pose::PoseResult;
+use crate::domain::align::reason::{self, Reason, ReasonCounts, reasons};
+use crate::domain::align::{Directions, PointFit};
+use crate::domain::frames::PlanarPose;
+use crate::domain::grid::{Grid, Mask};
+use crate::domain::sensor::Finger;
+
+/// What the layers show of one registration.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LayerResult {
+    /// The registered pose that they are of, `grasp_from_object`.
+    pub grasp_from_object: PlanarPose,
+    /// The reason of every pixel, by [`Finger::index`].
+    pub reasons: [Option<Grid<Reason>>; 2],
+    /// Residual (metres) and weight of every contact point, by [`Finger::index`], in the order of the cloud.
+    pub fits: [Vec<PointFit>; 2],
+    /// Pixels per reason, by [`Finger::index`].
+    pub counts: [ReasonCounts; 2],
+    /// Residuals of the contact points of both fingers by size: shares of [`LayerResult::range_m`].
+    pub histogram: Vec<u32>,
+    /// Contact points with a larger residual than the range.
+    pub above: u32,
+    /// Largest residual of the histogram and of the heat map, metres.
+    pub range_m: f64,
+    /// Width of the narrowest kernel, metres; `None` for an engine without one.
+    pub kernel_m: Option<f64>,
+    /// Distances in both directions; `None` without points on one side.
+    pub directions: Option<Directions>,
+}
+
+impl LayerResult {
+    /// Residual, weight and reason at a raw bubble pixel; the fit only where the pixel is a contact point.
+    pub fn at(&self, finger: Finger, cloud: &FingerCloud, pixel: [u16; 2]) -> Option<(Reason, Option<PointFit>)> {
+        let (x, y) = (usize::from(pixel[0]), usize::from(pixel[1]));
+        let reason = *self.reasons[finger.index()].as_ref()?.get(x, y)?;
+        let fit = cloud.at_pixel(x, y).filter(|at| cloud.contact.get(*at) == Some(&true)).and_then(|at| {
+            let before = cloud.contact[..at].iter().filter(|c| **c).count();
+            self.fits[finger.index()].get(before).copied()
+        });
+        Some((reason, fit))
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let pixels: usize = self.reasons.iter().flatten().map(Grid::len).sum();
+        pixels + self.fits.iter().map(|f| f.len() * size_of::<PointFit>()).sum::<usize>() + size_of::<Self>()
+    }
+}
 
 /// Bars of the histogram of residuals.
 pub const BARS: usize = 40;

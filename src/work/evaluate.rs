@@ -13,8 +13,6 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::super::error::TaskError;
-use super::JobCx;
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Group, Row, Scores};
@@ -23,6 +21,8 @@ use crate::domain::postprocess::ShiftMode;
 use crate::domain::sample::Scale;
 use crate::infer::engine::{EngineChoice, threads};
 use crate::io::dataset::Dataset;
+use crate::work::error::TaskError;
+use crate::work::job::JobCx;
 use methods::{Method, Models};
 
 pub use export::{Report, export, rows};

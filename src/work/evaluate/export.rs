@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::super::super::error::TaskError;
 use super::Evaluation;
 use crate::domain::evaluation::{self, Row, Scores, paper_rows};
 use crate::io::atomic;
+use crate::work::error::TaskError;
 
 /// The evaluation as one JSON object.
 #[derive(Serialize)]

@@ -4,13 +4,13 @@ use std::sync::mpsc::sync_channel;
 
 use rayon::prelude::*;
 
-use super::super::JobCx;
 use super::{Setup, Skipped, ToolWork, by_tool, spread};
 use crate::domain::dataset::PairId;
 use crate::domain::evaluation::Group;
 use crate::domain::grid::Grid;
 use crate::domain::sample::{Sample, Scale};
 use crate::io::dataset::{Dataset, SourceKind};
+use crate::work::job::JobCx;
 
 /// A loaded pair.
 pub(super) struct Case {

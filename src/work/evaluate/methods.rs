@@ -4,8 +4,6 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
 
-use super::super::super::error::TaskError;
-use super::super::JobCx;
 use super::load::Case;
 use super::{MaskBy, Setup, WHAT};
 use crate::domain::dataset::PairId;
@@ -21,6 +19,8 @@ use crate::infer::classifier::ToolClassifier;
 use crate::infer::generator::{GenerateError, Generator};
 use crate::infer::mask::MaskModel;
 use crate::io::dataset::{Dataset, SourceKind};
+use crate::work::error::TaskError;
+use crate::work::job::JobCx;
 
 /// Pictures that are looked at for stored predictions: a folder has them from the start, or not at all.
 const LOOKED_AT: u32 = 16;

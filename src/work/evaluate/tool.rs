@@ -5,12 +5,9 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::super::JobCx;
-use super::super::compute;
 use super::load::Case;
 use super::methods::{Made, Method, Models};
 use super::{MaskBy, Setup, Skipped};
-use crate::app::keys::MaskRecipe;
 use crate::domain::contact::LAB_CAD_DISTANCE_M;
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
 use crate::domain::grid::{DepthMap, Grid, Mask};
@@ -23,6 +20,9 @@ use crate::domain::sim::pattern_of;
 use crate::domain::units::angle_error;
 use crate::infer::classifier::Verdict;
 use crate::io::dataset::Dataset;
+use crate::work::job::JobCx;
+use crate::work::mask;
+use crate::work::mask::MaskRecipe;
 
 /// A prediction that waits for its image figures.
 struct Image {
@@ -142,7 +142,7 @@ impl Tool {
             MaskBy::Threshold(m) => MaskRecipe::Threshold(m.into()),
             MaskBy::Truth | MaskBy::Unet => MaskRecipe::Truth,
         };
-        compute::mask(&recipe, imprint, sample.finger(finger), self.model.as_ref(), sample.grasp_from_object)
+        mask::mask(&recipe, imprint, sample.finger(finger), self.model.as_ref(), sample.grasp_from_object)
             .map_err(|err| err.to_string())
     }
 

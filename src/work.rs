@@ -1,0 +1,27 @@
+//! The job itself, once: from a touch to a prediction, its imprint in metres, the contact mask, the cloud, the pose and
+//! the figures, as plain functions of values.
+//!
+//! A button of the studio gathers the inputs, calls one of these on a lane and wraps the answer; a verb of the command
+//! line parses, loops and prints. Neither computes anything itself, so that both always give the same figure.
+//!
+//! * [`models`]: bundles found and loaded once; predictions, from the disk where they were made before.
+//! * [`imprint`], [`mask`], [`cloud`], [`pose`]: one step each. [`compare`], [`ledger`], [`layers`], [`ensemble`]: what
+//!   there is to know about their results.
+//! * [`evaluate`], [`statistics`]: passes over a whole data set.
+//! * [`job`], [`error`]: how work is watched, stopped, and how it fails.
+
+pub mod bundles;
+pub mod cloud;
+pub mod compare;
+pub mod ensemble;
+pub mod error;
+pub mod evaluate;
+pub mod imprint;
+pub mod job;
+pub mod layers;
+pub mod ledger;
+pub mod mask;
+pub mod models;
+pub mod pose;
+pub mod statistics;
+pub mod tool;

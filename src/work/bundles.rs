@@ -1,0 +1,145 @@
+//! Model bundles as everything above knows them: [`BundleInfo`], found once, opened when a model is needed.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::error::TaskError;
+use crate::domain::dataset::Problem;
+use crate::domain::diffusion::GenerateConfig;
+use crate::infer::bundle::{self, Bundle, BundleSpec};
+use crate::infer::generator::GenerateError;
+
+/// A model bundle that was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BundleInfo {
+    /// Its identity: the digest of its manifest and files.
+    pub id: Arc<str>,
+    /// The name on screen.
+    pub name: String,
+    /// What it does.
+    pub kind: BundleKind,
+    /// Its folder.
+    pub folder: PathBuf,
+    /// What can be chosen, if it is a generator.
+    pub generator: Option<GeneratorInfo>,
+}
+
+/// The choices that a generator's bundle leaves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeneratorInfo {
+    /// What it recommends.
+    pub defaults: GenerateConfig,
+    /// The steps of its training: no more can be taken.
+    pub training_steps: usize,
+    /// Whether it was trained for guidance.
+    pub guided: bool,
+}
+
+/// What a bundle does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum BundleKind {
+    /// GelSlim image to Soft Bubble imprint.
+    Generator,
+    /// Imprint to contact mask.
+    Mask,
+    /// Imprint to tool.
+    Classifier,
+}
+
+impl BundleKind {
+    /// The name in messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Generator => "generator",
+            Self::Mask => "mask model",
+            Self::Classifier => "tool classifier",
+        }
+    }
+}
+
+impl BundleInfo {
+    /// What is known of an opened bundle.
+    pub fn of(bundle: &Bundle) -> Self {
+        Self {
+            id: bundle.hash().into(),
+            name: bundle.name().to_owned(),
+            kind: match bundle.spec() {
+                BundleSpec::Generator(_) => BundleKind::Generator,
+                BundleSpec::MaskUnet(_) => BundleKind::Mask,
+                BundleSpec::ToolClassifier(_) => BundleKind::Classifier,
+            },
+            folder: bundle.dir().to_owned(),
+            generator: bundle.generator().map(|spec| GeneratorInfo {
+                defaults: spec.defaults,
+                training_steps: spec.schedule.training_steps(),
+                guided: spec.guidance.is_some(),
+            }),
+        }
+    }
+
+    /// # Errors
+    /// If `scale` guides and the generator was not trained for guidance.
+    pub fn check_guidance(&self, scale: f64) -> Result<(), GenerateError> {
+        match self.generator {
+            Some(generator) if !generator.guided && scale != 1.0 => {
+                Err(GenerateError::NoGuidance { bundle: self.name.clone(), scale })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Opens it again. It must still be the same: its identity is part of every recipe.
+    ///
+    /// # Errors
+    /// If it cannot be opened, or was changed since it was found.
+    pub fn open(&self, what: &str) -> Result<Bundle, TaskError> {
+        let checked = Bundle::open(&self.folder).map_err(|err| TaskError::from_error(what, &err))?;
+        if checked.hash() == &*self.id {
+            return Ok(checked);
+        }
+        let why = format!("the bundle was changed since it was found ({})", self.folder.display());
+        Err(TaskError::new(what, why).with_hint("Start the program again."))
+    }
+}
+
+/// The bundles that are there, and what is wrong with those that were refused.
+#[derive(Clone, Debug, Default)]
+pub struct FoundBundles {
+    /// Those that can be used, in the order in which they are taken.
+    pub bundles: Vec<BundleInfo>,
+    /// What is wrong with the others.
+    pub problems: Vec<Problem>,
+}
+
+/// The bundles that ship with the program, and those in `folders`.
+pub fn find(folders: &[PathBuf]) -> FoundBundles {
+    let mut roots = bundle::default_roots();
+    roots.extend_from_slice(folders);
+    let found = bundle::find(&roots);
+    FoundBundles { bundles: found.bundles.iter().map(BundleInfo::of).collect(), problems: found.problems }
+}
+
+impl FoundBundles {
+    /// The bundle in the named folder, else the first found of its kind.
+    ///
+    /// # Errors
+    /// If the named one cannot be opened or is of another kind, or none was found; then with what was refused, and why.
+    pub fn take(&self, kind: BundleKind, named: Option<&Path>) -> Result<BundleInfo, TaskError> {
+        let what = format!("Look for a {}", kind.name());
+        if let Some(folder) = named {
+            let bundle = Bundle::open(folder).map_err(|err| TaskError::from_error(&what, &err))?;
+            let info = BundleInfo::of(&bundle);
+            if info.kind != kind {
+                let why = format!("the bundle is a {}, not a {} ({})", info.kind.name(), kind.name(), folder.display());
+                return Err(TaskError::new(what, why));
+            }
+            return Ok(info);
+        }
+        self.bundles.iter().find(|bundle| bundle.kind == kind).cloned().ok_or_else(|| {
+            let refused: Vec<String> =
+                self.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
+            let why = format!("no {} bundle was found{}", kind.name(), refused.concat());
+            TaskError::new(what, why).with_hint("Name one with an option, or put it into a folder of bundles.")
+        })
+    }
+}

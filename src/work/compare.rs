@@ -1,0 +1,108 @@
+//! A prediction against the measurement of the same touch: [`compare_parts`].
+
+use super::error::TaskError;
+use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::metrics::{self, Split, SsimRange};
+use crate::domain::sample::Scale;
+
+/// The peak of the lab's PSNR, metres.
+pub const LAB_PEAK_M: f64 = 0.0225;
+
+/// A prediction against the measurement of the same touch.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// Predicted minus measured, metres; NaN where either is.
+    pub error: DepthMap,
+    /// Peak signal-to-noise ratio as the lab computes it, decibels; `None` if it is not defined.
+    pub psnr_db: Option<f64>,
+    /// Structural similarity as the lab computes it; `None` if it is not defined.
+    pub ssim: Option<f64>,
+    /// Mean absolute error, metres; NaN without a pixel to compare.
+    pub mae_m: f64,
+    /// Whether PSNR and SSIM are of metres, or (assumed scale) of images stretched to 0..1 each.
+    pub scale: Scale,
+    /// The same figures inside and outside the GelSlim's footprint, errors in metres; `None` where nobody asked.
+    pub split: Option<Split>,
+}
+
+/// A prediction against the measurement. With an assumed scale both are stretched to 0..1 first.
+///
+/// # Errors
+/// If the sizes differ or no pixel is left to compare.
+pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Result<Comparison, TaskError> {
+    let fail = |err: metrics::MetricError| TaskError::from_error("Compare prediction and measurement", &err);
+    let mut sum = 0.0;
+    let mut count = 0usize;
+    let sizes_equal = predicted.size() == measured.size();
+    let error = Grid::from_fn(measured.width(), measured.height(), |x, y| {
+        let difference = if sizes_equal { predicted[(x, y)] - measured[(x, y)] } else { f32::NAN };
+        if difference.is_finite() {
+            sum += f64::from(difference.abs());
+            count += 1;
+        }
+        difference
+    });
+    let (psnr, ssim) = match scale {
+        Scale::Measured => (
+            metrics::psnr(predicted, measured, LAB_PEAK_M).map_err(fail)?,
+            metrics::ssim(predicted, measured, SsimRange::Explicit(LAB_PEAK_M)),
+        ),
+        Scale::Assumed => {
+            let (p, m) = (metrics::unit_range(predicted), metrics::unit_range(measured));
+            (metrics::psnr(&p, &m, 1.0).map_err(fail)?, metrics::ssim(&p, &m, SsimRange::Explicit(1.0)))
+        }
+    };
+    Ok(Comparison {
+        error,
+        psnr_db: psnr.db(),
+        ssim: ssim.ok().map(|s| s.mean),
+        mae_m: if count == 0 { f64::NAN } else { sum / count as f64 },
+        scale,
+        split: None,
+    })
+}
+
+/// [`compare`] with the figures apart for what the GelSlim saw (`seen`) and for what the model made up.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_parts(
+    predicted: &DepthMap,
+    measured: &DepthMap,
+    scale: Scale,
+    seen: &Mask,
+) -> Result<Comparison, TaskError> {
+    let fail = |err: metrics::MetricError| TaskError::from_error("Compare prediction and measurement", &err);
+    let whole = compare(predicted, measured, scale)?;
+    let mut split = metrics::split(predicted, measured, seen, LAB_PEAK_M).map_err(fail)?;
+    if scale == Scale::Assumed {
+        // Lengths stay in the assumed metres; PSNR and SSIM are of the stretched images, as those of the whole are.
+        let (p, m) = (metrics::unit_range(predicted), metrics::unit_range(measured));
+        let unit = metrics::split(&p, &m, seen, 1.0).map_err(fail)?;
+        for (part, unit) in
+            [(&mut split.whole, unit.whole), (&mut split.seen, unit.seen), (&mut split.invented, unit.invented)]
+        {
+            (part.psnr_db, part.ssim) = (unit.psnr_db, unit.ssim);
+        }
+    }
+    Ok(Comparison { split: Some(split), ..whole })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn comparing_says_how_far_off() {
+        let a = Grid::from_fn(40, 30, |x, y| 1e-4 * (x * y % 17) as f32);
+        let b = a.map(|v| v + 0.001);
+        let comparison = compare(&b, &a, Scale::Measured).unwrap();
+        // A constant error of 1 mm: 20 log10(0.0225 / 0.001) = 27.04 dB.
+        assert!((comparison.psnr_db.unwrap() - 27.04).abs() < 0.01);
+        assert!((comparison.mae_m - 0.001).abs() < 1e-8);
+        // With an assumed scale an offset is invisible: the stretched images are equal up to rounding.
+        let assumed = compare(&b, &a, Scale::Assumed).unwrap();
+        assert!(assumed.psnr_db.is_none_or(|db| db > 80.0));
+        assert!(compare(&Grid::filled(3, 3, 0.0), &a, Scale::Measured).is_err());
+    }
+}

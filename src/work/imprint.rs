@@ -1,0 +1,122 @@
+//! A decoder's picture to metres: [`imprint`].
+
+use super::error::TaskError;
+use super::models::{Chains, Prediction};
+use crate::domain::grid::{DepthMap, Grid};
+use crate::domain::postprocess::{DepthChain, PostprocessError, RawPrediction, ShiftMode};
+use crate::domain::resample::bilinear;
+use crate::domain::sample::Sample;
+use crate::domain::sensor::Finger;
+
+/// Longest side of a thumbnail, pixels.
+const THUMBNAIL_PX: usize = 44;
+
+/// A prediction in metres, as large as the bubble image `size` (`[width, height]`).
+///
+/// # Errors
+/// If the bundle has no such range mapping, or its steps do not fit its output.
+pub fn imprint(prediction: &Prediction, shift: ShiftMode, size: [usize; 2]) -> Result<DepthMap, TaskError> {
+    let what = format!("Range mapping \"{}\"", shift.label());
+    let chain = chain(prediction, shift)?;
+    in_metres(&chain, &prediction.raw, size).map_err(|err| TaskError::from_error(&what, &err))
+}
+
+/// The prediction of one finger of a sample in metres, as large as its bubble image; without one, the bundle's own size
+/// is kept.
+///
+/// # Errors
+/// As [`imprint`].
+pub fn imprint_of(
+    prediction: &Prediction,
+    shift: ShiftMode,
+    sample: &Sample,
+    finger: Finger,
+) -> Result<DepthMap, TaskError> {
+    let bubble = sample.finger(finger).and_then(|t| t.bubble.as_ref());
+    imprint(prediction, shift, bubble.map_or([0, 0], |b| b.imprint.size()))
+}
+
+/// A decoder's picture in metres, as large as the bubble image `size` (`[width, height]`; with a zero in it the chain's
+/// own size is kept).
+///
+/// # Errors
+/// If the chain does not fit the picture.
+pub fn in_metres(chain: &DepthChain, raw: &RawPrediction, size: [usize; 2]) -> Result<DepthMap, PostprocessError> {
+    let depth = chain.run(raw)?;
+    if depth.size() == size || size.contains(&0) { Ok(depth) } else { Ok(bilinear(&depth, size[0], size[1])) }
+}
+
+/// The steps from a prediction to metres.
+///
+/// # Errors
+/// If the bundle has no such range mapping, or the statistics of a refit are of another bundle.
+pub fn chain(prediction: &Prediction, shift: ShiftMode) -> Result<DepthChain, TaskError> {
+    chain_of(&prediction.chains, &prediction.bundle, shift)
+}
+
+/// The steps to metres among the ways that a bundle of this identity offers.
+///
+/// # Errors
+/// As [`chain`].
+pub fn chain_of(chains: &Chains, bundle: &str, shift: ShiftMode) -> Result<DepthChain, TaskError> {
+    let fail = |why: &str| {
+        TaskError::new(format!("Range mapping \"{}\"", shift.label()), why)
+            .with_hint("Choose another range mapping, or another bundle.")
+    };
+    let of = |mode: ShiftMode| match chains.get(&mode) {
+        Some(Ok(chain)) => Ok(chain.clone()),
+        Some(Err(why)) => Err(fail(why)),
+        None => Err(fail("the bundle does not offer it")),
+    };
+    match shift {
+        ShiftMode::Refit(refit) => {
+            refit.check(bundle).map_err(|why| fail(&why))?;
+            of(ShiftMode::Raw)?.with_mode(shift, None).map_err(|err| fail(&err.to_string()))
+        }
+        mode => of(mode),
+    }
+}
+
+/// A small picture of the measured imprint of the right finger, else of the left, else nothing (an empty image).
+pub fn thumbnail(sample: &Sample) -> DepthMap {
+    let bubble = |finger: Finger| sample.finger(finger).and_then(|t| t.bubble.as_ref());
+    let Some(bubble) = Finger::BOTH.into_iter().find_map(bubble) else { return Grid::filled(0, 0, 0.0) };
+    let imprint = &bubble.imprint;
+    let longest = imprint.width().max(imprint.height());
+    if longest <= THUMBNAIL_PX {
+        return imprint.clone();
+    }
+    // The mean of the finite pixels of each block: no aliasing of the speckle, no holes where a few are missing.
+    let size = imprint.size().map(|n| (n * THUMBNAIL_PX).div_ceil(longest).max(1));
+    let block = |at: usize, out: usize, full: usize| at * full / out..((at + 1) * full / out).max(at * full / out + 1);
+    Grid::from_fn(size[0], size[1], |x, y| {
+        let (mut sum, mut count) = (0.0f32, 0u32);
+        for v in block(y, size[1], imprint.height()) {
+            for value in &imprint.row(v)[block(x, size[0], imprint.width())] {
+                if value.is_finite() {
+                    sum += value;
+                    count += 1;
+                }
+            }
+        }
+        if count == 0 { f32::NAN } else { sum / count as f32 }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thumbnail_keeps_means_and_survives_holes() {
+        let imprint = Grid::from_fn(175, 140, |x, y| if (x + y) % 2 == 0 { f32::NAN } else { 0.004 });
+        let bubble = crate::domain::sample::BubbleTouch { imprint, camera: None, truth: None };
+        let touch = crate::domain::sample::FingerTouch { bubble: Some(bubble), ..Default::default() };
+        let sample = Sample { fingers: [None, Some(touch)], ..Sample::default() };
+        let small = thumbnail(&sample);
+        assert_eq!(small.size(), [44, 36]);
+        // The mean of equal numbers is that number up to rounding of a sum of at most 20.
+        assert!(small.as_slice().iter().all(|v| (v - 0.004).abs() < 1e-8));
+        assert!(thumbnail(&Sample::default()).is_empty());
+    }
+}

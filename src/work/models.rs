@@ -1,0 +1,354 @@
+//! [`Models`]: the models of a run of the program, loaded when first needed and kept loaded; predictions come from the
+//! disk where they were made before.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use strum::IntoEnumIterator as _;
+
+use super::bundles::BundleInfo;
+use super::error::TaskError;
+use super::imprint::in_metres;
+use super::job::{JobCx, PreviewPicture};
+use crate::domain::diffusion::{GenerateConfig, Progress};
+use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::postprocess::{DepthChain, RawPrediction, ShiftMode};
+use crate::domain::sensor::gelslim;
+use crate::infer::bundle::GeneratorSpec;
+use crate::infer::engine::{EngineChoice, EngineKind, resolve};
+use crate::infer::generator::{GenerateError, Generator, Item, Observer};
+use crate::infer::mask::MaskModel;
+use crate::infer::recipe::{Recipe, input_digest};
+use crate::infer::store::Store;
+
+/// Predictions of one touch that are read back; older ones stay on the disk.
+const LISTED: usize = 16;
+
+/// Per range mapping the steps to metres, or why it cannot be done.
+pub type Chains = Arc<BTreeMap<ShiftMode, Result<DepthChain, String>>>;
+
+/// A prediction: the decoder's picture, with the ways to metres.
+#[derive(Clone, Debug)]
+pub struct Prediction {
+    /// The decoder's picture.
+    pub raw: RawPrediction,
+    /// The ways to metres that its bundle offers.
+    pub chains: Chains,
+    /// The identity of the generator's bundle.
+    pub bundle: Arc<str>,
+    /// The engine that made it, for people.
+    pub engine: String,
+    /// Time that making it took, seconds; what was made together shares its time.
+    pub seconds: f64,
+    /// Whether it was made earlier and only read now.
+    pub kept: bool,
+}
+
+/// A prediction to be made.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted<'a> {
+    /// The condition: a GelSlim difference image.
+    pub difference: &'a RgbGrid,
+    /// Seed of its noise.
+    pub seed: u64,
+    /// `[width, height]` of the bubble image, for pictures on the way; `[0, 0]` where there is none.
+    pub size: [usize; 2],
+}
+
+/// A prediction from the disk, with the choices that made it.
+#[derive(Clone, Debug)]
+pub struct KeptPrediction {
+    /// The engine to ask for to make it again.
+    pub engine: EngineChoice,
+    /// The choices.
+    pub config: GenerateConfig,
+    /// The prediction.
+    pub prediction: Prediction,
+}
+
+/// A model in memory, with the bundle's identity and the engine it was loaded for.
+type Loaded<T> = Vec<((Arc<str>, EngineChoice), T)>;
+
+/// The models of a run of the program. Shared by threads; each model runs on one at a time.
+#[derive(Debug)]
+pub struct Models {
+    store: Option<Mutex<Store>>,
+    generators: Mutex<Loaded<Generator>>,
+    masks: Mutex<Loaded<MaskModel>>,
+    chains: Mutex<BTreeMap<Arc<str>, Chains>>,
+    /// Generators that stay loaded side by side.
+    most: usize,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn chains_of(spec: &GeneratorSpec) -> Chains {
+    Arc::new(ShiftMode::iter().map(|mode| (mode, spec.depth_chain(mode).map_err(|err| err.to_string()))).collect())
+}
+
+/// The model of `key`, loaded by `load` if it is not there; the one used longest ago makes room before that.
+fn ready<'m, T>(
+    loaded: &'m mut Loaded<T>,
+    key: (Arc<str>, EngineChoice),
+    most: usize,
+    load: impl FnOnce() -> Result<T, TaskError>,
+) -> Result<&'m mut T, TaskError> {
+    match loaded.iter().position(|(known, _)| *known == key) {
+        Some(at) => {
+            let used = loaded.remove(at);
+            loaded.push(used);
+        }
+        None => {
+            // Before the new one is loaded, so that memory never holds one more than it may.
+            while loaded.len() >= most.max(1) {
+                loaded.remove(0);
+            }
+            let model = load()?;
+            loaded.push((key, model));
+        }
+    }
+    let (_, model) = loaded.last_mut().expect("one was just put there");
+    Ok(model)
+}
+
+impl Default for Models {
+    fn default() -> Self {
+        Self::new(None)
+    }
+}
+
+impl Models {
+    /// Nothing is loaded yet. Predictions are kept in `store` and taken from it; `None` keeps none.
+    pub fn new(store: Option<Store>) -> Self {
+        Self {
+            store: store.map(Mutex::new),
+            generators: Mutex::default(),
+            masks: Mutex::default(),
+            chains: Mutex::default(),
+            most: 1,
+        }
+    }
+
+    /// The same with several generators side by side in memory.
+    #[must_use]
+    pub fn side_by_side(self, generators: usize) -> Self {
+        Self { most: generators, ..self }
+    }
+
+    /// Sets what kept predictions may take, bytes.
+    pub fn keep_at_most(&self, bytes: u64) {
+        if let Some(store) = &self.store {
+            lock(store).set_budget(bytes);
+        }
+    }
+
+    /// The ways to metres that a generator's bundle offers; none for another kind.
+    ///
+    /// # Errors
+    /// If the bundle cannot be opened.
+    pub fn chains(&self, bundle: &BundleInfo) -> Result<Chains, TaskError> {
+        if let Some(known) = lock(&self.chains).get(&bundle.id) {
+            return Ok(known.clone());
+        }
+        let opened = bundle.open(&format!("Open {}", bundle.name))?;
+        let chains = opened.generator().map(chains_of).unwrap_or_default();
+        lock(&self.chains).insert(bundle.id.clone(), chains.clone());
+        Ok(chains)
+    }
+
+    /// Predictions, all of one call in one batch; one answer for each, in order. What was made before is not made
+    /// again.
+    ///
+    /// # Errors
+    /// If the model cannot be loaded or run, the choices are not for this bundle, or the job was told to stop.
+    pub fn predict(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[Wanted<'_>],
+        cx: &JobCx,
+    ) -> Result<Vec<Prediction>, TaskError> {
+        self.make(self.store.as_ref(), bundle, engine, config, wanted, cx)
+    }
+
+    fn make(
+        &self,
+        store: Option<&Mutex<Store>>,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[Wanted<'_>],
+        cx: &JobCx,
+    ) -> Result<Vec<Prediction>, TaskError> {
+        let what = format!("Generate with {}", bundle.name);
+        let fail = |err: GenerateError| match err {
+            GenerateError::Cancelled => TaskError::cancelled(&what),
+            err => TaskError::from_error(&what, &err),
+        };
+        if wanted.is_empty() {
+            return Ok(Vec::new());
+        }
+        let kind = resolve(engine).map_err(|err| fail(err.into()))?;
+        let (images, image) = distinct(wanted);
+        let digests: Vec<String> = images.iter().map(|difference| input_digest(difference)).collect();
+        let recipe = |(item, at): (&Wanted<'_>, &usize)| {
+            let config = GenerateConfig { seed: item.seed, ..*config };
+            Recipe::new(digests[*at].clone(), bundle.id.as_ref().to_owned(), kind, &config)
+        };
+        let keys: Vec<Recipe> = wanted.iter().zip(&image).map(recipe).collect();
+        let mut answers: Vec<Option<(RawPrediction, f64, bool)>> = match store {
+            Some(store) => {
+                let store = lock(store);
+                keys.iter().map(|key| store.get(key).map(|found| (found.raw, found.seconds, true))).collect()
+            }
+            None => vec![None; wanted.len()],
+        };
+        let fresh: Vec<usize> = (0..wanted.len()).filter(|at| answers[*at].is_none()).collect();
+        // Nothing has to be loaded to show what is there.
+        let chains = self.chains(bundle)?;
+        if !fresh.is_empty() {
+            let mut loaded = lock(&self.generators);
+            let generator = ready(&mut loaded, (bundle.id.clone(), engine), self.most, || {
+                cx.progress(0, config.steps.into(), "loading the model");
+                Generator::open(&bundle.open(&what)?, engine).map_err(fail)
+            })?;
+            let begin = std::time::Instant::now();
+            let items: Vec<Item> = fresh.iter().map(|&at| Item { image: image[at], seed: wanted[at].seed }).collect();
+            let mut follow = Follow { cx, wanted, fresh: &fresh, chains: &chains };
+            let made = generator.run(&images, &items, config, &mut follow).map_err(fail)?;
+            let each = begin.elapsed().as_secs_f64() / fresh.len() as f64;
+            for (&at, raw) in fresh.iter().zip(made) {
+                if let Some(store) = store
+                    && let Err(err) = lock(store).put(&keys[at], &raw, each)
+                {
+                    log::warn!("a prediction could not be kept on the disk: {err}");
+                }
+                answers[at] = Some((raw, each, false));
+            }
+        }
+        let prediction = |(raw, seconds, kept)| Prediction {
+            raw,
+            chains: chains.clone(),
+            bundle: bundle.id.clone(),
+            engine: kind.label().to_owned(),
+            seconds,
+            kept,
+        };
+        Ok(answers.into_iter().flatten().map(prediction).collect())
+    }
+
+    /// Loads a generator and runs it once on two blank images, so that the first touch does not wait for memory and
+    /// kernels; the result is not kept.
+    ///
+    /// # Errors
+    /// As [`Self::predict`].
+    pub fn warm_up(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        config: &GenerateConfig,
+    ) -> Result<Prediction, TaskError> {
+        let blank = RgbGrid::filled(gelslim::WIDTH, gelslim::HEIGHT, [0.0; 3]);
+        // Both fingers of a grasp go through the model together.
+        let item = |seed| Wanted { difference: &blank, seed, size: [0, 0] };
+        let both = [item(config.seed), item(config.seed.wrapping_add(1))];
+        let made = self.make(None, bundle, engine, config, &both, &JobCx::unwatched())?.pop();
+        made.ok_or_else(|| TaskError::new(format!("Generate with {}", bundle.name), "the model gave no answer"))
+    }
+
+    /// What was made of an image before and is kept on the disk, oldest first, as far as its bundle is among `bundles`.
+    /// `engine` is the choice in force: what it stands for is said so. Never fails: what cannot be read is not there.
+    pub fn kept(&self, bundles: &[BundleInfo], engine: EngineChoice, difference: &RgbGrid) -> Vec<KeptPrediction> {
+        let Some(store) = &self.store else { return Vec::new() };
+        let found = lock(store).of_input(&input_digest(difference), LISTED);
+        let in_force = resolve(engine).ok();
+        let mut kept = Vec::new();
+        // Oldest first: the last one is the one shown.
+        for stored in found.into_iter().rev() {
+            let Some(bundle) = bundles.iter().find(|bundle| *bundle.id == *stored.recipe.bundle) else { continue };
+            let Ok(chains) = self.chains(bundle) else { continue };
+            let engine = match stored.recipe.engine {
+                made if Some(made) == in_force => engine,
+                EngineKind::Rten => EngineChoice::Rten,
+                EngineKind::Ort => EngineChoice::Ort,
+            };
+            let prediction = Prediction {
+                raw: stored.raw,
+                chains,
+                bundle: bundle.id.clone(),
+                engine: stored.recipe.engine.label().to_owned(),
+                seconds: stored.seconds,
+                kept: true,
+            };
+            kept.push(KeptPrediction { engine, config: stored.recipe.config(), prediction });
+        }
+        kept
+    }
+
+    /// What the mask model says of an imprint in metres.
+    ///
+    /// # Errors
+    /// If the model cannot be loaded or run.
+    pub fn mask(&self, bundle: &BundleInfo, engine: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
+        let what = format!("Mask with {}", bundle.name);
+        let mut loaded = lock(&self.masks);
+        let model = ready(&mut loaded, (bundle.id.clone(), engine), 1, || {
+            MaskModel::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
+        })?;
+        model.predict(imprint).map_err(|err| TaskError::from_error(&what, &err))
+    }
+}
+
+/// The images of some items, each once (both fingers of a grasp have their own, many seeds share one), and which is
+/// whose.
+fn distinct<'a>(wanted: &[Wanted<'a>]) -> (Vec<&'a RgbGrid>, Vec<usize>) {
+    let mut images: Vec<&RgbGrid> = Vec::new();
+    let mut of = |difference: &'a RgbGrid| match images.iter().position(|known| std::ptr::eq(*known, difference)) {
+        Some(at) => at,
+        None => {
+            images.push(difference);
+            images.len() - 1
+        }
+    };
+    let image = wanted.iter().map(|item| of(item.difference)).collect();
+    (images, image)
+}
+
+/// Progress, Cancel and previews of a run.
+struct Follow<'a> {
+    cx: &'a JobCx,
+    wanted: &'a [Wanted<'a>],
+    /// Which of them are made.
+    fresh: &'a [usize],
+    chains: &'a Chains,
+}
+
+impl Follow<'_> {
+    fn shift(&self, after: Progress, item: usize) -> Option<(usize, ShiftMode)> {
+        let at = *self.fresh.get(item)?;
+        Some((at, self.cx.previews()?.wants(at, after.step)?))
+    }
+}
+
+impl Observer for Follow<'_> {
+    fn progress(&mut self, p: Progress) -> ControlFlow<()> {
+        self.cx.progress(p.step.into(), p.of.into(), format!("step {} of {}", p.step, p.of));
+        if self.cx.cancel.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn wants_preview(&mut self, after: Progress, item: usize) -> bool {
+        self.shift(after, item).is_some()
+    }
+
+    fn preview(&mut self, after: Progress, item: usize, raw: RawPrediction) {
+        let Some((at, shift)) = self.shift(after, item) else { return };
+        let Some(Ok(chain)) = self.chains.get(&shift) else { return };
+        if let (Ok(depth), Some(previews)) = (in_metres(chain, &raw, self.wanted[at].size), self.cx.previews()) {
+            previews.show(at, PreviewPicture { step: after.step, of: after.of, depth });
+        }
+    }
+}
