@@ -3,97 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-use strum::EnumIter;
-
-use super::keys::{ImprintSource, Revision};
+use super::keys::Revision;
 use crate::domain::grid::Mask;
-use crate::domain::hand::AcceptedPose;
 use crate::domain::sensor::Finger;
 use crate::work::error::TaskError;
-
-/// How far the review of a pair is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum Review {
-    /// Nobody looked at it.
-    #[default]
-    Todo,
-    /// Its mask was touched.
-    InProgress,
-    /// Something about it is wrong.
-    Flagged,
-    /// Finished.
-    Done,
-    /// Left out on purpose.
-    Skip,
-}
-
-impl Review {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Todo => "todo",
-            Self::InProgress => "in progress",
-            Self::Flagged => "flagged",
-            Self::Done => "done",
-            Self::Skip => "skip",
-        }
-    }
-
-    /// The name in files.
-    pub fn stored(self) -> &'static str {
-        match self {
-            Self::InProgress => "in_progress",
-            other => other.name(),
-        }
-    }
-
-    /// The state of a name in files; `None` for an unknown one.
-    pub fn from_stored(name: &str) -> Option<Self> {
-        use strum::IntoEnumIterator as _;
-        Self::iter().find(|review| review.stored() == name)
-    }
-
-    /// Whether nothing more is to be done.
-    pub fn is_finished(self) -> bool {
-        matches!(self, Self::Done | Self::Skip)
-    }
-}
-
-/// A mask that a person corrected.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HandMask {
-    /// The pixels, in raw bubble orientation, as large as the imprint.
-    pub mask: Arc<Mask>,
-    /// Changes with every change of the pixels; equal revisions are equal masks.
-    pub revision: Revision,
-    /// What it was before the first correction, for the label: e.g. `Threshold 5.00 mm`.
-    pub base: String,
-}
-
-/// What a person said about one pair.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PairLabels {
-    /// Corrected masks by [`Finger::index`].
-    pub masks: [Option<HandMask>; 2],
-    /// The review state.
-    pub review: Review,
-    /// Accepted `grasp_from_object` poses: from the measured, from the predicted imprint.
-    pub accepted: [Option<AcceptedPose>; 2],
-}
-
-impl PairLabels {
-    /// Whether it says nothing, so that nothing need be stored.
-    pub fn is_empty(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// The pose accepted for `source`.
-    pub fn accepted(&self, source: ImprintSource) -> Option<AcceptedPose> {
-        self.accepted[source as usize]
-    }
-}
+pub use crate::work::labels::{HandMask, PairLabels, Review};
 
 /// What happened when the stored labels of a pair were read.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -8,6 +8,7 @@ use strum::EnumIter;
 pub use crate::domain::bits::Bits;
 pub use crate::domain::diffusion::{Preset, Sampler, Spacing};
 pub use crate::domain::postprocess::ShiftMode;
+pub use crate::work::labels::{ImprintSource, Revision};
 pub use crate::work::mask::MaskRecipe;
 
 use crate::domain::align::basin::Plane;
@@ -108,26 +109,6 @@ impl PredictionKey {
     }
 }
 
-/// Which imprint of a touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum ImprintSource {
-    /// What the Soft Bubble measured.
-    Measured,
-    /// What the generator predicts from the GelSlim image.
-    Predicted,
-}
-
-impl ImprintSource {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Measured => "Measured",
-            Self::Predicted => "Predicted",
-        }
-    }
-}
-
 /// One imprint in metres.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum ImprintKey {
@@ -155,10 +136,6 @@ pub struct MaskKey {
     /// The recipe.
     pub recipe: MaskRecipe,
 }
-
-/// Counts changes: equal revisions of the same thing are equal. Never reused within a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Revision(pub u64);
 
 /// The mask in force, as part of a recipe.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

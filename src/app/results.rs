@@ -256,17 +256,4 @@ mod tests {
         cache.retain(|_| false);
         assert_eq!((cache.len(), cache.bytes()), (0, 0));
     }
-
-    #[test]
-    fn points_are_found_by_pixel() {
-        let cloud = FingerCloud {
-            points: vec![DVec3::ZERO; 3],
-            pixels: vec![[5, 0], [1, 2], [3, 2]],
-            contact: vec![false, true, true],
-        };
-        assert_eq!(cloud.at_pixel(3, 2), Some(2));
-        assert_eq!(cloud.at_pixel(2, 2), None);
-        let clouds = Clouds { fingers: [None, Some(cloud)] };
-        assert_eq!(clouds.contact_points().len(), 2);
-    }
 }

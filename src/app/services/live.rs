@@ -3,13 +3,13 @@
 
 mod follow;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use super::super::command::Opened;
-use super::super::document::{HandMask, PairLabels, Review};
-use super::super::keys::{PredictionKey, Revision, TouchKey};
+use super::super::document::{PairLabels, Review};
+use super::super::keys::{PredictionKey, TouchKey};
 use super::super::library::Place;
 use super::super::settings::{SETTINGS_VERSION, Settings};
 use super::{DataSource, Following, Services};
@@ -18,17 +18,16 @@ use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::infer::engine::EngineChoice;
 use crate::infer::store::{self, Store};
 use crate::io::atomic;
 use crate::io::dataset::Dataset;
-use crate::io::export_unet::{self, ExportConfig, ExportEntry};
-use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::{self, BundleInfo};
 use crate::work::error::TaskError;
+use crate::work::export::{ExportSetup, HandMasks, export_masks};
 use crate::work::job::JobCx;
+use crate::work::labels::Labels;
 use crate::work::models::{KeptPrediction, Models, Prediction, Wanted};
 
 /// The settings file inside the configuration folder.
@@ -41,10 +40,6 @@ const BAD_SETTINGS_FILE: &str = "settings.bad.json";
 pub struct LiveServices {
     config_folder: Option<PathBuf>,
     models: Models,
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl LiveServices {
@@ -88,39 +83,19 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
             .map_err(|err| TaskError::from_error(format!("Open {place}"), &err).with_hint(err.hint()))?,
     };
     let mut problems = dataset.problems.clone();
-    let store = MaskStore::for_dataset(&dataset);
-    let mut reviews = BTreeMap::new();
-    match &store {
-        Ok(store) => {
-            let (stored, mut damaged) = store.reviews();
-            problems.append(&mut damaged);
-            for (pair, review) in stored {
-                match Review::from_stored(&review.review) {
-                    Some(Review::Todo) | None => {}
-                    Some(review) => {
-                        reviews.insert(pair, review);
-                    }
-                }
-            }
-        }
-        Err(err) => problems.push(Problem {
-            file: dataset.root.clone().unwrap_or_default(),
-            what: err.to_string(),
-            hint: err.hint().into(),
-        }),
-    }
-    Ok(LiveSource { dataset: Arc::new(dataset), store, problems, reviews, saved: Arc::default() })
+    let labels = Labels::of(&dataset);
+    let (reviews, mut damaged) = labels.reviews();
+    problems.append(&mut damaged);
+    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews })
 }
 
 /// An open data set with its store of labels.
 #[derive(Debug)]
 pub struct LiveSource {
     dataset: Arc<Dataset>,
-    store: Result<MaskStore, StoreError>,
+    labels: Labels,
     problems: Vec<Problem>,
     reviews: BTreeMap<String, Review>,
-    /// What is on the disk, as far as it was read or written here: only differences are written.
-    saved: Arc<Mutex<BTreeMap<String, PairLabels>>>,
 }
 
 impl LiveSource {
@@ -128,14 +103,6 @@ impl LiveSource {
     pub fn dataset(&self) -> &Dataset {
         &self.dataset
     }
-
-    fn store(&self, what: &str) -> Result<&MaskStore, TaskError> {
-        self.store.as_ref().map_err(|err| store_error(what, err))
-    }
-}
-
-fn store_error(what: &str, err: &StoreError) -> TaskError {
-    TaskError::from_error(what, err).with_hint(err.hint())
 }
 
 impl DataSource for LiveSource {
@@ -181,58 +148,11 @@ impl DataSource for LiveSource {
     }
 
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {
-        let what = format!("Labels of {name}");
-        // Without a place for labels there are none; saving says why.
-        let Ok(store) = &self.store else { return Ok(PairLabels::default()) };
-        let fail = |err: StoreError| store_error(&what, &err);
-        let mut labels = PairLabels::default();
-        for finger in Finger::BOTH {
-            labels.masks[finger.index()] = store.load(name, finger).map_err(fail)?.map(|stored| HandMask {
-                mask: Arc::new(stored.mask),
-                revision: Revision::default(),
-                base: stored.base,
-            });
-        }
-        if let Some(stored) = store.load_review(name).map_err(fail)? {
-            labels.review = Review::from_stored(&stored.review).ok_or_else(|| {
-                TaskError::new(&what, format!("the review state \"{}\" is not known", stored.review))
-                    .with_hint("It may come from a newer version of this program.")
-            })?;
-            labels.accepted = stored.accepted;
-        }
-        lock(&self.saved).insert(name.to_owned(), labels.clone());
-        Ok(labels)
+        self.labels.load(name)
     }
 
     fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError> {
-        let what = format!("Save the labels of {name}");
-        let store = self.store(&what)?;
-        let fail = |err: StoreError| store_error(&what, &err);
-        let before = lock(&self.saved).get(name).cloned().unwrap_or_default();
-        for finger in Finger::BOTH {
-            let at = finger.index();
-            let same = match (&before.masks[at], &labels.masks[at]) {
-                (None, None) => true,
-                (Some(a), Some(b)) => a.mask == b.mask && a.base == b.base,
-                _ => false,
-            };
-            if same {
-                continue;
-            }
-            let stored = labels.masks[at].as_ref().map(|hand| StoredMask {
-                mask: (*hand.mask).clone(),
-                base: hand.base.clone(),
-                person: masks::person(),
-                saved_unix_s: masks::now_unix_s(),
-            });
-            store.save(name, finger, stored.as_ref()).map_err(fail)?;
-        }
-        if before.review != labels.review || before.accepted != labels.accepted {
-            let review = StoredReview { review: labels.review.stored().into(), accepted: labels.accepted };
-            store.save_review(name, &review).map_err(fail)?;
-        }
-        lock(&self.saved).insert(name.to_owned(), labels.clone());
-        Ok(())
+        self.labels.save(name, labels)
     }
 
     fn export_masks(
@@ -241,58 +161,10 @@ impl DataSource for LiveSource {
         folder: &Path,
         cx: &JobCx,
     ) -> Result<String, TaskError> {
-        const WHAT: &str = "Export masks";
-        let known: BTreeMap<&str, PairId> =
-            (0u32..).zip(&self.dataset.index.pairs).map(|(id, entry)| (entry.name.as_str(), PairId(id))).collect();
-        // What is on the disk, and over it what was changed since.
-        let mut wanted: BTreeSet<(String, Finger)> =
-            self.store.as_ref().map_or_else(|_| Vec::new(), MaskStore::masks).into_iter().collect();
-        for (pair, labels) in changed {
-            for finger in Finger::BOTH {
-                let key = (pair.clone(), finger);
-                if labels.masks[finger.index()].is_some() {
-                    wanted.insert(key);
-                } else {
-                    wanted.remove(&key);
-                }
-            }
-        }
-        let review = |pair: &str| {
-            changed.get(pair).map(|l| l.review).or_else(|| self.reviews.get(pair).copied()).unwrap_or_default()
-        };
-        wanted.retain(|(pair, _)| known.contains_key(pair.as_str()) && review(pair) != Review::Skip);
-        let entries: Vec<ExportEntry> = wanted
-            .into_iter()
-            .map(|(pair, finger)| {
-                let tool = known.get(pair.as_str()).and_then(|id| self.dataset.index.get(*id)?.tool.clone());
-                ExportEntry { pair, tool, finger }
-            })
-            .collect();
-        if entries.is_empty() {
-            return Err(TaskError::new(WHAT, "no mask was corrected yet")
-                .with_hint("Correct masks, or take automatic ones over with \"Threshold to mask\" (T)."));
-        }
-        let total = entries.len() as u64;
-        let report = export_unet::export(folder, &entries, &ExportConfig::default(), |at| {
-            let entry = &entries[at];
-            cx.check(WHAT)?;
-            cx.progress(at as u64, total, format!("{}, {}", entry.pair, entry.finger.name()));
-            let sample = self.load(known[entry.pair.as_str()])?;
-            let bubble = sample.finger(entry.finger).and_then(|touch| touch.bubble.as_ref());
-            let imprint = bubble.ok_or_else(|| TaskError::new(WHAT, "the finger has no imprint"))?.imprint.clone();
-            let mask = match changed.get(&entry.pair).and_then(|l| l.masks[entry.finger.index()].as_ref()) {
-                Some(hand) => (*hand.mask).clone(),
-                None => {
-                    let stored = self.store(WHAT)?.load(&entry.pair, entry.finger)?;
-                    stored.ok_or_else(|| TaskError::new(WHAT, "its mask disappeared"))?.mask
-                }
-            };
-            Ok((imprint, mask))
-        })
-        .map_err(|err| {
-            if cx.cancel.is_cancelled() { TaskError::cancelled(WHAT) } else { TaskError::from_error(WHAT, &err) }
-        })?;
-        let [train, val, test] = report.counts;
+        let masks = HandMasks { labels: &self.labels, changed };
+        let done = export_masks(&self.dataset, &masks, &ExportSetup::default(), folder, None, cx)?;
+        let [train, val, test] = done.report.counts;
+        let total = train + val + test;
         Ok(format!("Exported {total} masks to {} ({train} train, {val} val, {test} test)", folder.display()))
     }
 }

@@ -1,26 +1,26 @@
 //! Following a folder: the same follower as `touch2touch watch`.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::Instant;
 
-use super::super::super::document::{PairLabels, Review};
+use super::super::super::document::Review;
 use super::super::{DataSource, Followed, Following};
 use super::LiveSource;
 use crate::io::follow::{Arrival, Follower};
-use crate::io::masks::MaskStore;
 use crate::work::error::TaskError;
+use crate::work::labels::Labels;
 
 struct LiveFollowing {
     follower: Follower,
     reviews: BTreeMap<String, Review>,
-    saved: Arc<Mutex<BTreeMap<String, PairLabels>>>,
+    labels: Labels,
 }
 
 /// `None` for the demo.
 pub(super) fn start(source: &LiveSource) -> Option<Box<dyn Following>> {
     let follower = Follower::continuing(source.dataset.clone())?;
-    Some(Box::new(LiveFollowing { follower, reviews: source.reviews.clone(), saved: source.saved.clone() }))
+    Some(Box::new(LiveFollowing { follower, reviews: source.reviews.clone(), labels: source.labels.clone() }))
 }
 
 impl Following for LiveFollowing {
@@ -36,11 +36,9 @@ impl Following for LiveFollowing {
         };
         let dataset = self.follower.dataset()?.clone();
         let source: Arc<dyn DataSource> = Arc::new(LiveSource {
-            store: MaskStore::for_dataset(&dataset),
+            labels: self.labels.continued(&dataset),
             problems: dataset.problems.clone(),
             reviews: self.reviews.clone(),
-            // What was written since the opening stays known.
-            saved: self.saved.clone(),
             dataset,
         });
         Some(Followed { source, pair: ready.id, completed: ready.completed, sample })

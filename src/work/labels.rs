@@ -1,0 +1,251 @@
+//! [`Labels`]: what people said about the pairs of a data set (masks drawn by hand, review states, accepted poses), as
+//! it lies on the disk. The studio and every verb read and write it here.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
+
+use super::error::TaskError;
+use crate::domain::dataset::Problem;
+use crate::domain::grid::Mask;
+use crate::domain::hand::AcceptedPose;
+use crate::domain::sensor::Finger;
+use crate::io::dataset::Dataset;
+use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
+
+/// Which imprint of a touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum ImprintSource {
+    /// What the Soft Bubble measured.
+    Measured,
+    /// What the generator predicts from the GelSlim image.
+    Predicted,
+}
+
+impl ImprintSource {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "Measured",
+            Self::Predicted => "Predicted",
+        }
+    }
+}
+
+/// How far the review of a pair is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Review {
+    /// Nobody looked at it.
+    #[default]
+    Todo,
+    /// Its mask was touched.
+    InProgress,
+    /// Something about it is wrong.
+    Flagged,
+    /// Finished.
+    Done,
+    /// Left out on purpose.
+    Skip,
+}
+
+impl Review {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Todo => "todo",
+            Self::InProgress => "in progress",
+            Self::Flagged => "flagged",
+            Self::Done => "done",
+            Self::Skip => "skip",
+        }
+    }
+
+    /// The name in files.
+    pub fn stored(self) -> &'static str {
+        match self {
+            Self::InProgress => "in_progress",
+            other => other.name(),
+        }
+    }
+
+    /// The state of a name in files; `None` for an unknown one.
+    pub fn from_stored(name: &str) -> Option<Self> {
+        use strum::IntoEnumIterator as _;
+        Self::iter().find(|review| review.stored() == name)
+    }
+
+    /// Whether nothing more is to be done.
+    pub fn is_finished(self) -> bool {
+        matches!(self, Self::Done | Self::Skip)
+    }
+}
+
+/// Counts changes: equal revisions of the same thing are equal. Never reused within a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Revision(pub u64);
+
+/// A mask that a person corrected.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandMask {
+    /// The pixels, in raw bubble orientation, as large as the imprint.
+    pub mask: Arc<Mask>,
+    /// Changes with every change of the pixels; equal revisions are equal masks.
+    pub revision: Revision,
+    /// What it was before the first correction, for the label: e.g. `Threshold 5.00 mm`.
+    pub base: String,
+}
+
+/// What a person said about one pair.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PairLabels {
+    /// Corrected masks by [`Finger::index`].
+    pub masks: [Option<HandMask>; 2],
+    /// The review state.
+    pub review: Review,
+    /// Accepted `grasp_from_object` poses: from the measured, from the predicted imprint.
+    pub accepted: [Option<AcceptedPose>; 2],
+}
+
+impl PairLabels {
+    /// Whether it says nothing, so that nothing need be stored.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The pose accepted for `source`.
+    pub fn accepted(&self, source: ImprintSource) -> Option<AcceptedPose> {
+        self.accepted[source as usize]
+    }
+}
+
+/// The labels of an open data set. Clones share what they know.
+#[derive(Clone, Debug)]
+pub struct Labels {
+    store: Arc<Result<MaskStore, StoreError>>,
+    /// What is on the disk, as far as it was read or written here: only differences are written.
+    saved: Arc<Mutex<BTreeMap<String, PairLabels>>>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn store_error(what: &str, err: &StoreError) -> TaskError {
+    TaskError::from_error(what, err).with_hint(err.hint())
+}
+
+impl Labels {
+    /// Those of a data set; where there is no place for labels, there are none, and saving says why.
+    pub fn of(dataset: &Dataset) -> Self {
+        Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: Arc::default() }
+    }
+
+    /// The same of a data set that grew: what was written since the opening stays known.
+    #[must_use]
+    pub fn continued(&self, dataset: &Dataset) -> Self {
+        Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: self.saved.clone() }
+    }
+
+    /// The folder they lie in.
+    ///
+    /// # Errors
+    /// If there is no place for labels.
+    pub fn folder(&self) -> Result<&Path, TaskError> {
+        Ok(self.store("Labels")?.folder())
+    }
+
+    fn store(&self, what: &str) -> Result<&MaskStore, TaskError> {
+        (*self.store).as_ref().map_err(|err| store_error(what, err))
+    }
+
+    /// The review states that are not "todo", by pair name, and the files that cannot be read.
+    pub fn reviews(&self) -> (BTreeMap<String, Review>, Vec<Problem>) {
+        let store = match &*self.store {
+            Ok(store) => store,
+            Err(err) => {
+                let problem =
+                    Problem { file: std::path::PathBuf::new(), what: err.to_string(), hint: err.hint().into() };
+                return (BTreeMap::new(), vec![problem]);
+            }
+        };
+        let (stored, damaged) = store.reviews();
+        let known = |(pair, review): (String, StoredReview)| {
+            let review = Review::from_stored(&review.review).filter(|review| *review != Review::Todo)?;
+            Some((pair, review))
+        };
+        (stored.into_iter().filter_map(known).collect(), damaged)
+    }
+
+    /// The pairs and fingers that have a mask drawn by hand.
+    pub fn masks(&self) -> Vec<(String, Finger)> {
+        (*self.store).as_ref().map_or_else(|_| Vec::new(), MaskStore::masks)
+    }
+
+    /// Reads the labels of a pair; empty if there are none.
+    ///
+    /// # Errors
+    /// If there are some and they cannot be read: then they must not be written either.
+    pub fn load(&self, name: &str) -> Result<PairLabels, TaskError> {
+        let what = format!("Labels of {name}");
+        // Without a place for labels there are none; saving says why.
+        let Ok(store) = &*self.store else { return Ok(PairLabels::default()) };
+        let fail = |err: StoreError| store_error(&what, &err);
+        let mut labels = PairLabels::default();
+        for finger in Finger::BOTH {
+            labels.masks[finger.index()] = store.load(name, finger).map_err(fail)?.map(|stored| HandMask {
+                mask: Arc::new(stored.mask),
+                revision: Revision::default(),
+                base: stored.base,
+            });
+        }
+        if let Some(stored) = store.load_review(name).map_err(fail)? {
+            labels.review = Review::from_stored(&stored.review).ok_or_else(|| {
+                TaskError::new(&what, format!("the review state \"{}\" is not known", stored.review))
+                    .with_hint("It may come from a newer version of this program.")
+            })?;
+            labels.accepted = stored.accepted;
+        }
+        lock(&self.saved).insert(name.to_owned(), labels.clone());
+        Ok(labels)
+    }
+
+    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub fn save(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError> {
+        let what = format!("Save the labels of {name}");
+        let store = self.store(&what)?;
+        let fail = |err: StoreError| store_error(&what, &err);
+        let before = lock(&self.saved).get(name).cloned().unwrap_or_default();
+        for finger in Finger::BOTH {
+            let at = finger.index();
+            let same = match (&before.masks[at], &labels.masks[at]) {
+                (None, None) => true,
+                (Some(a), Some(b)) => a.mask == b.mask && a.base == b.base,
+                _ => false,
+            };
+            if same {
+                continue;
+            }
+            let stored = labels.masks[at].as_ref().map(|hand| StoredMask {
+                mask: (*hand.mask).clone(),
+                base: hand.base.clone(),
+                person: masks::person(),
+                saved_unix_s: masks::now_unix_s(),
+            });
+            store.save(name, finger, stored.as_ref()).map_err(fail)?;
+        }
+        if before.review != labels.review || before.accepted != labels.accepted {
+            let review = StoredReview { review: labels.review.stored().into(), accepted: labels.accepted };
+            store.save_review(name, &review).map_err(fail)?;
+        }
+        lock(&self.saved).insert(name.to_owned(), labels.clone());
+        Ok(())
+    }
+}
