@@ -97,6 +97,14 @@ pub enum LoadError {
         /// Width and height of each.
         sizes: [[usize; 2]; 2],
     },
+    /// The program failed on the pair's files.
+    #[error("reading the pair failed, which is a bug: {message} ({})", names(files))]
+    Bug {
+        /// The pair's files.
+        files: Vec<PathBuf>,
+        /// What the panic said.
+        message: String,
+    },
     /// The pair is not one of this dataset.
     #[error("the dataset has no pair number {}", id.0)]
     NoSuchPair {
@@ -112,6 +120,7 @@ impl LoadError {
             Self::Pt(err) => Some(err.file()),
             Self::Picture(err) => Some(err.file()),
             Self::Sizes { file, .. } => Some(file),
+            Self::Bug { files, .. } => files.first().map(PathBuf::as_path),
             Self::NoSuchPair { .. } => None,
         }
     }
@@ -122,6 +131,7 @@ impl LoadError {
             Self::Pt(err) => err.hint(),
             Self::Picture(err) => err.hint(),
             Self::Sizes { .. } => "take both images with the same camera settings",
+            Self::Bug { .. } => "please report it with these files; the other pairs are not affected",
             Self::NoSuchPair { .. } => "open the dataset again",
         }
     }
@@ -273,16 +283,24 @@ impl Dataset {
         if self.index.get(id).is_none() {
             return Err(LoadError::NoSuchPair { id });
         }
-        let mut loaded = match &self.source {
-            Source::Lab(lab) => lab.load(id)?,
-            Source::Pictures(pictures) => pictures.load(id)?,
-            Source::BuiltIn(set) => {
-                let sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
-                Loaded { sample, notes: Vec::new(), invalid: Default::default() }
-            }
-        };
-        self.lend_cameras(&mut loaded.sample);
-        Ok(loaded)
+        self.caught(id, || {
+            let mut loaded = match &self.source {
+                Source::Lab(lab) => lab.load(id)?,
+                Source::Pictures(pictures) => pictures.load(id)?,
+                Source::BuiltIn(set) => {
+                    let sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
+                    Loaded { sample, notes: Vec::new(), invalid: Default::default() }
+                }
+            };
+            self.lend_cameras(&mut loaded.sample);
+            Ok(loaded)
+        })
+    }
+
+    /// Reads something of a pair. A panic is that pair's error: no file may end a run over others.
+    fn caught<T>(&self, id: PairId, read: impl FnOnce() -> Result<T, LoadError>) -> Result<T, LoadError> {
+        super::caught::caught(read)
+            .unwrap_or_else(|message| Err(LoadError::Bug { files: self.pair_files(id), message }))
     }
 
     /// The tool's CAD model in metres and the object frame; `None` where the dataset has none.
@@ -323,7 +341,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn bubble_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => pictures.tile(id, pictures::BUBBLE, laid),
+            Source::Pictures(pictures) => self.caught(id, || pictures.tile(id, pictures::BUBBLE, laid)),
             Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
@@ -335,7 +353,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn vqvae_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => pictures.tile(id, pictures::VQVAE, laid),
+            Source::Pictures(pictures) => self.caught(id, || pictures.tile(id, pictures::VQVAE, laid)),
             Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
@@ -346,7 +364,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn gelslim_is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => pictures.is_clipped(id),
+            Source::Pictures(pictures) => self.caught(id, || pictures.is_clipped(id)),
             Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
@@ -369,6 +387,10 @@ fn last_integer(text: &str) -> u64 {
     text[start..=end].parse().unwrap_or(u64::MAX)
 }
 
+fn names(files: &[PathBuf]) -> String {
+    files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
+}
+
 fn problem(file: impl Into<PathBuf>, what: impl Into<String>, hint: impl Into<String>) -> Problem {
     Problem { file: file.into(), what: what.into(), hint: hint.into() }
 }
@@ -389,6 +411,23 @@ mod tests {
         ] {
             assert_eq!(last_integer(text), want, "{text}");
         }
+    }
+
+    #[test]
+    fn a_panic_on_a_pair_is_that_pairs_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("a_gelslim.png");
+        std::fs::write(&file, b"").unwrap();
+        let dataset = Dataset::open(dir.path()).unwrap();
+        let error =
+            dataset.caught(PairId(0), || -> Result<(), LoadError> { panic!("the depth is {}", 3) }).unwrap_err();
+        let problem = error.to_problem();
+        assert!(
+            problem.what.contains("a bug: the depth is 3") && problem.what.contains("a_gelslim.png"),
+            "{problem:?}"
+        );
+        assert_eq!(problem.file, dir.path().canonicalize().unwrap().join("a_gelslim.png"));
+        assert!(dataset.load(PairId(0)).is_err_and(|err| !matches!(err, LoadError::Bug { .. })));
     }
 
     #[test]

@@ -26,11 +26,11 @@ use crate::infer::engine::EngineChoice;
 use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
 use crate::infer::store::{self, Store};
-use crate::io::atomic;
 use crate::io::dataset::Dataset;
 use crate::io::export_unet::{self, ExportConfig, ExportEntry};
 use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
 use crate::io::statistics::ShiftStatistics;
+use crate::io::{atomic, files};
 
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";
@@ -405,7 +405,7 @@ impl LiveServices {
     fn read_settings(&self) -> (Settings, Option<TaskError>) {
         let Some(folder) = &self.config_folder else { return (Settings::default(), None) };
         let file = folder.join(SETTINGS_FILE);
-        let bytes = match std::fs::read(&file) {
+        let bytes = match files::read(&file, files::SMALL) {
             Ok(bytes) => bytes,
             Err(err) if err.kind() == std::io::ErrorKind::NotFound => return (Settings::default(), None),
             Err(err) => {
