@@ -61,6 +61,7 @@ fn parent() {
     let child = command
         .args([TEST, "--exact", "--nocapture", "--test-threads=1"])
         .env(CHILD, &folder)
+        .env("RUST_BACKTRACE", "0")
         // Every further arena and thread reserves address space that nobody uses.
         .env("MALLOC_ARENA_MAX", "1")
         .env("RAYON_NUM_THREADS", "1")

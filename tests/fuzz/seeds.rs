@@ -59,13 +59,14 @@ pub(super) fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
 /// An archive taken apart.
 pub(super) fn opened(bytes: &[u8]) -> Content {
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).unwrap();
+    let count = archive.len();
     let entry = |index| {
         let mut entry = archive.by_index(index).unwrap();
         let mut bytes = Vec::new();
         entry.read_to_end(&mut bytes).unwrap();
         (String::from_utf8_lossy(entry.name_raw()).into_owned(), bytes)
     };
-    Content::Zip((0..archive.len()).map(entry).collect())
+    Content::Zip((0..count).map(entry).collect())
 }
 
 /// A dict as `torch.save` writes it.

@@ -108,10 +108,8 @@ pub(super) fn all() -> Vec<Target> {
             |dir, bytes| put(dir.join("a_gelslim.png"), bytes),
             read_pair,
         ),
-        target("manifest", PLAIN_MIB, manifest_seeds(), place_manifest, |dir, _| {
-            Bundle::open(dir).map(drop).map_err(said)
-        }),
-        target("onnx", PLAIN_MIB, onnx_seeds(), place_onnx, |dir, _| Bundle::open(dir).map(drop).map_err(said)),
+        target("manifest", PLAIN_MIB, manifest_seeds(), place_manifest, read_bundle),
+        target("onnx", PLAIN_MIB, onnx_seeds(), place_onnx, read_bundle),
         target("mask", PLAIN_MIB, mask_seeds(), |dir, bytes| put(mask_file(dir), bytes), read_mask),
         target("review", PLAIN_MIB, review_seeds(), |dir, bytes| put(dir.join("a.review.json"), bytes), read_review),
         target(
@@ -255,6 +253,15 @@ fn manifest_seeds() -> Vec<Seed> {
 fn place_manifest(dir: &Path, bytes: &[u8]) -> PathBuf {
     std::fs::copy(Path::new(MASK_BUNDLE).join(GRAPH), dir.join(GRAPH)).unwrap();
     put(dir.join(MANIFEST), bytes)
+}
+
+fn read_bundle(dir: &Path, file: &Path) -> Outcome {
+    // Either file may be what disagrees with the other.
+    Bundle::open(dir).map(drop).map_err(|err| {
+        let text = err.to_string();
+        assert!(text.contains(MANIFEST) || text.contains(".onnx"), "it names no file: {text}");
+        format!("{text} ({})", file.display())
+    })
 }
 
 fn onnx_seeds() -> Vec<Seed> {

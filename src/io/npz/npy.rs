@@ -211,7 +211,7 @@ mod tests {
         let all = Some(("<f4".to_owned(), false, vec![2, 3]));
         assert_eq!(dict("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 3), }  \n"), all);
         assert_eq!(dict("{\"shape\":(2L,3L),\"fortran_order\":False,\"descr\":\"<f4\"}"), all);
-        assert_eq!(dict("{'descr': '|u1', 'fortran_order': True, 'shape': (), }").unwrap().2, []);
+        assert_eq!(dict("{'descr': '|u1', 'fortran_order': True, 'shape': (), }").unwrap().2, Vec::<usize>::new());
         for bad in [
             "",
             "{}",

@@ -34,11 +34,14 @@ const TAR_MAGIC: std::ops::Range<usize> = 257..262;
 pub(super) fn check(mut file: File) -> Result<(), String> {
     let mut head = Vec::new();
     // Whatever cannot be read here cannot be read by the reader either, which says so.
-    if (&mut file).take(2 * MAX_PICKLE).read_to_end(&mut head).is_err() {
+    if (&mut file).take(2).read_to_end(&mut head).is_err() {
         return Ok(());
     }
-    if head.starts_with(b"PK") {
+    if head == b"PK" {
         return if file.rewind().is_ok() { zip(file) } else { Ok(()) };
+    }
+    if (&mut file).take(2 * MAX_PICKLE - 2).read_to_end(&mut head).is_err() {
+        return Ok(());
     }
     if head.get(TAR_MAGIC) == Some(b"ustar") {
         return Err("it is a tar archive as PyTorch wrote before 2017".into());
