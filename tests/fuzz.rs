@@ -110,7 +110,6 @@ fn child(folder: &Path) {
     let asked = number("FUZZ_SECONDS");
     let seed = number("FUZZ_SEED").unwrap_or(1);
     let only = std::env::var("FUZZ_ONLY").ok();
-    let end = Instant::now() + Duration::from_secs(asked.unwrap_or(30));
     let targets: Vec<Target> =
         targets::all().into_iter().filter(|t| only.as_ref().is_none_or(|o| o == t.name)).collect();
     assert!(!targets.is_empty(), "no reader has that name");
@@ -126,6 +125,7 @@ fn child(folder: &Path) {
             }
         }
     }
+    let end = Instant::now() + Duration::from_secs(asked.unwrap_or(30));
     'all: for round in 0..if asked.is_some() { u64::MAX } else { MOST } {
         for (number, (target, tally)) in targets.iter().zip(&mut tallies).enumerate() {
             if Instant::now() > end {
