@@ -124,7 +124,10 @@ impl Header {
         // The product is bounded by the header's check.
         let expected = count * bytes_each;
         if size != (length + expected) as u64 {
-            return Err(format!("values of shape {shape:?} do not fit into {size} bytes"));
+            return Err(format!(
+                "the values of shape {shape:?} take {expected} bytes; it has {} for them",
+                size.saturating_sub(length as u64)
+            ));
         }
         let mut bytes = Vec::new();
         // One more than expected: the end of a compressed array is where its checksum is looked at.
