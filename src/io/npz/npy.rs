@@ -78,7 +78,8 @@ fn dict(text: &str) -> Option<(String, bool, Vec<usize>)> {
             }
             "shape" => {
                 let (value, after) = value.strip_prefix('(')?.split_once(')')?;
-                let value = value.trim().trim_end_matches(',');
+                let value = value.trim();
+                let value = value.strip_suffix(',').unwrap_or(value);
                 // numpy of Python 2 wrote long integers with an L.
                 let size = |n: &str| n.trim().trim_end_matches('L').parse().ok();
                 shape = Some(if value.is_empty() {
