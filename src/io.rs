@@ -4,9 +4,11 @@
 
 pub mod atomic;
 pub mod cases;
+pub mod caught;
 pub mod dataset;
 pub mod doctor;
 pub mod export_unet;
+pub mod files;
 pub mod follow;
 pub mod images;
 pub mod masks;

@@ -3,6 +3,8 @@
 mod dataset;
 mod doctor;
 mod export;
+#[cfg(unix)]
+mod hostile;
 mod lab;
 mod masks;
 mod pt;

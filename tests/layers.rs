@@ -90,6 +90,28 @@ fn layers_only_point_downwards() {
     assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
 
+/// How a file could be opened without asking what it is.
+const OPENERS: &[&str] = &["fs::read(", "fs::read_to_string(", "File::open(", "ImageReader::open("];
+/// Who may: the one that asks, and the one that flushes a folder.
+const MAY_OPEN: &[&str] = &["io/files.rs", "io/atomic.rs"];
+
+#[test]
+fn readers_open_ordinary_files_only() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = Vec::new();
+    for layer in ["io", "infer", "app"] {
+        rust_files(&src.join(layer), &mut files);
+    }
+    let mut broken = Vec::new();
+    for file in files.iter().filter(|file| !MAY_OPEN.iter().any(|may| file.ends_with(may))) {
+        let code = code(&std::fs::read_to_string(file).unwrap());
+        for name in OPENERS.iter().filter(|name| is_named(&code, name)) {
+            broken.push(format!("{} calls {name}...): use io::files, which refuses pipes and devices", file.display()));
+        }
+    }
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
 #[test]
 fn files_can_be_held_in_the_head() {
     let mut files = Vec::new();

@@ -9,6 +9,7 @@ mod apply;
 mod cli;
 #[cfg(feature = "onnx")]
 mod cli_generate;
+mod fuzz;
 mod io;
 mod layers;
 mod models;

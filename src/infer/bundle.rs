@@ -100,6 +100,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::domain::dataset::Problem;
+use crate::io::files;
 
 pub use find::{Found, default_roots, find};
 pub use manifest::{
@@ -188,7 +189,7 @@ impl Bundle {
     pub fn open(dir: &Path) -> Result<Self, BundleError> {
         let refuse = |problems| BundleError { dir: dir.to_path_buf(), problems };
         let path = dir.join(MANIFEST);
-        let text = std::fs::read(&path).map_err(|err| {
+        let text = files::read(&path, files::SMALL).map_err(|err| {
             refuse(vec![Problem {
                 file: path.clone(),
                 what: format!("cannot be read: {err}"),
@@ -206,7 +207,7 @@ impl Bundle {
                 problems.add(what, "name a file inside the bundle's folder");
                 continue;
             };
-            match std::fs::read(&file) {
+            match files::read(&file, files::MODEL) {
                 Ok(bytes) => {
                     let mut at_file = Problems { file: file.clone(), list: Vec::new() };
                     if !sha256(&bytes).eq_ignore_ascii_case(&entry.sha256) {

@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bundle::Role;
 use crate::domain::diffusion::{ModelError, Tensor};
+use crate::io::files;
 
 /// An engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -132,7 +133,8 @@ impl Graph {
     /// # Errors
     /// See [`EngineError`].
     pub fn load(engine: EngineKind, role: Role, path: &Path) -> Result<Self, EngineError> {
-        let bytes = std::fs::read(path).map_err(|source| EngineError::Read { path: path.to_path_buf(), source })?;
+        let bytes =
+            files::read(path, files::MODEL).map_err(|source| EngineError::Read { path: path.to_path_buf(), source })?;
         load_session(engine, bytes)
             .map(|session| Self { role, runs: 0, session })
             .map_err(|err| err.unwrap_or_else(|reason| EngineError::Load { engine, role, reason }))

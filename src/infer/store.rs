@@ -6,7 +6,7 @@
 //! last change is the time it was last used; the least recently used go first.
 
 use std::fs::{self, File};
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
@@ -17,6 +17,7 @@ use super::bundle::sha256;
 use super::recipe::Recipe;
 use crate::domain::grid::Grid;
 use crate::domain::postprocess::RawPrediction;
+use crate::io::files;
 
 /// The format and its version, in every file.
 const FORMAT: &str = "touch2touch-prediction-1";
@@ -198,10 +199,8 @@ impl Store {
 
     /// Reads a file and marks it as used; one that is not whole is removed.
     fn read(&self, file: &Path) -> Option<Stored> {
-        let mut open = File::open(file).ok()?;
-        let mut content = Vec::new();
-        let read = open.read_to_end(&mut content);
-        match read.ok().and_then(|_| parse(&content)) {
+        let content = files::read(file, (MAX_HEADER + 4 * MAX_VALUES) as u64).ok()?;
+        match parse(&content) {
             Some(stored) => {
                 // Needs a handle that may write; a folder that may only be read is used as it is.
                 let touched = File::options().append(true).open(file).and_then(|f| f.set_modified(SystemTime::now()));

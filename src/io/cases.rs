@@ -125,6 +125,9 @@ impl CaseSet {
     }
 }
 
+/// Largest number of a tool.
+const LAST_TOOL: usize = 9999;
+
 /// The file of tool number `tool`.
 pub fn tool_file(folder: &Path, tool: usize) -> PathBuf {
     folder.join(format!("tool_{tool:02}.stl"))
@@ -176,12 +179,24 @@ impl Arrays<'_> {
         Ok(values)
     }
 
+    /// A whole number from 0 to `last`.
+    fn whole(&mut self, name: &'static str, last: usize) -> Result<usize, CaseError> {
+        let value = self.values(name, 1)?[0];
+        if value.fract() != 0.0 || !(0.0..=last as f64).contains(&value) {
+            return Err(self.bad(name, format!("is {value}, not a whole number from 0 to {last}")));
+        }
+        Ok(value as usize)
+    }
+
     /// Two images of one size.
     fn images(&mut self, name: &'static str) -> Result<[Grid<f64>; 2], CaseError> {
         let (shape, values) = self.take(name)?;
         let &[2, height, width] = shape.as_slice() else {
             return Err(self.bad(name, format!("must be 2 x height x width; its shape is {shape:?}")));
         };
+        if height == 0 || width == 0 {
+            return Err(self.bad(name, format!("has no pixels; its shape is {shape:?}")));
+        }
         let half = height * width;
         let image = |finger: usize| Grid::from_fn(width, height, |x, y| values[finger * half + y * width + x]);
         Ok([image(0), image(1)])
@@ -210,12 +225,11 @@ pub fn read(file: &Path) -> Result<Case, CaseError> {
     let t = arrays.values("T", 32)?;
     let theta_rad = arrays.values("theta_deg", 1)?[0].to_radians();
     let yz = arrays.values("yz", 2)?;
-    let tool = arrays.values("tool", 1)?[0];
-    let stratum = match arrays.values("stratum", 1)?[0] as i64 {
+    let tool = arrays.whole("tool", LAST_TOOL)?;
+    let stratum = match arrays.whole("stratum", 2)? {
         0 => Stratum::Nominal,
         1 => Stratum::Hard,
-        2 => Stratum::Degenerate,
-        other => return Err(arrays.bad("stratum", format!("is {other}, not 0, 1 or 2"))),
+        _ => Stratum::Degenerate,
     };
     let imprint = |f: usize| {
         let [width, height] = size;
@@ -240,7 +254,7 @@ pub fn read(file: &Path) -> Result<Case, CaseError> {
         masks,
         masks_clean,
         grasp_from_object: PlanarPose { theta_rad, y_m: yz[0], z_m: yz[1] },
-        tool: tool as usize,
+        tool,
         stratum,
     })
 }
@@ -334,6 +348,22 @@ mod tests {
         original.grasp_from_object = back.grasp_from_object;
         assert_eq!(back, original);
         assert!(matches!(CaseSet::open(dir.path()), Err(CaseError::Mesh(_))), "its tool is missing");
+    }
+
+    #[test]
+    fn a_tool_is_a_whole_number_that_names_a_file() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("case_000.npz");
+        write(&file, &case()).unwrap();
+        let good = npz::read(&file).unwrap();
+        for (name, bad) in [("tool", -1.0), ("tool", 0.5), ("tool", 1e12), ("stratum", -1.0), ("stratum", 3.0)] {
+            let with = good.iter().map(|(key, tensor)| {
+                (key.as_str(), if key == name { Tensor::f64(&[], vec![bad]) } else { tensor.clone() })
+            });
+            npz::write(&file, &with.collect::<Vec<_>>()).unwrap();
+            let text = read(&file).unwrap_err().to_string();
+            assert!(text.contains(&format!("\"{name}\" is {bad}")) && text.contains("case_000.npz"), "{text}");
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@
 //! A [`Dataset`] never changes after opening and can be shared with worker threads.
 
 mod built_in;
+mod error;
 mod grow;
 mod lab;
 mod pictures;
@@ -22,11 +23,10 @@ use crate::domain::mesh::TriMesh;
 use crate::domain::sample::{BubbleCamera, Sample};
 use crate::domain::upright::Turn;
 
-use super::images::PictureError;
-use super::pt::PtError;
 use super::stl::MeshError;
 
 pub use built_in::BuiltIn;
+pub use error::{LoadError, OpenError};
 pub use grow::{Growth, OUTPUT_MARK, RIG_FILE, cameras_of, is_output};
 pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, assumed_metres};
 pub use tool_scale::{ToolScale, UNIT_FILE, read_in_metres};
@@ -40,100 +40,6 @@ pub enum SourceKind {
     Pictures,
     /// The built-in simulator: the demo or a test set.
     Demo,
-}
-
-/// Why a folder cannot be opened as a dataset.
-#[derive(Debug, thiserror::Error)]
-pub enum OpenError {
-    /// The folder does not exist or may not be read.
-    #[error("cannot read the folder ({}): {source}", path.display())]
-    Io {
-        /// The folder.
-        path: PathBuf,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// Nothing in the folder looks like a dataset.
-    #[error("no paired touches found ({})", path.display())]
-    NothingFound {
-        /// The folder.
-        path: PathBuf,
-    },
-}
-
-impl OpenError {
-    /// What to do about it.
-    pub fn hint(&self) -> &'static str {
-        match self {
-            Self::Io { .. } => "check the path and its permissions",
-            Self::NothingFound { .. } => {
-                "open the folder that holds train/, test/ and tools_stls/, a folder of GelSlim .pt files, of \
-                 NAME_gelslim.png (with NAME_bubble.png), or of NAME_touch.png with reference.png"
-            }
-        }
-    }
-
-    /// The same as an entry of a problem list.
-    pub fn to_problem(&self) -> Problem {
-        let (Self::Io { path, .. } | Self::NothingFound { path }) = self;
-        Problem { file: path.clone(), what: self.to_string(), hint: self.hint().into() }
-    }
-}
-
-/// Why one pair cannot be loaded.
-#[derive(Debug, thiserror::Error)]
-pub enum LoadError {
-    /// A `.pt` file of the pair.
-    #[error(transparent)]
-    Pt(#[from] PtError),
-    /// A picture of the pair.
-    #[error(transparent)]
-    Picture(#[from] PictureError),
-    /// Touched and untouched image do not fit each other.
-    #[error("the touched image has {:?} pixels, the untouched one {:?} ({})", sizes[0], sizes[1], file.display())]
-    Sizes {
-        /// The touched image.
-        file: PathBuf,
-        /// Width and height of each.
-        sizes: [[usize; 2]; 2],
-    },
-    /// The pair is not one of this dataset.
-    #[error("the dataset has no pair number {}", id.0)]
-    NoSuchPair {
-        /// The number asked for.
-        id: PairId,
-    },
-}
-
-impl LoadError {
-    /// The file it is about.
-    pub fn file(&self) -> Option<&Path> {
-        match self {
-            Self::Pt(err) => Some(err.file()),
-            Self::Picture(err) => Some(err.file()),
-            Self::Sizes { file, .. } => Some(file),
-            Self::NoSuchPair { .. } => None,
-        }
-    }
-
-    /// What to do about it.
-    pub fn hint(&self) -> &'static str {
-        match self {
-            Self::Pt(err) => err.hint(),
-            Self::Picture(err) => err.hint(),
-            Self::Sizes { .. } => "take both images with the same camera settings",
-            Self::NoSuchPair { .. } => "open the dataset again",
-        }
-    }
-
-    /// The same as an entry of a problem list.
-    pub fn to_problem(&self) -> Problem {
-        Problem {
-            file: self.file().map(Path::to_owned).unwrap_or_default(),
-            what: self.to_string(),
-            hint: self.hint().into(),
-        }
-    }
 }
 
 /// A sample with what was odd about its files.
@@ -273,16 +179,24 @@ impl Dataset {
         if self.index.get(id).is_none() {
             return Err(LoadError::NoSuchPair { id });
         }
-        let mut loaded = match &self.source {
-            Source::Lab(lab) => lab.load(id)?,
-            Source::Pictures(pictures) => pictures.load(id)?,
-            Source::BuiltIn(set) => {
-                let sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
-                Loaded { sample, notes: Vec::new(), invalid: Default::default() }
-            }
-        };
-        self.lend_cameras(&mut loaded.sample);
-        Ok(loaded)
+        self.caught(id, || {
+            let mut loaded = match &self.source {
+                Source::Lab(lab) => lab.load(id)?,
+                Source::Pictures(pictures) => pictures.load(id)?,
+                Source::BuiltIn(set) => {
+                    let sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
+                    Loaded { sample, notes: Vec::new(), invalid: Default::default() }
+                }
+            };
+            self.lend_cameras(&mut loaded.sample);
+            Ok(loaded)
+        })
+    }
+
+    /// Reads something of a pair. A panic is that pair's error: no file may end a run over others.
+    fn caught<T>(&self, id: PairId, read: impl FnOnce() -> Result<T, LoadError>) -> Result<T, LoadError> {
+        super::caught::caught(read)
+            .unwrap_or_else(|message| Err(LoadError::Bug { files: self.pair_files(id), message }))
     }
 
     /// The tool's CAD model in metres and the object frame; `None` where the dataset has none.
@@ -323,7 +237,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn bubble_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => pictures.tile(id, pictures::BUBBLE, laid),
+            Source::Pictures(pictures) => self.caught(id, || pictures.tile(id, pictures::BUBBLE, laid)),
             Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
@@ -335,7 +249,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn vqvae_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => pictures.tile(id, pictures::VQVAE, laid),
+            Source::Pictures(pictures) => self.caught(id, || pictures.tile(id, pictures::VQVAE, laid)),
             Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
@@ -346,7 +260,7 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn gelslim_is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => pictures.is_clipped(id),
+            Source::Pictures(pictures) => self.caught(id, || pictures.is_clipped(id)),
             Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
@@ -389,6 +303,23 @@ mod tests {
         ] {
             assert_eq!(last_integer(text), want, "{text}");
         }
+    }
+
+    #[test]
+    fn a_panic_on_a_pair_is_that_pairs_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("a_gelslim.png");
+        std::fs::write(&file, b"").unwrap();
+        let dataset = Dataset::open(dir.path()).unwrap();
+        let error =
+            dataset.caught(PairId(0), || -> Result<(), LoadError> { panic!("the depth is {}", 3) }).unwrap_err();
+        let problem = error.to_problem();
+        assert!(
+            problem.what.contains("a bug: the depth is 3") && problem.what.contains("a_gelslim.png"),
+            "{problem:?}"
+        );
+        assert_eq!(problem.file, dir.path().canonicalize().unwrap().join("a_gelslim.png"));
+        assert!(dataset.load(PairId(0)).is_err_and(|err| !matches!(err, LoadError::Bug { .. })));
     }
 
     #[test]

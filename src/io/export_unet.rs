@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::Digest as _;
 
+use super::files;
 use super::images::{self, PictureError};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Grid, Mask};
@@ -205,7 +206,7 @@ pub fn export(
                     hint: "check the disk".into(),
                 });
             }
-            let bytes = std::fs::read(&path).map_err(|s| io(&path, "read", s))?;
+            let bytes = files::read(&path, files::SMALL).map_err(|s| io(&path, "read", s))?;
             manifest.files.insert(relative, sha256(&bytes));
         }
     }
@@ -267,7 +268,7 @@ fn refuse_foreign(folder: &Path) -> Result<(), ExportError> {
         Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(()),
         Err(source) => return Err(io(folder, "list the folder", source)),
     }
-    let known: BTreeMap<String, String> = std::fs::read(folder.join(MANIFEST))
+    let known: BTreeMap<String, String> = files::read(&folder.join(MANIFEST), files::SMALL)
         .ok()
         .and_then(|bytes| serde_json::from_slice::<Manifest>(&bytes).ok())
         .filter(|manifest| manifest.format == FORMAT)

@@ -3,8 +3,9 @@
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use image::{DynamicImage, ExtendedColorType, ImageFormat, ImageReader};
+use image::{DynamicImage, ExtendedColorType, ImageDecoder as _, ImageFormat, ImageReader};
 
+use super::files;
 use crate::domain::grid::{Grid, RgbGrid};
 
 /// Why a picture cannot be read or written.
@@ -26,6 +27,14 @@ pub enum PictureError {
         /// The decoder's reason.
         source: image::ImageError,
     },
+    /// The picture has too many pixels.
+    #[error("the picture is {} x {} pixels; at most {MAX_SIDE} a side are read ({})", size[0], size[1], file.display())]
+    TooLarge {
+        /// The file.
+        file: PathBuf,
+        /// Width and height.
+        size: [u32; 2],
+    },
     /// The picture has other channels or another depth than asked for.
     #[error("the picture is {found}, expected {expected} ({})", file.display())]
     Kind {
@@ -42,7 +51,10 @@ impl PictureError {
     /// The file it is about.
     pub fn file(&self) -> &Path {
         match self {
-            Self::Io { file, .. } | Self::Decode { file, .. } | Self::Kind { file, .. } => file,
+            Self::Io { file, .. }
+            | Self::Decode { file, .. }
+            | Self::TooLarge { file, .. }
+            | Self::Kind { file, .. } => file,
         }
     }
 
@@ -51,15 +63,20 @@ impl PictureError {
         match self {
             Self::Io { .. } => "check that the file exists and may be read, and that the disk has room",
             Self::Decode { .. } => "copy or save the picture again",
+            Self::TooLarge { .. } => "save the picture smaller: the sensors have fewer than 500 pixels a side",
             Self::Kind { .. } => "save the picture again in that form",
         }
     }
 }
 
+/// Most pixels a side. A file of a few kilobytes can announce a thousand times more.
+pub const MAX_SIDE: u32 = 4096;
+/// Most bytes of a file: what a picture of that size takes without compression.
+const MAX_BYTES: u64 = 256 << 20;
+
 fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
     let io = |source| PictureError::Io { file: path.to_owned(), source };
-    let bytes = std::fs::read(path).map_err(io)?;
-    // The decoder's default limits keep a small file from asking for gigabytes.
+    let bytes = files::read(path, MAX_BYTES).map_err(io)?;
     let jpeg = bytes.starts_with(&[0xff, 0xd8]);
     // A JPEG decoder fills what is cut off with grey: the end mark tells a whole file from one being written.
     if jpeg && !bytes.trim_ascii_end().ends_with(&[0xff, 0xd9]) {
@@ -68,7 +85,14 @@ fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
     }
     let mut reader = ImageReader::new(Cursor::new(bytes));
     reader.set_format(if jpeg { ImageFormat::Jpeg } else { ImageFormat::Png });
-    reader.decode().map_err(|source| PictureError::Decode { file: path.to_owned(), source })
+    let failed = |source| PictureError::Decode { file: path.to_owned(), source };
+    // The size is in the header: it is looked at before there is room for a single pixel.
+    let decoder = reader.into_decoder().map_err(failed)?;
+    let (width, height) = decoder.dimensions();
+    if width.max(height) > MAX_SIDE {
+        return Err(PictureError::TooLarge { file: path.to_owned(), size: [width, height] });
+    }
+    DynamicImage::from_decoder(decoder).map_err(failed)
 }
 
 /// Turns decoded bytes into a grid. The decoder guarantees the length.
@@ -192,6 +216,21 @@ mod tests {
         write_rgb8(&path, &colour).unwrap();
         assert_eq!(read_rgb(&path).unwrap()[(2, 1)], [200.0, 1.0, 7.0]);
         assert!(read_grey8(&path).unwrap_err().to_string().contains("expected 8-bit grey"));
+    }
+
+    #[test]
+    fn too_many_pixels_are_refused_by_the_header() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("p.png");
+        let side = MAX_SIDE as usize;
+        for size in [[side + 1, 1], [1, side + 1]] {
+            write_grey8(&path, &Grid::filled(size[0], size[1], 3)).unwrap();
+            let error = read_rgb(&path).unwrap_err();
+            assert!(matches!(error, PictureError::TooLarge { .. }), "{error}");
+            assert!(error.to_string().contains("4097") && error.to_string().contains("p.png"), "{error}");
+        }
+        write_grey8(&path, &Grid::filled(side, 1, 3)).unwrap();
+        assert_eq!(read_grey(&path).unwrap().size(), [side, 1]);
     }
 
     #[test]

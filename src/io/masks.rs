@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::atomic;
 use super::dataset::Dataset;
+use super::{atomic, files};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
@@ -327,7 +327,7 @@ impl MaskStore {
                 if let Some(pair) = stem.strip_suffix(finger.name()).and_then(|s| s.strip_suffix('.')) {
                     // A name too long to be its own file name is in the file.
                     let pair = unescape(pair).or_else(|| {
-                        let content: MaskFile = serde_json::from_slice(&std::fs::read(&file).ok()?).ok()?;
+                        let content: MaskFile = serde_json::from_slice(&read(&file).ok()?).ok()?;
                         Some(content.pair)
                     });
                     masks.extend(pair.map(|pair| (pair, finger)));
@@ -360,7 +360,7 @@ impl MaskStore {
     /// [`StoreError::Io`].
     pub fn journal(&self) -> Result<Vec<JournalEntry>, StoreError> {
         let file = self.folder.join(JOURNAL);
-        let bytes = match std::fs::read(&file) {
+        let bytes = match files::read(&file, files::SMALL) {
             Ok(bytes) => bytes,
             Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
             Err(source) => return Err(StoreError::Io { file, what: "read the journal", source }),
@@ -376,7 +376,7 @@ impl MaskStore {
     fn find(&self, name: &str) -> Result<Option<(PathBuf, Vec<u8>)>, StoreError> {
         for folder in self.folders() {
             let file = folder.join(name);
-            match std::fs::read(&file) {
+            match files::read(&file, files::SMALL) {
                 Ok(bytes) => return Ok(Some((file, bytes))),
                 Err(err) if err.kind() == std::io::ErrorKind::NotFound => {}
                 // The folder's name is taken by a file: nothing was saved there.
@@ -418,7 +418,7 @@ fn review_name(pair: &str) -> String {
 }
 
 fn read(file: &Path) -> Result<Vec<u8>, StoreError> {
-    std::fs::read(file).map_err(|source| StoreError::Io {
+    files::read(file, files::SMALL).map_err(|source| StoreError::Io {
         file: file.to_owned(),
         what: "read the stored labels",
         source,

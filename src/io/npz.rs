@@ -1,13 +1,13 @@
 //! numpy's `.npz`: a zip of arrays.
 
+mod npy;
+
 use std::collections::BTreeMap;
-use std::io::{Read as _, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use npyz::{NpyFile, Order, TypeChar, WriterBuilder as _};
-
-use super::atomic;
 use super::pt::{Tensor, Values};
+use super::{atomic, files};
 use crate::domain::grid::Grid;
 
 /// Why an `.npz` file cannot be read.
@@ -46,16 +46,8 @@ pub enum NpzError {
 /// # Errors
 /// [`NpzError::Io`] if the file cannot be written.
 pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
-    let shape = [image.height() as u64, image.width() as u64];
-    atomic::write(file, |out| {
-        // Buffered: the writer hands over value by value.
-        let mut bytes = Vec::with_capacity(128 + 4 * image.len());
-        let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
-        writer.extend(image.as_slice())?;
-        writer.finish()?;
-        out.write_all(&bytes)
-    })
-    .map_err(|source| NpzError::Io { file: file.to_owned(), source })
+    let bytes = npy::bytes(&[image.height(), image.width()], &Values::F32(image.as_slice().to_vec()));
+    atomic::write_bytes(file, &bytes).map_err(|source| NpzError::Io { file: file.to_owned(), source })
 }
 
 /// Writes arrays of numbers under their names, compressed, row-major.
@@ -80,7 +72,7 @@ pub fn write(path: &Path, arrays: &[(&str, Tensor)]) -> Result<(), NpzError> {
         let mut zip = zip::ZipWriter::new(out);
         for (name, tensor) in arrays {
             zip.start_file(format!("{name}.npy"), zip::write::SimpleFileOptions::default())?;
-            zip.write_all(&npy_bytes(tensor)?)?;
+            zip.write_all(&npy::bytes(&tensor.shape, &tensor.values))?;
         }
         zip.finish()?;
         Ok(())
@@ -88,109 +80,37 @@ pub fn write(path: &Path, arrays: &[(&str, Tensor)]) -> Result<(), NpzError> {
     .map_err(|source| NpzError::Io { file: path.to_owned(), source })
 }
 
-fn npy_bytes(tensor: &Tensor) -> std::io::Result<Vec<u8>> {
-    fn bytes<T: npyz::AutoSerialize>(shape: &[usize], values: &[T]) -> std::io::Result<Vec<u8>> {
-        let shape: Vec<u64> = shape.iter().map(|&n| n as u64).collect();
-        let mut bytes = Vec::with_capacity(128 + size_of_val(values));
-        let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
-        writer.extend(values)?;
-        writer.finish()?;
-        Ok(bytes)
-    }
-    match &tensor.values {
-        Values::F32(v) => bytes(&tensor.shape, v),
-        Values::F64(v) => bytes(&tensor.shape, v),
-        Values::U8(v) => bytes(&tensor.shape, v),
-        Values::I64(v) => bytes(&tensor.shape, v),
-    }
-}
-
-/// An array larger than this is refused: a damaged header must not ask for all memory.
-const MAX_BYTES: u64 = 1 << 31;
+/// Most values of all arrays of a file together: two cameras' images at 1920 x 1080, four of each.
+const MAX_VALUES: usize = 1 << 24;
+/// Most arrays of a file.
+const MAX_ARRAYS: usize = 1000;
 
 /// Reads all arrays of numbers, row-major, by name. Integers other than `u8` become `i64`.
 ///
 /// # Errors
 /// [`NpzError`]; arrays of other things than numbers (texts, objects) are errors too.
 pub fn read(path: &Path) -> Result<BTreeMap<String, Tensor>, NpzError> {
-    let file = std::fs::File::open(path).map_err(|source| NpzError::Io { file: path.to_owned(), source })?;
-    let archive = |err: zip::result::ZipError| NpzError::Archive { file: path.to_owned(), reason: err.to_string() };
-    let mut zip = zip::ZipArchive::new(std::io::BufReader::new(file)).map_err(archive)?;
+    let file = files::open(path).map_err(|source| NpzError::Io { file: path.to_owned(), source })?;
+    let archive = |reason: String| NpzError::Archive { file: path.to_owned(), reason: files::clip(&reason) };
+    let mut zip = zip::ZipArchive::new(std::io::BufReader::new(file)).map_err(|err| archive(err.to_string()))?;
+    if zip.len() > MAX_ARRAYS {
+        return Err(archive(format!("it has {} entries; at most {MAX_ARRAYS} are read", zip.len())));
+    }
     let mut arrays = BTreeMap::new();
+    let mut room = MAX_VALUES;
     for index in 0..zip.len() {
-        let mut entry = zip.by_index(index).map_err(archive)?;
+        let mut entry = zip.by_index(index).map_err(|err| archive(err.to_string()))?;
         let Some(name) = String::from_utf8_lossy(entry.name_raw()).strip_suffix(".npy").map(str::to_owned) else {
             continue;
         };
-        let failed = |reason: String| NpzError::Array { file: path.to_owned(), name: name.clone(), reason };
-        if entry.size() > MAX_BYTES {
-            return Err(failed(format!("{} bytes is too large", entry.size())));
-        }
-        let mut bytes = Vec::new();
-        entry.read_to_end(&mut bytes).map_err(|err| failed(err.to_string()))?;
-        let tensor = array(&bytes).map_err(failed)?;
+        let failed = |reason: String| NpzError::Array { file: path.to_owned(), name: files::clip(&name), reason };
+        let size = entry.size();
+        let header = npy::header(&mut entry, room).map_err(failed)?;
+        room -= header.count;
+        let tensor = header.values(&mut entry, size).map_err(failed)?;
         arrays.insert(name, tensor);
     }
     Ok(arrays)
-}
-
-fn array(bytes: &[u8]) -> Result<Tensor, String> {
-    let npy = NpyFile::new(bytes).map_err(|err| err.to_string())?;
-    let shape: Vec<usize> = npy.shape().iter().map(|&n| n as usize).collect();
-    let fortran = npy.order() == Order::Fortran;
-    let npyz::DType::Plain(kind) = npy.dtype() else { return Err("it is an array of records".into()) };
-    // Beyond the file's own length nothing can be read, so the header cannot ask for more.
-    if npy.len() > bytes.len() as u64 {
-        return Err(format!("{:?} values do not fit into {} bytes", shape, bytes.len()));
-    }
-    let text = kind.to_string();
-    macro_rules! values {
-        ($t:ty) => {
-            npy.into_vec::<$t>().map_err(|err| err.to_string())?
-        };
-    }
-    let whole = |v: Vec<i64>| Values::I64(v);
-    let values = match (kind.type_char(), kind.size_field()) {
-        (TypeChar::Float, 4) => Values::F32(values!(f32)),
-        (TypeChar::Float, 8) => Values::F64(values!(f64)),
-        (TypeChar::Uint, 1) => Values::U8(values!(u8)),
-        (TypeChar::Bool, 1) => Values::U8(values!(bool).into_iter().map(u8::from).collect()),
-        (TypeChar::Uint, 2) => whole(values!(u16).into_iter().map(i64::from).collect()),
-        (TypeChar::Uint, 4) => whole(values!(u32).into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 1) => whole(values!(i8).into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 2) => whole(values!(i16).into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 4) => whole(values!(i32).into_iter().map(i64::from).collect()),
-        (TypeChar::Int, 8) => whole(values!(i64)),
-        _ => return Err(format!("its element type {text} is not supported")),
-    };
-    let values = if fortran && shape.len() > 1 { row_major(&shape, values) } else { values };
-    Ok(Tensor { shape, values })
-}
-
-/// Reorders values whose first index runs fastest.
-fn row_major(shape: &[usize], values: Values) -> Values {
-    fn reorder<T: Copy>(shape: &[usize], values: &[T]) -> Vec<T> {
-        let mut index = vec![0usize; shape.len()];
-        let mut out = Vec::with_capacity(values.len());
-        for _ in 0..values.len() {
-            let at = index.iter().zip(shape).rev().fold(0, |at, (&i, &n)| at * n + i);
-            out.push(values[at]);
-            for axis in (0..shape.len()).rev() {
-                index[axis] += 1;
-                if index[axis] < shape[axis] {
-                    break;
-                }
-                index[axis] = 0;
-            }
-        }
-        out
-    }
-    match values {
-        Values::F32(v) => Values::F32(reorder(shape, &v)),
-        Values::F64(v) => Values::F64(reorder(shape, &v)),
-        Values::U8(v) => Values::U8(reorder(shape, &v)),
-        Values::I64(v) => Values::I64(reorder(shape, &v)),
-    }
 }
 
 #[cfg(test)]
@@ -252,7 +172,9 @@ mod tests {
             let image = Grid::from_fn(width, 3, |x, y| x as f32 - 0.1 * y as f32);
             let path = dir.path().join("i.npy");
             write_npy(&path, &image).unwrap();
-            let read = array(&std::fs::read(&path).unwrap()).unwrap();
+            let bytes = std::fs::read(&path).unwrap();
+            let mut from = bytes.as_slice();
+            let read = npy::header(&mut from, 1000).unwrap().values(&mut from, bytes.len() as u64).unwrap();
             assert_eq!(read, Tensor::f32(&[3, width], image.into_vec()));
         }
     }

@@ -1,131 +1,22 @@
 //! PyTorch's `.pt` files: a zip with a pickled dict and raw storages.
 //!
-//! Reading goes through the crate `pytorch-reader` and touches only the tensors that are asked for;
-//! [`write_dict`] is a small writer of the same container that `torch.load(weights_only=True)` accepts.
+//! Reading goes through the crate `pytorch-reader` and touches only the tensors that are asked for; what the file would
+//! cost is checked before (the submodule `budget`). [`write_dict`] is a small writer of the same container that
+//! `torch.load(weights_only=True)` accepts.
 
+mod budget;
+mod error;
 mod write;
 
-use std::fs::File;
-use std::io::Read as _;
+use std::io::{Read as _, Seek as _};
 use std::path::{Path, PathBuf};
 
 use pytorch_reader::{DType, PickleValue, PytorchError, PytorchReader};
 
+pub use error::PtError;
 pub use write::{PtItem, write_dict};
 
-/// Why a `.pt` file, or a value in it, cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum PtError {
-    /// The file cannot be opened, read or written.
-    #[error("{what} ({}): {source}", file.display())]
-    Io {
-        /// The file.
-        file: PathBuf,
-        /// What was tried.
-        what: &'static str,
-        /// The system's reason.
-        source: std::io::Error,
-    },
-    /// The file is empty, cut off, or its checksums disagree with its content.
-    #[error("damaged or truncated file: {reason} ({})", file.display())]
-    Damaged {
-        /// The file.
-        file: PathBuf,
-        /// What was found.
-        reason: String,
-    },
-    /// The file is not what `torch.save` writes for a dict.
-    #[error("not a PyTorch file with a dict of tensors: {reason} ({})", file.display())]
-    NotADict {
-        /// The file.
-        file: PathBuf,
-        /// What was found.
-        reason: String,
-    },
-    /// The dict has no such key.
-    #[error("key \"{key}\" is missing; found {found} ({})", file.display())]
-    MissingKey {
-        /// The file.
-        file: PathBuf,
-        /// The key asked for.
-        key: String,
-        /// The keys that are there.
-        found: String,
-    },
-    /// The key holds something that is not a tensor or a plain number.
-    #[error("key \"{key}\" holds {found}, expected a tensor ({})", file.display())]
-    NotATensor {
-        /// The file.
-        file: PathBuf,
-        /// The key asked for.
-        key: String,
-        /// The Python type that was found.
-        found: String,
-    },
-    /// The tensor has another shape.
-    #[error("key \"{key}\" has shape {found:?}, expected {expected} ({})", file.display())]
-    WrongShape {
-        /// The file.
-        file: PathBuf,
-        /// The key asked for.
-        key: String,
-        /// The shape in the file.
-        found: Vec<usize>,
-        /// The accepted shape or shapes.
-        expected: String,
-    },
-    /// The storage is shorter than the tensor's shape says, or its checksum is wrong.
-    #[error("key \"{key}\" cannot be read: {reason} ({})", file.display())]
-    BadStorage {
-        /// The file.
-        file: PathBuf,
-        /// The key asked for.
-        key: String,
-        /// What was found.
-        reason: String,
-    },
-    /// A tensor to be written whose length does not match its shape.
-    #[error("key \"{key}\": {len} values do not fill shape {shape:?} ({})", file.display())]
-    BadTensor {
-        /// The file.
-        file: PathBuf,
-        /// The key.
-        key: String,
-        /// The values given.
-        len: usize,
-        /// The shape given.
-        shape: Vec<usize>,
-    },
-}
-
-impl PtError {
-    /// The file it is about.
-    pub fn file(&self) -> &Path {
-        match self {
-            Self::Io { file, .. }
-            | Self::Damaged { file, .. }
-            | Self::NotADict { file, .. }
-            | Self::MissingKey { file, .. }
-            | Self::NotATensor { file, .. }
-            | Self::WrongShape { file, .. }
-            | Self::BadStorage { file, .. }
-            | Self::BadTensor { file, .. } => file,
-        }
-    }
-
-    /// What to do about it.
-    pub fn hint(&self) -> &'static str {
-        match self {
-            Self::Io { .. } => "check that the file exists and may be read, and that the disk has room",
-            Self::Damaged { .. } | Self::BadStorage { .. } => "copy or download the file again",
-            Self::NotADict { .. } => "save a dict of tensors with torch.save",
-            Self::MissingKey { .. } => "check that the file belongs to this folder and to the released data set",
-            Self::NotATensor { .. } => "convert the value with torch.as_tensor(...) before torch.save",
-            Self::WrongShape { .. } => "check which version of the data set the file belongs to",
-            Self::BadTensor { .. } => "give as many values as the shape has",
-        }
-    }
-}
+use super::files::{self, clip};
 
 /// The values of a tensor, row-major, in the element type of the file where a type for it exists here.
 ///
@@ -201,31 +92,32 @@ pub struct PtDict {
 /// [`PtError`] if the file cannot be read, is cut off, or does not hold a dict.
 pub fn read_dict(path: &Path) -> Result<PtDict, PtError> {
     let io = |source| PtError::Io { file: path.to_owned(), what: "cannot open the file", source };
+    let not_a_dict = |reason: String| PtError::NotADict { file: path.to_owned(), reason };
+    let damaged = |reason: String| PtError::Damaged { file: path.to_owned(), reason };
     let mut head = [0u8; 2];
-    let mut file = File::open(path).map_err(io)?;
-    let length = file.metadata().map_err(io)?;
-    if length.is_dir() {
-        return Err(PtError::NotADict { file: path.to_owned(), reason: "it is a folder".into() });
-    }
-    if length.len() == 0 {
-        return Err(PtError::Damaged { file: path.to_owned(), reason: "the file is empty".into() });
+    let mut file = match files::open(path) {
+        Err(err) if err.kind() == std::io::ErrorKind::IsADirectory => return Err(not_a_dict("it is a folder".into())),
+        other => other.map_err(io)?,
+    };
+    if file.metadata().map_err(io)?.len() == 0 {
+        return Err(damaged("the file is empty".into()));
     }
     let is_zip = file.read_exact(&mut head).is_ok() && &head == b"PK";
-    drop(file);
+    file.rewind().map_err(io)?;
+    budget::check(file).map_err(|reason| PtError::TooLarge { file: path.to_owned(), reason })?;
     match PytorchReader::new(path) {
         Ok(reader) => Ok(PtDict { file: path.to_owned(), reader }),
-        Err(PytorchError::Zip(err)) if is_zip => {
-            Err(PtError::Damaged { file: path.to_owned(), reason: err.to_string() })
-        }
-        Err(PytorchError::Io(err)) if is_zip => {
-            Err(PtError::Damaged { file: path.to_owned(), reason: err.to_string() })
-        }
+        Err(PytorchError::Zip(err)) if is_zip => Err(damaged(clip(&err.to_string()))),
+        Err(PytorchError::Io(err)) if is_zip => Err(damaged(clip(&err.to_string()))),
         Err(err) => {
-            let reason = if is_zip { err.to_string() } else { format!("no zip archive; {err}") };
-            Err(PtError::NotADict { file: path.to_owned(), reason })
+            let reason = clip(&err.to_string());
+            Err(not_a_dict(if is_zip { reason } else { format!("no zip archive; {reason}") }))
         }
     }
 }
+
+/// Most values of a tensor: a hundred times those of a touch.
+const MAX_VALUES: usize = 1 << 24;
 
 impl PtDict {
     /// The file it was read from.
@@ -256,11 +148,12 @@ impl PtDict {
     /// [`PtError::MissingKey`], [`PtError::NotATensor`] (numpy values among them), [`PtError::BadStorage`].
     pub fn tensor(&self, key: &str) -> Result<Tensor, PtError> {
         let Some(tensor) = self.reader.get(key) else { return self.plain_number(key) };
-        let bytes = tensor.read().map_err(|err| PtError::BadStorage {
-            file: self.file.clone(),
-            key: key.into(),
-            reason: err.to_string(),
-        })?;
+        let bad = |reason: String| PtError::BadStorage { file: self.file.clone(), key: key.into(), reason };
+        // A view can repeat one value of the file for ever.
+        if tensor.shape().iter().fold(1usize, |product, &n| product.saturating_mul(n)) > MAX_VALUES {
+            return Err(bad(format!("its shape {:?} has more than {MAX_VALUES} values", tensor.shape())));
+        }
+        let bytes = tensor.read().map_err(|err| bad(clip(&err.to_string())))?;
         Ok(Tensor { shape: tensor.shape().to_vec(), values: decode(tensor.dtype(), &bytes) })
     }
 
@@ -269,8 +162,7 @@ impl PtDict {
     /// # Errors
     /// As [`PtDict::tensor`], and [`PtError::WrongShape`], which is found before the values are read.
     pub fn f32s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f32>, PtError> {
-        self.check_shape(key, shapes)?;
-        Ok(self.tensor(key)?.into_f32())
+        Ok(self.shaped(key, shapes)?.into_f32())
     }
 
     /// Reads the tensor under `key`, which must have one of `shapes`, as 64-bit floats.
@@ -278,8 +170,7 @@ impl PtDict {
     /// # Errors
     /// As [`PtDict::f32s`].
     pub fn f64s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f64>, PtError> {
-        self.check_shape(key, shapes)?;
-        Ok(self.tensor(key)?.into_f64())
+        Ok(self.shaped(key, shapes)?.into_f64())
     }
 
     /// Reads a single number: a tensor with one element of any rank, or a plain Python number.
@@ -288,7 +179,7 @@ impl PtDict {
     /// As [`PtDict::f32s`].
     pub fn scalar(&self, key: &str) -> Result<f64, PtError> {
         let tensor = match self.shape(key) {
-            Some(shape) if shape.iter().product::<usize>() != 1 => {
+            Some(shape) if shape.iter().any(|&n| n != 1) => {
                 return Err(self.wrong_shape(key, shape, "a single number".into()));
             }
             _ => self.tensor(key)?,
@@ -297,13 +188,22 @@ impl PtDict {
         tensor.into_f64().first().copied().ok_or_else(|| self.wrong_shape(key, &shape, "a single number".into()))
     }
 
-    fn check_shape(&self, key: &str, shapes: &[&[usize]]) -> Result<(), PtError> {
+    /// The tensor under `key`, which must have one of `shapes`: found out before its values are read.
+    fn shaped(&self, key: &str, shapes: &[&[usize]]) -> Result<Tensor, PtError> {
+        let accepts = |shape: &[usize]| shapes.contains(&shape);
+        let expected = || shapes.iter().map(|s| format!("{s:?}")).collect::<Vec<_>>().join(" or ");
         match self.shape(key) {
-            Some(shape) if !shapes.contains(&shape) => {
-                let list: Vec<String> = shapes.iter().map(|s| format!("{s:?}")).collect();
-                Err(self.wrong_shape(key, shape, list.join(" or ")))
+            Some(shape) if !accepts(shape) => Err(self.wrong_shape(key, shape, expected())),
+            Some(_) => self.tensor(key),
+            // A plain number has a value but no shape of its own.
+            None => {
+                let number = self.tensor(key)?;
+                if accepts(&number.shape) {
+                    return Ok(number);
+                }
+                let found = format!("a plain number where a tensor of shape {} belongs", expected());
+                Err(PtError::NotATensor { file: self.file.clone(), key: key.into(), found })
             }
-            _ => Ok(()),
         }
     }
 
@@ -313,7 +213,8 @@ impl PtDict {
 
     /// Looks `key` up among the values that are not tensors: only reached where no tensor has that name.
     fn plain_number(&self, key: &str) -> Result<Tensor, PtError> {
-        let missing = |found: String| PtError::MissingKey { file: self.file.clone(), key: key.into(), found };
+        let missing =
+            |found: String| PtError::MissingKey { file: self.file.clone(), key: key.into(), found: clip(&found) };
         let Ok(PickleValue::Dict(dict)) = PytorchReader::read_pickle_data(&self.file, None) else {
             return Err(missing(self.keys().join(", ")));
         };
@@ -321,7 +222,7 @@ impl PtDict {
             Some(PickleValue::Float(x)) => return Ok(Tensor::f64(&[], vec![*x])),
             Some(PickleValue::Int(x)) => return Ok(Tensor { shape: vec![], values: Values::I64(vec![*x]) }),
             Some(PickleValue::Bool(x)) => return Ok(Tensor::u8(&[], vec![u8::from(*x)])),
-            Some(PickleValue::Unsupported(kind)) => format!("a value of type {kind}"),
+            Some(PickleValue::Unsupported(kind)) => format!("a value of type {}", clip(kind)),
             Some(PickleValue::None) => "None".into(),
             Some(PickleValue::String(_)) => "a text".into(),
             Some(PickleValue::List(_)) => "a list".into(),
@@ -344,7 +245,7 @@ impl PtDict {
 pub fn read_text_lists(path: &Path) -> Result<Vec<(String, Vec<String>)>, PtError> {
     drop(read_dict(path)?);
     let damaged = |reason: String| PtError::NotADict { file: path.to_owned(), reason };
-    let value = PytorchReader::read_pickle_data(path, None).map_err(|err| damaged(err.to_string()))?;
+    let value = PytorchReader::read_pickle_data(path, None).map_err(|err| damaged(clip(&err.to_string())))?;
     let PickleValue::Dict(dict) = value else { return Err(damaged("the file holds no dict".into())) };
     let mut lists: Vec<(String, Vec<String>)> = dict
         .into_iter()
@@ -363,19 +264,20 @@ pub fn read_text_lists(path: &Path) -> Result<Vec<(String, Vec<String>)>, PtErro
     Ok(lists)
 }
 
+/// Splits `bytes` into arrays of `N`.
+pub(super) fn each<const N: usize, T>(bytes: &[u8], f: impl Fn([u8; N]) -> T) -> Vec<T> {
+    bytes
+        .chunks_exact(N)
+        .map(|chunk| {
+            let mut array = [0; N];
+            array.copy_from_slice(chunk);
+            f(array)
+        })
+        .collect()
+}
+
 /// Turns native-endian bytes, as `pytorch-reader` hands them out, into values.
 fn decode(dtype: DType, bytes: &[u8]) -> Values {
-    /// Splits `bytes` into arrays of `N`.
-    fn each<const N: usize, T>(bytes: &[u8], f: impl Fn([u8; N]) -> T) -> Vec<T> {
-        bytes
-            .chunks_exact(N)
-            .map(|chunk| {
-                let mut array = [0; N];
-                array.copy_from_slice(chunk);
-                f(array)
-            })
-            .collect()
-    }
     match dtype {
         DType::F32 => Values::F32(each(bytes, f32::from_ne_bytes)),
         DType::F64 => Values::F64(each(bytes, f64::from_ne_bytes)),

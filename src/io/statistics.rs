@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::atomic;
+use super::{atomic, files};
 use crate::domain::postprocess::{RefitShift, ShiftFit, ShiftStats};
 
 const FORMAT: &str = "touch2touch-shift-statistics";
@@ -123,8 +123,8 @@ impl ShiftStatistics {
     pub fn read(path: &Path) -> Result<Self, StatisticsError> {
         let io = |source| StatisticsError::Io { path: path.to_owned(), source };
         let parse = |why: String| StatisticsError::Parse { path: path.to_owned(), why };
-        let found: Self =
-            serde_json::from_slice(&std::fs::read(path).map_err(io)?).map_err(|err| parse(err.to_string()))?;
+        let found: Self = serde_json::from_slice(&files::read(path, files::SMALL).map_err(io)?)
+            .map_err(|err| parse(err.to_string()))?;
         if found.format != FORMAT || found.version != VERSION {
             return Err(parse(format!(
                 "format \"{}\" version {}, expected \"{FORMAT}\" version {VERSION}",

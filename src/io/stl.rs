@@ -119,6 +119,8 @@ pub struct StlFile {
     pub suggested_scale: Option<f64>,
 }
 
+/// Most bytes of a model: five million triangles. Welding takes about five times as much memory.
+const MAX_BYTES: u64 = 256 << 20;
 const HEADER: usize = 84;
 const RECORD: usize = 50;
 
@@ -129,7 +131,8 @@ const RECORD: usize = 50;
 /// # Errors
 /// [`MeshError`].
 pub fn read(path: &Path) -> Result<StlFile, MeshError> {
-    let bytes = std::fs::read(path).map_err(|source| MeshError::Io { file: path.to_owned(), source })?;
+    let bytes =
+        super::files::read(path, MAX_BYTES).map_err(|source| MeshError::Io { file: path.to_owned(), source })?;
     weld(path, corners(path, &bytes)?)
 }
 

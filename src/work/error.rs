@@ -54,11 +54,7 @@ impl TaskError {
 
     /// A panic caught at the edge of a lane.
     pub fn panicked(what: impl Into<String>, payload: &(dyn std::any::Any + Send)) -> Self {
-        let text = payload
-            .downcast_ref::<&str>()
-            .map(ToString::to_string)
-            .or_else(|| payload.downcast_ref::<String>().cloned())
-            .unwrap_or_else(|| "no message".into());
+        let text = crate::io::caught::panic_message(payload);
         Self {
             what: what.into(),
             why: format!("an internal error: {text}"),

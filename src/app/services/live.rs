@@ -20,9 +20,9 @@ use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
 use crate::infer::store::{self, Store};
-use crate::io::atomic;
 use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
+use crate::io::{atomic, files};
 use crate::work::bundles::{self, BundleInfo};
 use crate::work::error::TaskError;
 use crate::work::export::{ExportSetup, HandMasks, export_masks};
@@ -253,7 +253,7 @@ impl LiveServices {
     fn read_settings(&self) -> (Settings, Option<TaskError>) {
         let Some(folder) = &self.config_folder else { return (Settings::default(), None) };
         let file = folder.join(SETTINGS_FILE);
-        let bytes = match std::fs::read(&file) {
+        let bytes = match files::read(&file, files::SMALL) {
             Ok(bytes) => bytes,
             Err(err) if err.kind() == std::io::ErrorKind::NotFound => return (Settings::default(), None),
             Err(err) => {

@@ -13,8 +13,8 @@ use super::registration::{EngineRow, Prepared, offset, position_error_mm};
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
 use crate::domain::units::angle_error;
-use crate::io::npz;
 use crate::io::pt::Tensor;
+use crate::io::{files, npz};
 
 const SCRIPT: &str = include_str!("../../../benches/peers.py");
 /// Surface points of a tool: as many as the lab's loop compares with.
@@ -101,7 +101,7 @@ pub(super) fn run(
         .wait_with_output()?;
     let said = String::from_utf8_lossy(&done.stderr);
     ensure!(done.status.success(), "{}: {}", python.display(), said.lines().last().unwrap_or("it failed"));
-    let reply = std::fs::read(folder.path().join("reply.json")).context("the script wrote no answer")?;
+    let reply = files::read(&folder.path().join("reply.json"), files::SMALL).context("the script wrote no answer")?;
     let reply: Reply = serde_json::from_slice(&reply).context("the script's answer")?;
     let mut notes = Vec::new();
     for (library, version) in &reply.versions {

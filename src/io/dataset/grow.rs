@@ -10,6 +10,7 @@ use super::{Dataset, LoadError, OpenError, Source};
 use crate::domain::dataset::PairId;
 use crate::domain::sample::{BubbleCamera, Sample};
 use crate::domain::sensor::Finger;
+use crate::io::caught::caught;
 
 /// What is in the name of every file that is written beside a touch; such files are never taken for touches.
 pub const OUTPUT_MARK: &str = ".t2t.";
@@ -122,7 +123,7 @@ impl Dataset {
                 Source::Lab(lab) => lab.first_bubble(),
                 Source::Pictures(_) | Source::BuiltIn(_) => None,
             };
-            let cameras = named.or_else(first).map(|file| (Lab::cameras(&file), file));
+            let cameras = named.or_else(first).map(|file| (cameras_of(&file), file));
             match cameras {
                 Some((Ok(cameras), _)) => cameras.map(|camera| camera.map(Arc::new)),
                 Some((Err(err), file)) => {
@@ -150,7 +151,8 @@ impl Dataset {
 /// # Errors
 /// [`LoadError`] if the file cannot be read; one without camera data has none.
 pub fn cameras_of(file: &Path) -> Result<[Option<BubbleCamera>; 2], LoadError> {
-    Lab::cameras(file)
+    caught(|| Lab::cameras(file))
+        .unwrap_or_else(|message| Err(LoadError::Bug { files: vec![file.to_owned()], message }))
 }
 
 fn put<T>(list: &mut Vec<T>, item: T, at: Option<PairId>) {

@@ -17,6 +17,8 @@ use std::path::{Path, PathBuf};
 
 use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
 use crate::domain::sample::BubbleCamera;
+use crate::io::caught::caught;
+use crate::io::pt::read_dict;
 
 use super::{LoadError, Loaded, Scan, Source, SourceKind, is_output, last_integer, problem};
 
@@ -152,7 +154,10 @@ pub(super) fn scan_flat(folder: &Path) -> Option<Scan> {
     found.sort_by(|a, b| a.name.cmp(&b.name));
     found.dedup_by(|a, b| a.name == b.name);
     // A folder of something else says so with its first readable file.
-    let other = |f: &Found| super::super::pt::read_dict(&scan.path(&f.file)).is_ok_and(|dict| !dict.has("gelslim"));
+    // What cannot be read, or makes the reader fail, may be a touch that is still being written.
+    let other = |f: &Found| {
+        caught(|| read_dict(&scan.path(&f.file))).is_ok_and(|read| read.is_ok_and(|dict| !dict.has("gelslim")))
+    };
     if found.is_empty() || found.iter().take(1).any(other) {
         return None;
     }

@@ -4,10 +4,13 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use crate::domain::mesh::TriMesh;
+use crate::io::files;
 use crate::io::stl::{self, MeshError};
 
 /// The file beside the CAD models that says which unit they are in.
 pub const UNIT_FILE: &str = "unit.txt";
+/// Most bytes of that file: a word or a number.
+const MAX_UNIT_BYTES: u64 = 4096;
 
 /// What the numbers of a CAD file mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,7 +38,12 @@ impl FromStr for ToolScale {
             "in" => Self::Factor(0.0254),
             other => match other.parse::<f64>() {
                 Ok(factor) if factor.is_finite() && factor > 0.0 => Self::Factor(factor),
-                _ => return Err(format!("{other:?} is no unit: use m, cm, mm, um, in, auto or a factor to metres")),
+                _ => {
+                    return Err(format!(
+                        "{:?} is no unit: use m, cm, mm, um, in, auto or a factor to metres",
+                        files::clip(other)
+                    ));
+                }
             },
         })
     }
@@ -45,7 +53,7 @@ impl ToolScale {
     /// What [`UNIT_FILE`] beside `model` says; `None` without one.
     fn beside(model: &Path) -> Result<Option<Self>, MeshError> {
         let file: PathBuf = model.with_file_name(UNIT_FILE);
-        match std::fs::read_to_string(&file) {
+        match files::read_to_string(&file, MAX_UNIT_BYTES) {
             Ok(text) => text.parse().map(Some).map_err(|reason| MeshError::UnitFile { file, reason }),
             Err(err) if err.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(source) => Err(MeshError::Io { file, source }),

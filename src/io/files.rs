@@ -1,0 +1,123 @@
+//! Opening files that others wrote: ordinary files only, and never more of one than the reader can use.
+//!
+//! Every reader of `io`, `infer` and `app` goes through here (`tests/layers.rs` holds them to it). A named pipe would wait
+//! for a writer for ever, and a link to `/dev/zero` never ends.
+
+use std::fs::{File, Metadata};
+use std::io::{self, Read as _};
+use std::path::Path;
+
+/// Most bytes of a small file: settings, manifests, reports, masks.
+pub const SMALL: u64 = 64 << 20;
+/// Most bytes of a model: a protobuf message, which is what an ONNX file is, cannot be larger.
+pub const MODEL: u64 = 2 << 30;
+
+/// Opens an ordinary file, or what a link to one leads to.
+///
+/// # Errors
+/// The system's, and [`io::ErrorKind::InvalidInput`] for a pipe, a socket or a device.
+pub fn open(path: &Path) -> io::Result<File> {
+    // Asked before opening, because opening a named pipe waits for somebody to write to it.
+    ordinary(&std::fs::metadata(path)?)?;
+    let file = File::open(path)?;
+    ordinary(&file.metadata()?)?;
+    Ok(file)
+}
+
+fn ordinary(found: &Metadata) -> io::Result<()> {
+    if found.is_file() {
+        Ok(())
+    } else if found.is_dir() {
+        Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, not a file"))
+    } else {
+        Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a pipe, a socket or a device, not an ordinary file"))
+    }
+}
+
+/// Reads an ordinary file of at most `limit` bytes.
+///
+/// # Errors
+/// As [`open`]; [`io::ErrorKind::FileTooLarge`] before anything is read.
+pub fn read(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let file = open(path)?;
+    let length = file.metadata()?.len();
+    let too_large = |length: u64| {
+        let what = format!("it has {length} bytes, and at most {limit} are read");
+        io::Error::new(io::ErrorKind::FileTooLarge, what)
+    };
+    if length > limit {
+        return Err(too_large(length));
+    }
+    let mut bytes = Vec::new();
+    // A file that memory cannot hold is an error, not the end of the program.
+    bytes.try_reserve_exact(length as usize).map_err(|_| io::Error::from(io::ErrorKind::OutOfMemory))?;
+    // It may grow while it is read.
+    file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        return Err(too_large(bytes.len() as u64));
+    }
+    Ok(bytes)
+}
+
+/// [`read`] as text.
+///
+/// # Errors
+/// As [`read`]; [`io::ErrorKind::InvalidData`] for what is not UTF-8.
+pub fn read_to_string(path: &Path, limit: u64) -> io::Result<String> {
+    String::from_utf8(read(path, limit)?).map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not text"))
+}
+
+/// A text from a file or from a library that quotes one, short enough for a message.
+pub fn clip(text: &str) -> String {
+    const MOST: usize = 400;
+    match text.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{} ...", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_ordinary_files_of_a_bounded_size_are_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("f");
+        std::fs::write(&file, b"12345").unwrap();
+        assert_eq!(read(&file, 5).unwrap(), b"12345");
+        assert_eq!(read_to_string(&file, 9).unwrap(), "12345");
+        let error = read(&file, 4).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::FileTooLarge);
+        assert!(error.to_string().contains('5') && error.to_string().contains('4'), "{error}");
+        assert_eq!(read(&dir.path().join("no"), 4).unwrap_err().kind(), io::ErrorKind::NotFound);
+        assert_eq!(read(dir.path(), 4).unwrap_err().kind(), io::ErrorKind::IsADirectory);
+        std::fs::write(&file, b"\xff").unwrap();
+        assert_eq!(read_to_string(&file, 9).unwrap_err().kind(), io::ErrorKind::InvalidData);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn pipes_devices_and_links_to_them_are_refused_at_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let pipe = dir.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let zero = dir.path().join("zero");
+        std::os::unix::fs::symlink("/dev/zero", &zero).unwrap();
+        for path in [&pipe, &zero] {
+            let error = read(path, SMALL).unwrap_err();
+            assert!(error.to_string().contains("not an ordinary file"), "{error}");
+        }
+        let (file, link) = (dir.path().join("f"), dir.path().join("link"));
+        std::fs::write(&file, b"1").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        assert_eq!(read(&link, 1).unwrap(), b"1");
+    }
+
+    #[test]
+    fn long_texts_are_clipped_at_a_character() {
+        assert_eq!(clip("short"), "short");
+        let long = clip(&"é".repeat(1000));
+        assert!(long.len() < 900 && long.ends_with("é ..."));
+    }
+}
