@@ -10,6 +10,7 @@ mod cli;
 #[cfg(feature = "onnx")]
 mod cli_generate;
 mod io;
+mod kill;
 mod layers;
 mod models;
 mod pose;

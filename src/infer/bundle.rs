@@ -2,7 +2,8 @@
 //!
 //! [`Bundle::open`] checks everything that can be checked without running a graph: the manifest, the presence and
 //! SHA-256 of every file, and the names, element types and shapes of every graph's inputs and outputs against the
-//! manifest. A bundle with anything wrong is refused with the whole list.
+//! manifest. A bundle with anything wrong is refused with the whole list. Whether an engine takes the graphs, and what
+//! they ask for, is found out by [`super::trial`].
 //!
 //! # Manifest, format version 1
 //!
@@ -88,7 +89,7 @@
 //! | `mask_unet` | `imprint` \[N, 1, input height, width\], 0 to 1 | `logits` \[N, classes, input height, width\] |
 //! | `tool_classifier` | `imprint` \[N, 1, input height, width\], -1 to 1 | `logits` \[N, classes\], `features` \[N, features\] |
 
-mod contract;
+pub(super) mod contract;
 mod find;
 mod manifest;
 
@@ -110,6 +111,11 @@ pub use manifest::{
 
 /// The manifest's file name.
 pub const MANIFEST: &str = "manifest.json";
+
+/// Longest manifest that is read, bytes.
+const MAX_MANIFEST: u64 = 4 << 20;
+/// Longest graph that is read, bytes: the format's own limit.
+pub(super) const MAX_GRAPH: u64 = (2 << 30) - 1;
 
 /// What a graph does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -172,6 +178,7 @@ pub struct Bundle {
     name: String,
     hash: String,
     files: BTreeMap<Role, PathBuf>,
+    bytes: u64,
     spec: BundleSpec,
     provenance: serde_json::Value,
 }
@@ -188,7 +195,7 @@ impl Bundle {
     pub fn open(dir: &Path) -> Result<Self, BundleError> {
         let refuse = |problems| BundleError { dir: dir.to_path_buf(), problems };
         let path = dir.join(MANIFEST);
-        let text = std::fs::read(&path).map_err(|err| {
+        let text = read(&path, MAX_MANIFEST).map_err(|err| {
             refuse(vec![Problem {
                 file: path.clone(),
                 what: format!("cannot be read: {err}"),
@@ -200,14 +207,16 @@ impl Bundle {
             return Err(refuse(problems.list));
         };
         let mut files = BTreeMap::new();
+        let mut size = 0;
         for (&role, entry) in &manifest.files {
             let Some(file) = inside(dir, &entry.path) else {
                 let what = format!("files.{}.path: \"{}\" leads out of the folder", role.key(), entry.path);
                 problems.add(what, "name a file inside the bundle's folder");
                 continue;
             };
-            match std::fs::read(&file) {
+            match read(&file, MAX_GRAPH) {
                 Ok(bytes) => {
+                    size += bytes.len() as u64;
                     let mut at_file = Problems { file: file.clone(), list: Vec::new() };
                     if !sha256(&bytes).eq_ignore_ascii_case(&entry.sha256) {
                         at_file.add(
@@ -234,6 +243,7 @@ impl Bundle {
                 name: manifest.name,
                 hash: sha256(&text),
                 files,
+                bytes: size,
                 spec,
                 provenance: manifest.provenance,
             }),
@@ -290,6 +300,16 @@ impl Bundle {
         self.files.get(&role).map(PathBuf::as_path)
     }
 
+    /// The graphs with their roles.
+    pub fn files(&self) -> impl Iterator<Item = (Role, &Path)> {
+        self.files.iter().map(|(role, file)| (*role, file.as_path()))
+    }
+
+    /// The size of all graphs together, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
     /// Free-form: data, commit, licence, losses.
     pub fn provenance(&self) -> &serde_json::Value {
         &self.provenance
@@ -313,6 +333,20 @@ fn inside(dir: &Path, name: &str) -> Option<PathBuf> {
     let path = Path::new(name);
     let plain = path.components().all(|c| matches!(c, std::path::Component::Normal(_)));
     (plain && !name.is_empty()).then(|| dir.join(path))
+}
+
+/// The content of an ordinary file of at most `limit` bytes: a pipe would never end, nor would a device.
+pub(super) fn read(path: &Path, limit: u64) -> std::io::Result<Vec<u8>> {
+    use std::io::{Error, Read as _};
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(Error::other("it is not an ordinary file"));
+    }
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)?.take(limit + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        return Err(Error::other(format!("it is longer than {} MB", limit >> 20)));
+    }
+    Ok(bytes)
 }
 
 /// SHA-256 in lower-case hex.

@@ -83,6 +83,9 @@ pub enum EngineError {
         /// The engine's words.
         reason: String,
     },
+    /// The bundle failed its trial.
+    #[error(transparent)]
+    Refused(#[from] super::trial::Refusal),
 }
 
 /// One input of a run.
@@ -119,7 +122,7 @@ impl Graph {
     /// # Errors
     /// See [`EngineError`].
     pub fn load(engine: EngineKind, role: Role, path: &Path) -> Result<Self, EngineError> {
-        let bytes = std::fs::read(path).map_err(|source| EngineError::Read { path: path.to_path_buf(), source })?;
+        let bytes = super::bundle::read(path, super::bundle::MAX_GRAPH).map_err(|source| EngineError::Read { path: path.to_path_buf(), source })?;
         load_session(engine, bytes)
             .map(|session| Self { role, runs: 0, session })
             .map_err(|err| err.unwrap_or_else(|reason| EngineError::Load { engine, role, reason }))
@@ -209,6 +212,15 @@ pub fn resolve(_: EngineChoice) -> Result<EngineKind, EngineError> {
 #[cfg(feature = "onnx")]
 pub(super) fn library() -> Result<Library, Vec<super::runtime::Searched>> {
     ort_engine::library()
+}
+
+/// What exactly an engine is that [`resolve`] gave: its name, and its library's own words where it has one.
+pub(super) fn build(engine: EngineKind) -> String {
+    match engine {
+        #[cfg(feature = "onnx")]
+        EngineKind::Ort => library().map_or_else(|_| engine.label().to_owned(), |library| library.build),
+        _ => engine.label().to_owned(),
+    }
 }
 
 /// Forgets that no library was found, so that a freshly fetched one is.
