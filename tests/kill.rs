@@ -128,7 +128,8 @@ fn script(seed: u64) -> Vec<Vec<Command>> {
             0..11 => {
                 let mut at = || [rng.random_range(0.0..175.0f32), rng.random_range(0.0..140.0f32)];
                 let (at_px, to) = (at(), at());
-                let begin = Command::BeginStroke { finger, source: ImprintSource::Measured, at_px, erase: rng.random() };
+                let begin =
+                    Command::BeginStroke { finger, source: ImprintSource::Measured, at_px, erase: rng.random() };
                 vec![Command::SelectFinger(finger), begin, Command::StrokeTo(to), Command::EndStroke]
             }
             11 => vec![Command::SelectFinger(finger), Command::FillHoles],

@@ -122,7 +122,8 @@ impl Graph {
     /// # Errors
     /// See [`EngineError`].
     pub fn load(engine: EngineKind, role: Role, path: &Path) -> Result<Self, EngineError> {
-        let bytes = super::bundle::read(path, super::bundle::MAX_GRAPH).map_err(|source| EngineError::Read { path: path.to_path_buf(), source })?;
+        let bytes = super::bundle::read(path, super::bundle::MAX_GRAPH)
+            .map_err(|source| EngineError::Read { path: path.to_path_buf(), source })?;
         load_session(engine, bytes)
             .map(|session| Self { role, runs: 0, session })
             .map_err(|err| err.unwrap_or_else(|reason| EngineError::Load { engine, role, reason }))
