@@ -103,6 +103,7 @@ type VerbResult = anyhow::Result<bool>;
 /// Parses the arguments and runs the verb or the window.
 pub fn main() -> ExitCode {
     output::start_log();
+    crate::infer::trial::by_this_program();
     let cli = Cli::parse();
     let result = match cli.verb {
         None => studio(cli.path, cli.reset_ui),

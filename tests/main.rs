@@ -11,6 +11,7 @@ mod cli;
 mod cli_generate;
 mod fuzz;
 mod io;
+mod kill;
 mod layers;
 mod models;
 mod pose;

@@ -507,3 +507,163 @@ fn a_build_without_models_says_so() {
     use touch2touch::infer::engine::{EngineChoice, EngineError, resolve};
     assert!(matches!(resolve(EngineChoice::Auto), Err(EngineError::NotInThisBuild)));
 }
+
+/// The trial of a bundle in a second process, by the program itself.
+#[cfg(feature = "onnx")]
+mod trial {
+    use std::process::{Command, Output};
+
+    use super::*;
+
+    fn run(args: &[&str], data: &Path) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_touch2touch"))
+            .args(args)
+            // Nothing of the user's may be read or written by a test.
+            .env("TOUCH2TOUCH_DATA", data)
+            .env("XDG_DATA_HOME", data)
+            .env("XDG_CONFIG_HOME", data)
+            .env("TOUCH2TOUCH_CACHE", data)
+            .output()
+            .unwrap()
+    }
+
+    fn text(output: &Output) -> String {
+        String::from_utf8_lossy(&[output.stdout.as_slice(), &output.stderr].concat()).into_owned()
+    }
+
+    /// Verdicts that were kept.
+    fn kept(data: &Path) -> usize {
+        std::fs::read_dir(data.join("trials")).map_or(0, Iterator::count)
+    }
+
+    fn number(mut n: u64) -> Vec<u8> {
+        let mut out = Vec::new();
+        while n > 0x7f {
+            out.push(n as u8 | 0x80);
+            n >>= 7;
+        }
+        out.push(n as u8);
+        out
+    }
+
+    /// Fields of a protobuf message: bytes and numbers.
+    fn bytes(field: u8, value: &[u8]) -> Vec<u8> {
+        [vec![field << 3 | 2], number(value.len() as u64), value.to_vec()].concat()
+    }
+    fn whole(field: u8, value: u64) -> Vec<u8> {
+        [vec![field << 3], number(value)].concat()
+    }
+
+    fn port(field: u8, name: &str, axes: &[u64]) -> Vec<u8> {
+        let batch = bytes(1, &bytes(2, b"N"));
+        let axes: Vec<u8> = axes.iter().flat_map(|&n| bytes(1, &whole(1, n))).collect();
+        let tensor = [whole(1, 1), bytes(2, &[batch, axes].concat())].concat();
+        bytes(field, &[bytes(1, name.as_bytes()), bytes(2, &bytes(1, &tensor))].concat())
+    }
+
+    /// A copy of the tiny mask bundle with another graph: one node of type `op` from `imprint` (and a list of numbers,
+    /// if there is one) to `logits`.
+    fn with_graph(op: &str, shape: &[i64]) -> tempfile::TempDir {
+        let dir = copy("mask");
+        let mut node = bytes(1, b"imprint");
+        let mut graph = Vec::new();
+        if !shape.is_empty() {
+            node.extend(bytes(1, b"shape"));
+            let raw: Vec<u8> = shape.iter().flat_map(|n| n.to_le_bytes()).collect();
+            let tensor = [whole(1, shape.len() as u64), whole(2, 7), bytes(8, b"shape"), bytes(9, &raw)].concat();
+            graph.extend(bytes(5, &tensor));
+        }
+        node.extend([bytes(2, b"logits"), bytes(3, b"node"), bytes(4, op.as_bytes())].concat());
+        graph.extend([bytes(1, &node), bytes(2, b"graph")].concat());
+        graph.extend([port(11, "imprint", &[1, 14, 18]), port(12, "logits", &[2, 14, 18])].concat());
+        let opset = bytes(8, &whole(2, 17));
+        let model = [whole(1, 8), bytes(7, &graph), opset].concat();
+        std::fs::write(dir.path().join("mask_unet.onnx"), &model).unwrap();
+        let sum: String = <sha2::Sha256 as sha2::Digest>::digest(&model).iter().map(|b| format!("{b:02x}")).collect();
+        edit(dir.path(), |m| m["files"]["mask_unet"]["sha256"] = sum.into());
+        Bundle::open(dir.path()).expect("nothing is wrong that can be seen without an engine");
+        dir
+    }
+
+    #[test]
+    fn whole_bundles_are_taken_and_the_verdict_is_kept() {
+        let data = tempfile::tempdir().unwrap();
+        for name in ["generator", "mask", "classifier"] {
+            let checked = run(&["bundle", "check", fixture(name).to_str().unwrap(), "--json"], data.path());
+            assert!(checked.status.success(), "{}", text(&checked));
+            let report: serde_json::Value = serde_json::from_slice(&checked.stdout).unwrap();
+            assert_eq!((&report["engines"][0], &report["problems"]), (&"rten".into(), &serde_json::json!([])));
+        }
+        assert!(kept(data.path()) >= 3);
+    }
+
+    /// 196 GB from a graph of 300 bytes, and 8 GB, which a large machine could give.
+    #[test]
+    fn a_graph_that_asks_for_too_much_is_refused_and_ends_nothing() {
+        let data = tempfile::tempdir().unwrap();
+        for copies in [97_000_000, 4_000_000] {
+            let dir = with_graph("Expand", &[copies, 2, 14, 18]);
+            let checked = run(&["bundle", "check", dir.path().to_str().unwrap()], data.path());
+            let said = text(&checked);
+            assert_eq!(checked.status.code(), Some(1), "{said}");
+            for expected in ["rten (built in) does not take", "`mask_unet`", "memory"] {
+                assert!(said.contains(expected), "`{expected}` is missing in:\n{said}");
+            }
+        }
+        assert_eq!(kept(data.path()), 0);
+    }
+
+    #[test]
+    fn what_an_engine_cannot_load_or_run_is_said() {
+        let data = tempfile::tempdir().unwrap();
+        for (dir, expected) in [
+            (with_graph("NoSuchOperator", &[]), "cannot load the graph `mask_unet`"),
+            (with_graph("Identity", &[]), "mask_unet"),
+            (with_graph("Expand", &[1, -7, 14, 18]), "mask_unet"),
+        ] {
+            let checked = run(&["bundle", "check", dir.path().to_str().unwrap()], data.path());
+            let said = text(&checked);
+            assert_eq!(checked.status.code(), Some(1), "{said}");
+            assert!(said.contains("rten (built in) does not take") && said.contains(expected), "{said}");
+        }
+    }
+
+    /// The verbs and the studio open a bundle by the same functions: none of them comes to the engine.
+    #[test]
+    fn a_verb_refuses_such_a_bundle_before_its_engine_sees_it() {
+        let data = tempfile::tempdir().unwrap();
+        let set = data.path().join("set");
+        let made =
+            run(&["simulate", "--out", set.to_str().unwrap(), "--tools", "pattern_36", "--grasps", "1"], data.path());
+        assert!(made.status.success(), "{}", text(&made));
+        let pose = |bundle: &Path| {
+            let args = ["pose", set.to_str().unwrap(), "--mask", "unet", "--runtime", "rten", "--mask-bundle"];
+            run(&[&args[..], &[bundle.to_str().unwrap()]].concat(), data.path())
+        };
+        let refused = pose(with_graph("Expand", &[97_000_000, 2, 14, 18]).path());
+        assert!(matches!(refused.status.code(), Some(1 | 2)), "{}", text(&refused));
+        assert!(text(&refused).contains("does not take the model bundle"), "{}", text(&refused));
+        assert_eq!(kept(data.path()), 0);
+        // A good one is tried once, and then known.
+        let good = pose(&fixture("mask"));
+        assert!(!text(&good).contains("does not take"), "{}", text(&good));
+        assert_eq!(kept(data.path()), 1);
+    }
+
+    #[test]
+    fn a_manifest_that_is_no_ordinary_file_is_refused_at_once() {
+        let data = tempfile::tempdir().unwrap();
+        let dir = copy("mask");
+        std::fs::remove_file(dir.path().join("mask_unet.onnx")).unwrap();
+        std::fs::create_dir(dir.path().join("mask_unet.onnx")).unwrap();
+        assert!(refusal(dir.path()).contains("not an ordinary file"));
+        #[cfg(unix)]
+        {
+            let dir = copy("mask");
+            std::fs::remove_file(dir.path().join(MANIFEST)).unwrap();
+            std::os::unix::fs::symlink("/dev/zero", dir.path().join(MANIFEST)).unwrap();
+            let checked = run(&["bundle", "check", dir.path().to_str().unwrap()], data.path());
+            assert!(!checked.status.success() && text(&checked).contains("not an ordinary file"), "{}", text(&checked));
+        }
+    }
+}

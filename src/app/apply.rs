@@ -238,10 +238,12 @@ fn save_settings(state: &State, effects: &mut Vec<Effect>) {
 /// Writes the labels of a pair of the open data set.
 fn save_labels(state: &mut State, name: &str, effects: &mut Vec<Effect>) {
     let Some(open) = &state.library.open else { return };
+    let revision = state.document.next_revision();
     let Some(labels) = state.document.labels.get(name) else { return };
-    let save = super::command::LabelsToSave { seq: open.seq, name: name.to_owned(), labels: labels.clone() };
+    let save = super::command::LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels: labels.clone() };
     effects.push(Effect::SaveLabels(open.source.clone(), Box::new(save)));
     state.document.unsaved.insert(name.to_owned());
+    state.document.asked.insert(name.to_owned(), revision);
 }
 
 fn save_all(state: &mut State, effects: &mut Vec<Effect>) {

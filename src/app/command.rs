@@ -11,7 +11,7 @@ use super::document::{PairLabels, Review};
 use super::evaluation::EvaluateCommand;
 use super::inspect::{InspectCommand, Inspection};
 use super::jobs::generate::Keyed;
-use super::keys::{DatasetSeq, ImprintSource, PoseEngine, PredictionKey, Request, ShiftMode};
+use super::keys::{DatasetSeq, ImprintSource, PoseEngine, PredictionKey, Request, Revision, ShiftMode};
 use super::library::{Place, Sort};
 use super::results::Preview;
 use super::seeds::SeedsCommand;
@@ -345,8 +345,8 @@ pub enum Command {
     TaskFailed(Ticket, TaskError),
     /// A result that a pane asked for could not be made.
     RequestFailed(Request, TaskError),
-    /// The labels of a pair are on the disk.
-    LabelsSaved(String),
+    /// The labels of a pair are on the disk, as they were when this writing was asked for.
+    LabelsSaved(String, Revision),
     /// The settings are on the disk.
     SettingsSaved,
     /// A file could not be saved.
@@ -410,6 +410,8 @@ pub struct LabelsToSave {
     pub seq: DatasetSeq,
     /// Its name.
     pub name: String,
+    /// The number of this request.
+    pub revision: Revision,
     /// What to write.
     pub labels: PairLabels,
 }

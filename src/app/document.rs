@@ -29,6 +29,8 @@ pub struct Document {
     pub reviews: BTreeMap<String, Review>,
     /// Pairs whose last change is not on the disk yet.
     pub unsaved: BTreeSet<String>,
+    /// The last request to write each of them.
+    pub(super) asked: BTreeMap<String, Revision>,
     /// The stroke being drawn.
     pub stroke: Option<Stroke>,
     /// The last revision given out.

@@ -14,6 +14,14 @@ use super::mesh::{MeshDistance, TriMesh};
 const MODEL_SEED: u64 = 0;
 /// Samples this close to the outline of the silhouette, metres, get its normal.
 const OUTLINE_M: f64 = 0.5e-3;
+/// Points of the surface that stand for triangles which are too dear to search: less than half a millimetre apart on a
+/// hand-held tool.
+const DENSE_POINTS: usize = 50_000;
+/// Most triangles that a search may look at, on average. Ordinary meshes take some ten, however many they have.
+const MAX_EFFORT: usize = 500;
+/// Searches that tell, each this far from the surface, metres.
+const EFFORT_SEARCHES: usize = 64;
+const EFFORT_OFFSET_M: f64 = 1e-3;
 
 /// Why a CAD model cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -43,6 +51,8 @@ pub struct ToolModel {
     samples: OnceLock<Samples>,
     silhouette: OnceLock<Samples>,
     lab: OnceLock<LabModel>,
+    /// `None` inside where the triangles themselves can be searched.
+    dense: OnceLock<Option<Samples>>,
 }
 
 impl ToolModel {
@@ -64,12 +74,33 @@ impl ToolModel {
             samples: OnceLock::new(),
             silhouette: OnceLock::new(),
             lab: OnceLock::new(),
+            dense: OnceLock::new(),
         })
     }
 
     /// Points of the surface with the normals of their triangles, in space.
     pub fn samples(&self) -> &Samples {
         self.samples.get_or_init(|| Samples::in_space(&self.surface))
+    }
+
+    /// What to compare with in place of the triangles, where looking for the nearest triangle takes too long: points of
+    /// the surface, close together, each with the plane of its triangle. `None` for nearly all tools.
+    pub fn instead_of_triangles(&self) -> Option<&Samples> {
+        let dense = self.dense.get_or_init(|| {
+            let (mut effort, mut searches) = (0, 0);
+            for (i, (point, normal)) in self.surface.iter().take(EFFORT_SEARCHES).enumerate() {
+                // In turn outside and inside.
+                let side = if i % 2 == 0 { EFFORT_OFFSET_M } else { -EFFORT_OFFSET_M };
+                let at = *point + *normal * side;
+                if at.is_finite() {
+                    effort += self.distance.effort(at);
+                    searches += 1;
+                }
+            }
+            (effort > MAX_EFFORT * searches)
+                .then(|| Samples::in_space(&self.mesh.sample_surface_with_normals(DENSE_POINTS, MODEL_SEED)))
+        });
+        dense.as_ref()
     }
 
     /// The same points as the lab's loop sees them.

@@ -1,19 +1,25 @@
-//! `touch2touch bundle check` and `touch2touch runtime`.
+//! `touch2touch bundle check` (with the second process it starts) and `touch2touch runtime`.
 
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
+use super::predict::RuntimeArg;
 use super::{Common, Output, VerbResult};
 use crate::infer::bundle::Bundle;
-use crate::infer::runtime;
+use crate::infer::engine::{EngineChoice, EngineKind, resolve};
+use crate::infer::{runtime, trial};
 
 /// What can be done with a bundle.
 #[derive(Debug, Subcommand)]
 pub(super) enum BundleVerb {
-    /// Check a bundle's manifest, files and shapes, and list everything that is wrong.
+    /// Check a bundle's manifest, files and shapes, then load and run it once on every engine that is present, and list
+    /// everything that is wrong.
     Check(BundleArgs),
+    /// What `check` starts in a process of its own.
+    #[command(hide = true)]
+    Try(TryArgs),
 }
 
 /// Arguments of `bundle check`.
@@ -25,40 +31,88 @@ pub(super) struct BundleArgs {
     common: Common,
 }
 
+/// Arguments of `bundle try`.
+#[derive(Debug, Args)]
+pub(super) struct TryArgs {
+    path: PathBuf,
+    #[arg(long, value_enum)]
+    engine: RuntimeArg,
+}
+
 #[derive(Serialize)]
 struct BundleReport {
     bundle: PathBuf,
     name: Option<String>,
     hash: Option<String>,
+    /// Engines that took it.
+    engines: Vec<EngineKind>,
     problems: Vec<String>,
 }
 
 pub(super) fn bundle(verb: &BundleVerb) -> VerbResult {
-    let BundleVerb::Check(args) = verb;
-    let output = Output::new(args.common, "checking", 1);
-    let report = match Bundle::open(&args.path) {
-        Ok(bundle) => BundleReport {
-            bundle: args.path.clone(),
-            name: Some(bundle.name().to_owned()),
-            hash: Some(bundle.hash().to_owned()),
-            problems: Vec::new(),
-        },
-        Err(err) => BundleReport {
-            bundle: args.path.clone(),
-            name: None,
-            hash: None,
-            problems: err.problems.iter().map(|p| format!("{}: {} ({})", p.file.display(), p.what, p.hint)).collect(),
-        },
-    };
+    match verb {
+        BundleVerb::Check(args) => check(args),
+        BundleVerb::Try(args) => attempt(args),
+    }
+}
+
+fn check(args: &BundleArgs) -> VerbResult {
+    let engines: Vec<EngineKind> =
+        [EngineChoice::Rten, EngineChoice::Ort].into_iter().filter_map(|choice| resolve(choice).ok()).collect();
+    let output = Output::new(args.common, "checking", 1 + engines.len());
+    let mut report =
+        BundleReport { bundle: args.path.clone(), name: None, hash: None, engines: Vec::new(), problems: Vec::new() };
+    match Bundle::open(&args.path) {
+        Ok(bundle) => {
+            output.step("manifest and files");
+            for engine in engines {
+                output.message(engine.label());
+                match trial::check(&bundle, engine) {
+                    Ok(()) => report.engines.push(engine),
+                    Err(refusal) => report.problems.push(refusal.to_string()),
+                }
+                output.step(engine.label());
+            }
+            report.name = Some(bundle.name().to_owned());
+            report.hash = Some(bundle.hash().to_owned());
+        }
+        Err(err) => {
+            report.problems =
+                err.problems.iter().map(|p| format!("{}: {} ({})", p.file.display(), p.what, p.hint)).collect();
+        }
+    }
     let sound = report.problems.is_empty();
     output.finish(&report, || {
-        if sound {
-            format!("{}: sound", args.path.display())
-        } else {
-            format!("{} is refused:\n  {}", args.path.display(), report.problems.join("\n  "))
+        let folder = args.path.display();
+        let labels: Vec<&str> = report.engines.iter().map(|engine| engine.label()).collect();
+        match (sound, labels.is_empty()) {
+            (true, true) => format!("{folder}: sound, but this build has no engine to run it"),
+            (true, false) => format!("{folder}: sound; taken by {}", labels.join(" and ")),
+            (false, true) => format!("{folder} is refused:\n  {}", report.problems.join("\n  ")),
+            (false, false) => {
+                format!("{folder} is taken by {} alone:\n  {}", labels.join(" and "), report.problems.join("\n  "))
+            }
         }
     })?;
     Ok(sound)
+}
+
+/// The second process of a trial.
+fn attempt(args: &TryArgs) -> VerbResult {
+    // Also where the first process is gone and cannot end this one.
+    std::thread::spawn(|| {
+        std::thread::sleep(2 * trial::TIME);
+        std::process::exit(1);
+    });
+    let output = Output::new(Common { json: false }, "trying", 1);
+    let bundle = Bundle::open(&args.path)?;
+    let mut written = Ok(());
+    let taken = trial::run(&bundle, args.engine.choice(), &mut |text| {
+        if written.is_ok() {
+            written = output.line(&text, || text.to_owned());
+        }
+    })?;
+    written.map(|()| taken)
 }
 
 /// Arguments of `runtime`.

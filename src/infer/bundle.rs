@@ -2,7 +2,8 @@
 //!
 //! [`Bundle::open`] checks everything that can be checked without running a graph: the manifest, the presence and
 //! SHA-256 of every file, and the names, element types and shapes of every graph's inputs and outputs against the
-//! manifest. A bundle with anything wrong is refused with the whole list.
+//! manifest. A bundle with anything wrong is refused with the whole list. Whether an engine takes the graphs, and what
+//! they ask for, is found out by [`super::trial`].
 //!
 //! # Manifest, format version 1
 //!
@@ -88,7 +89,7 @@
 //! | `mask_unet` | `imprint` \[N, 1, input height, width\], 0 to 1 | `logits` \[N, classes, input height, width\] |
 //! | `tool_classifier` | `imprint` \[N, 1, input height, width\], -1 to 1 | `logits` \[N, classes\], `features` \[N, features\] |
 
-mod contract;
+pub(super) mod contract;
 mod find;
 mod manifest;
 
@@ -111,6 +112,9 @@ pub use manifest::{
 
 /// The manifest's file name.
 pub const MANIFEST: &str = "manifest.json";
+
+/// Longest manifest that is read, bytes.
+const MAX_MANIFEST: u64 = 4 << 20;
 
 /// What a graph does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -173,6 +177,7 @@ pub struct Bundle {
     name: String,
     hash: String,
     files: BTreeMap<Role, PathBuf>,
+    bytes: u64,
     spec: BundleSpec,
     provenance: serde_json::Value,
 }
@@ -189,7 +194,7 @@ impl Bundle {
     pub fn open(dir: &Path) -> Result<Self, BundleError> {
         let refuse = |problems| BundleError { dir: dir.to_path_buf(), problems };
         let path = dir.join(MANIFEST);
-        let text = files::read(&path, files::SMALL).map_err(|err| {
+        let text = files::read(&path, MAX_MANIFEST).map_err(|err| {
             refuse(vec![Problem {
                 file: path.clone(),
                 what: format!("cannot be read: {err}"),
@@ -201,6 +206,7 @@ impl Bundle {
             return Err(refuse(problems.list));
         };
         let mut files = BTreeMap::new();
+        let mut size = 0;
         for (&role, entry) in &manifest.files {
             let Some(file) = inside(dir, &entry.path) else {
                 let what = format!("files.{}.path: \"{}\" leads out of the folder", role.key(), entry.path);
@@ -209,6 +215,7 @@ impl Bundle {
             };
             match files::read(&file, files::MODEL) {
                 Ok(bytes) => {
+                    size += bytes.len() as u64;
                     let mut at_file = Problems { file: file.clone(), list: Vec::new() };
                     if !sha256(&bytes).eq_ignore_ascii_case(&entry.sha256) {
                         at_file.add(
@@ -235,6 +242,7 @@ impl Bundle {
                 name: manifest.name,
                 hash: sha256(&text),
                 files,
+                bytes: size,
                 spec,
                 provenance: manifest.provenance,
             }),
@@ -289,6 +297,16 @@ impl Bundle {
     /// Where a graph lies.
     pub fn file(&self, role: Role) -> Option<&Path> {
         self.files.get(&role).map(PathBuf::as_path)
+    }
+
+    /// The graphs with their roles.
+    pub fn files(&self) -> impl Iterator<Item = (Role, &Path)> {
+        self.files.iter().map(|(role, file)| (*role, file.as_path()))
+    }
+
+    /// The size of all graphs together, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
     }
 
     /// Free-form: data, commit, licence, losses.

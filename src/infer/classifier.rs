@@ -1,7 +1,8 @@
 //! [`ToolClassifier`]: an imprint to the tool that made it, with the graph of a bundle.
 
 use super::bundle::{Bundle, ClassifierInput, ClassifierSpec, Role};
-use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, resolve};
+use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
+use super::trial::admit;
 use crate::domain::diffusion::{ModelError, Tensor};
 use crate::domain::grid::DepthMap;
 use crate::domain::resample::bilinear;
@@ -55,7 +56,7 @@ impl ToolClassifier {
     pub fn open(bundle: &Bundle, choice: EngineChoice) -> Result<Self, ClassifyError> {
         let not = || ClassifyError::NotAClassifier(bundle.name().to_owned());
         let spec = bundle.tool_classifier().ok_or_else(not)?.clone();
-        let engine = resolve(choice)?;
+        let engine = admit(bundle, choice)?;
         let graph = Graph::load(engine, Role::ToolClassifier, bundle.file(Role::ToolClassifier).ok_or_else(not)?)?;
         Ok(Self { spec, engine, graph })
     }

@@ -97,6 +97,9 @@ pub enum EngineError {
         /// The engine's words.
         reason: String,
     },
+    /// The bundle failed its trial.
+    #[error(transparent)]
+    Refused(#[from] super::trial::Refusal),
 }
 
 /// One input of a run.
@@ -224,6 +227,15 @@ pub fn resolve(_: EngineChoice) -> Result<EngineKind, EngineError> {
 #[cfg(feature = "onnx")]
 pub(super) fn library() -> Result<Library, Vec<super::runtime::Searched>> {
     ort_engine::library()
+}
+
+/// What exactly an engine is that [`resolve`] gave: its name, and its library's own words where it has one.
+pub(super) fn build(engine: EngineKind) -> String {
+    match engine {
+        #[cfg(feature = "onnx")]
+        EngineKind::Ort => library().map_or_else(|_| engine.label().to_owned(), |library| library.build),
+        _ => engine.label().to_owned(),
+    }
 }
 
 /// Forgets that no library was found, so that a freshly fetched one is.

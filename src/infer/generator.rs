@@ -8,8 +8,9 @@ pub use preview::Observer;
 use preview::Watching;
 
 use super::bundle::{Bundle, GeneratorInput, GeneratorSpec, InputScale, Role, TimestepType, Unconditional};
-use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, resolve};
+use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
 use super::recipe::Recipe;
+use super::trial::admit;
 use crate::domain::diffusion::{
     Denoiser, DiffusionError, GenerateConfig, Guided, ModelError, Prediction, Progress, Tensor, sample_watched,
 };
@@ -97,7 +98,7 @@ impl Generator {
     pub fn open(bundle: &Bundle, choice: EngineChoice) -> Result<Self, GenerateError> {
         let not = || GenerateError::NotAGenerator(bundle.name().to_owned());
         let spec = bundle.generator().ok_or_else(not)?.clone();
-        let engine = resolve(choice)?;
+        let engine = admit(bundle, choice)?;
         let load = |role| -> Result<Graph, GenerateError> {
             Ok(Graph::load(engine, role, bundle.file(role).ok_or_else(not)?)?)
         };

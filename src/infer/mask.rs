@@ -1,7 +1,8 @@
 //! [`MaskModel`]: an imprint to a contact mask, with the graph of a bundle.
 
 use super::bundle::{Bundle, Cast, MaskInput, MaskSpec, Role};
-use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, resolve};
+use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
+use super::trial::admit;
 use crate::domain::diffusion::{ModelError, Tensor};
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::resample::{bilinear, nearest_mask};
@@ -45,7 +46,7 @@ impl MaskModel {
     pub fn open(bundle: &Bundle, choice: EngineChoice) -> Result<Self, MaskError> {
         let not = || MaskError::NotAMaskUnet(bundle.name().to_owned());
         let spec = bundle.mask_unet().ok_or_else(not)?.clone();
-        let engine = resolve(choice)?;
+        let engine = admit(bundle, choice)?;
         let graph = Graph::load(engine, Role::MaskUnet, bundle.file(Role::MaskUnet).ok_or_else(not)?)?;
         Ok(Self { spec, hash: bundle.hash().to_owned(), engine, graph })
     }

@@ -3,6 +3,8 @@
 //! An ONNX file is a protobuf message. Only the few fields needed are decoded, the weights are skipped, and any
 //! malformed byte is an error. Field numbers are those of the public `onnx.proto`.
 
+use std::collections::BTreeSet;
+
 /// The interface of a graph.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Header {
@@ -32,45 +34,75 @@ pub(crate) const INT64: u64 = 7;
 #[error("not an ONNX file: {0}")]
 pub(crate) struct HeaderError(&'static str);
 
-/// Decodes the interface of the ONNX file in `bytes`.
+/// Most inputs or outputs of a file: old files list their weights among the inputs, some thousand of them.
+const MAX_PORTS: usize = 10_000;
+/// Most axes of a tensor; no engine takes more than a few.
+const MAX_AXES: usize = 64;
+
+/// Decodes the interface of the ONNX file in `bytes`. Takes memory for the ports alone, however long the file is.
 pub(crate) fn read(bytes: &[u8]) -> Result<Header, HeaderError> {
-    let graph = fields(bytes)?
-        .into_iter()
-        .find_map(|f| (f.number == 7).then_some(f.value)) // ModelProto.graph
-        .ok_or(HeaderError("it holds no graph"))?;
+    let mut graph = None;
+    for field in fields(bytes) {
+        let field = field?;
+        if field.number == 7 && graph.is_none() {
+            graph = Some(field.value.message()?); // ModelProto.graph
+        }
+    }
+    let graph = graph.ok_or(HeaderError("it holds no graph"))?;
     let mut header = Header::default();
-    let mut initializers = Vec::new();
-    for field in fields(graph.message()?)? {
+    for field in fields(graph) {
+        let field = field?;
         match field.number {
-            5 => {
-                // TensorProto: 8 = name, 14 = data_location (1 = external).
-                for part in fields(field.value.message()?)? {
-                    match part.number {
-                        8 => initializers.push(text(part.value)?),
-                        14 => header.external_data |= matches!(part.value, Value::Number(1)),
-                        _ => {}
-                    }
+            11 | 12 => {
+                let ports = if field.number == 11 { &mut header.inputs } else { &mut header.outputs };
+                if ports.len() == MAX_PORTS {
+                    return Err(HeaderError("it has too many inputs or outputs"));
                 }
+                ports.push(port(field.value.message()?)?);
             }
-            11 => header.inputs.push(port(field.value.message()?)?),
-            12 => header.outputs.push(port(field.value.message()?)?),
             _ => {}
         }
     }
     // Old files list their weights among the inputs.
-    header.inputs.retain(|input| !initializers.contains(&input.name));
+    let names: BTreeSet<&str> = header.inputs.iter().map(|input| input.name.as_str()).collect();
+    let mut weights = BTreeSet::new();
+    for field in fields(graph) {
+        let field = field?;
+        if field.number != 5 {
+            continue;
+        }
+        // TensorProto: 8 = name, 14 = data_location (1 = external).
+        for part in fields(field.value.message()?) {
+            let part = part?;
+            match part.number {
+                8 => {
+                    let name = String::from_utf8_lossy(part.value.message()?);
+                    weights.extend(names.get(&*name).map(|name| (*name).to_owned()));
+                }
+                14 => header.external_data |= matches!(part.value, Value::Number(1)),
+                _ => {}
+            }
+        }
+    }
+    header.inputs.retain(|input| !weights.contains(&input.name));
     Ok(header)
 }
 
 /// ValueInfoProto: 1 = name, 2 = type { 1 = tensor_type { 1 = elem_type, 2 = shape { 1 = dim { 1 = value } } } }.
 fn port(bytes: &[u8]) -> Result<Port, HeaderError> {
     let mut port = Port::default();
-    for field in fields(bytes)? {
+    for field in fields(bytes) {
+        let field = field?;
         match field.number {
             1 => port.name = text(field.value)?,
             2 => {
-                for kind in fields(field.value.message()?)?.into_iter().filter(|f| f.number == 1) {
-                    for part in fields(kind.value.message()?)? {
+                for kind in fields(field.value.message()?) {
+                    let kind = kind?;
+                    if kind.number != 1 {
+                        continue;
+                    }
+                    for part in fields(kind.value.message()?) {
+                        let part = part?;
                         match part.number {
                             1 => port.element = part.value.number()?,
                             2 => port.shape = Some(shape(part.value.message()?)?),
@@ -86,14 +118,20 @@ fn port(bytes: &[u8]) -> Result<Port, HeaderError> {
 }
 
 fn shape(bytes: &[u8]) -> Result<Vec<Option<u64>>, HeaderError> {
-    let dims = fields(bytes)?.into_iter().filter(|f| f.number == 1);
-    dims.map(|dim| {
-        let size = fields(dim.value.message()?)?.into_iter().find(|f| f.number == 1);
-        let size = size.map(|f| f.value.number()).transpose()?;
+    let mut dims = Vec::new();
+    for dim in fields(bytes) {
+        let dim = dim?;
+        if dim.number != 1 {
+            continue;
+        }
+        if dims.len() == MAX_AXES {
+            return Err(HeaderError("a tensor has too many axes"));
+        }
+        let size = find(dim.value.message()?, 1)?.map(|size| size.number()).transpose()?;
         // Some exporters write 0 or -1 for a dynamic axis.
-        Ok(size.filter(|&n| n > 0 && n <= i64::MAX as u64))
-    })
-    .collect()
+        dims.push(size.filter(|&n| n > 0 && n <= i64::MAX as u64));
+    }
+    Ok(dims)
 }
 
 fn text(value: Value<'_>) -> Result<String, HeaderError> {
@@ -127,24 +165,41 @@ impl<'a> Value<'a> {
     }
 }
 
-/// Splits a protobuf message into its fields, without copying.
-fn fields(mut bytes: &[u8]) -> Result<Vec<Field<'_>>, HeaderError> {
-    let mut found = Vec::new();
-    while !bytes.is_empty() {
-        let key = varint(&mut bytes)?;
-        let value = match key & 7 {
-            0 => Value::Number(varint(&mut bytes)?),
-            1 => take(&mut bytes, 8).map(|_| Value::Fixed)?,
-            2 => {
-                let len = varint(&mut bytes)?;
-                Value::Bytes(take(&mut bytes, usize::try_from(len).unwrap_or(usize::MAX))?)
-            }
-            5 => take(&mut bytes, 4).map(|_| Value::Fixed)?,
-            _ => return Err(HeaderError("unknown wire type")),
-        };
-        found.push(Field { number: key >> 3, value });
+/// The fields of a protobuf message, one after the other, without copying; nothing follows an error.
+fn fields(mut bytes: &[u8]) -> impl Iterator<Item = Result<Field<'_>, HeaderError>> {
+    std::iter::from_fn(move || {
+        let field = (!bytes.is_empty()).then(|| field(&mut bytes))?;
+        if field.is_err() {
+            bytes = &[];
+        }
+        Some(field)
+    })
+}
+
+/// The first field with this number.
+fn find(bytes: &[u8], number: u64) -> Result<Option<Value<'_>>, HeaderError> {
+    for field in fields(bytes) {
+        let field = field?;
+        if field.number == number {
+            return Ok(Some(field.value));
+        }
     }
-    Ok(found)
+    Ok(None)
+}
+
+fn field<'a>(bytes: &mut &'a [u8]) -> Result<Field<'a>, HeaderError> {
+    let key = varint(bytes)?;
+    let value = match key & 7 {
+        0 => Value::Number(varint(bytes)?),
+        1 => take(bytes, 8).map(|_| Value::Fixed)?,
+        2 => {
+            let len = varint(bytes)?;
+            Value::Bytes(take(bytes, usize::try_from(len).unwrap_or(usize::MAX))?)
+        }
+        5 => take(bytes, 4).map(|_| Value::Fixed)?,
+        _ => return Err(HeaderError("unknown wire type")),
+    };
+    Ok(Field { number: key >> 3, value })
 }
 
 fn take<'a>(bytes: &mut &'a [u8], len: usize) -> Result<&'a [u8], HeaderError> {
@@ -180,6 +235,38 @@ mod tests {
         assert_eq!((header.inputs[0].element, header.inputs[1].element), (FLOAT32, INT64));
         assert_eq!(header.outputs[0].name, "prediction");
         assert!(!header.external_data);
+    }
+
+    /// A message within another: the field's key, its length, its bytes.
+    fn within(number: u8, message: &[u8]) -> Vec<u8> {
+        let mut out = vec![number << 3 | 2];
+        let mut len = message.len();
+        while len > 0x7f {
+            out.push(len as u8 | 0x80);
+            len >>= 7;
+        }
+        out.push(len as u8);
+        out.extend_from_slice(message);
+        out
+    }
+
+    /// Files that are short on the disk and would be long in memory, or long to compare.
+    #[test]
+    fn ports_and_axes_are_counted_before_they_are_kept() {
+        let ports = |count: usize| within(7, &within(11, &[]).repeat(count));
+        assert_eq!(read(&ports(MAX_PORTS)).unwrap().inputs.len(), MAX_PORTS);
+        assert!(read(&ports(MAX_PORTS + 1)).unwrap_err().to_string().contains("too many inputs"));
+        let axes = |count: usize| {
+            let shape = within(1, &[]).repeat(count);
+            within(7, &within(12, &within(2, &within(1, &within(2, &shape)))))
+        };
+        assert_eq!(read(&axes(MAX_AXES)).unwrap().outputs[0].shape, Some(vec![None; MAX_AXES]));
+        assert!(read(&axes(MAX_AXES + 1)).is_err());
+        // A million weights cost no more than the inputs they are compared with.
+        let mut graph = within(5, &within(8, b"w")).repeat(1_000_000);
+        graph.extend([within(11, &within(1, b"w")), within(11, &within(1, b"x"))].concat());
+        let inputs = read(&within(7, &graph)).unwrap().inputs;
+        assert_eq!(inputs.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["x"]);
     }
 
     #[test]

@@ -76,11 +76,16 @@ struct Header {
     seconds: f64,
 }
 
-/// The folder of this user's predictions by the rules of the platform; `TOUCH2TOUCH_CACHE` overrides it.
+/// The folder of this user's predictions, in [`user_cache`].
 pub fn user_folder() -> Option<PathBuf> {
+    user_cache().map(|folder| folder.join("predictions"))
+}
+
+/// The folder of what can be made again, by the rules of the platform; `TOUCH2TOUCH_CACHE` overrides it.
+pub(super) fn user_cache() -> Option<PathBuf> {
     let from = |variable: &str| std::env::var_os(variable).map(PathBuf::from).filter(|p| p.is_absolute());
     if let Some(folder) = from("TOUCH2TOUCH_CACHE") {
-        return Some(folder.join("predictions"));
+        return Some(folder);
     }
     let base = from("XDG_CACHE_HOME").or_else(|| {
         if cfg!(windows) {
@@ -91,7 +96,7 @@ pub fn user_folder() -> Option<PathBuf> {
             Some(from("HOME")?.join(".cache"))
         }
     })?;
-    Some(base.join("touch2touch").join("predictions"))
+    Some(base.join("touch2touch"))
 }
 
 impl Store {

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, Pane};
 use touch2touch::app::document::Review;
-use touch2touch::app::keys::{ImprintSource, MaskVersion};
+use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
 use touch2touch::app::settings::{MaskSource, MaskTool};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
@@ -197,6 +197,20 @@ fn a_full_disk_is_said_and_what_was_drawn_is_kept_and_saved_later() {
     bench.settle();
     assert!(bench.state.document.unsaved.is_empty());
     assert!(bench.services.source.labels.lock().unwrap().contains_key("tool_a/data_0"));
+}
+
+/// The studio says "saved" from `unsaved`: not while a newer stroke waits for the disk.
+#[test]
+fn an_answer_to_an_earlier_saving_confirms_nothing_newer() {
+    let mut bench = bench();
+    let unsaved = |bench: &Bench| bench.state.document.unsaved.contains("tool_a/data_0");
+    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
+    // What an earlier request, which was being carried out when this one came, is answered with.
+    bench.send(Command::LabelsSaved("tool_a/data_0".into(), Revision(0)));
+    assert!(unsaved(&bench), "the stroke is not on the disk");
+    bench.settle();
+    assert!(!unsaved(&bench));
+    assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 1);
 }
 
 #[test]

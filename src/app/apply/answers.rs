@@ -92,7 +92,9 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
         }
         Command::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
         Command::RequestFailed(request, err) => failed_request(state, request, err),
-        Command::LabelsSaved(name) => {
+        // An answer to anything but the last request: what was changed since is not on the disk yet.
+        Command::LabelsSaved(name, revision) if state.document.asked.get(&name) == Some(&revision) => {
+            state.document.asked.remove(&name);
             state.document.unsaved.remove(&name);
         }
         Command::SaveFailed(err) => state.log.error(&err),

@@ -102,7 +102,7 @@ impl Runtime {
                     "Save the labels",
                     Box::new(move |_| {
                         source.save_labels(&save.name, &save.labels)?;
-                        Ok(Command::LabelsSaved(save.name))
+                        Ok(Command::LabelsSaved(save.name, save.revision))
                     }),
                 );
             }

@@ -93,7 +93,7 @@ impl MeshDistance {
         if !p.is_finite() {
             return None;
         }
-        let (_, triangle) = self.search(p, limit_m * limit_m);
+        let triangle = self.search(p, limit_m * limit_m).triangle;
         let t @ [a, b, c] = self.triangles.get(triangle?)?;
         Some((nearest_on_triangle(t, p), (*b - *a).cross(*c - *a).try_normalize()?))
     }
@@ -144,13 +144,19 @@ impl MeshDistance {
 
     /// Squared distance to the nearest triangle, or `limit` if none is nearer than that.
     fn nearest_below(&self, p: DVec3, limit: f64) -> f64 {
-        self.search(p, limit).0
+        self.search(p, limit).squared
     }
 
-    /// Squared distance to the nearest triangle and its position; `limit` and `None` if none is nearer than that.
-    fn search(&self, p: DVec3, limit: f64) -> (f64, Option<usize>) {
+    /// Triangles that are looked at to find the one nearest to `p`, which must be finite: some ten, but all of those
+    /// that are long and thin and lie side by side, since the boxes do not tell them apart.
+    pub(in crate::domain) fn effort(&self, p: DVec3) -> usize {
+        self.search(p, f64::INFINITY).looked_at
+    }
+
+    /// The triangle nearest to `p`, if one is nearer than the root of `limit`.
+    fn search(&self, p: DVec3, limit: f64) -> Nearest {
         let mut best = limit;
-        let mut triangle = None;
+        let (mut triangle, mut looked_at) = (None, 0);
         let mut stack = vec![(0u32, self.nodes[0].distance_squared(p))];
         while let Some((index, distance)) = stack.pop() {
             if distance >= best {
@@ -169,6 +175,7 @@ impl MeshDistance {
                     stack.push((b, db));
                 }
             } else {
+                looked_at += node.count as usize;
                 for (i, t) in self.leaf(node).iter().enumerate() {
                     let distance = (nearest_on_triangle(t, p) - p).length_squared();
                     if distance < best {
@@ -178,8 +185,16 @@ impl MeshDistance {
                 }
             }
         }
-        (best, triangle)
+        Nearest { squared: best, triangle, looked_at }
     }
+}
+
+/// What a search found.
+struct Nearest {
+    /// Squared distance to the triangle; the limit if there is none.
+    squared: f64,
+    triangle: Option<usize>,
+    looked_at: usize,
 }
 
 /// Puts the node over `triangles[start..end]` and all below it at the end of `nodes`; returns its index.

@@ -5,10 +5,10 @@ use super::{Problems, Role};
 use crate::infer::onnx_header::{self, FLOAT32, INT64, Port};
 
 /// A tensor the manifest promises: its name, element types, and shape after the batch.
-struct Promise {
-    name: &'static str,
+pub(in crate::infer) struct Promise {
+    pub(in crate::infer) name: &'static str,
     elements: &'static [u64],
-    shape: Vec<usize>,
+    pub(in crate::infer) shape: Vec<usize>,
 }
 
 fn float(name: &'static str, shape: impl Into<Vec<usize>>) -> Promise {
@@ -54,7 +54,8 @@ pub(super) fn check(role: Role, bytes: &[u8], spec: &mut BundleSpec, problems: &
     }
 }
 
-fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<Promise>, Vec<Promise>)> {
+/// The inputs and outputs of a graph; `None` if this kind of bundle has no such graph.
+pub(in crate::infer) fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<Promise>, Vec<Promise>)> {
     match (role, spec) {
         (Role::MaskUnet, BundleSpec::MaskUnet(MaskSpec { input, output })) => {
             let [width, height] = input.size;

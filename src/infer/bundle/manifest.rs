@@ -17,6 +17,8 @@ const FORMAT: &str = "touch2touch-bundle";
 const VERSION: u64 = 1;
 /// No side of an image or latent may be longer; a larger number is a mistake and would exhaust the memory.
 const MAX_SIDE: usize = 4096;
+/// Most values of one tensor: four pictures with the longest sides.
+const MAX_VALUES: usize = 4 * MAX_SIDE * MAX_SIDE;
 
 /// One graph's file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -576,11 +578,11 @@ fn classifier(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<
     Some(BundleSpec::ToolClassifier(ClassifierSpec { input: input?, output: output? }))
 }
 
-const SIDES: &str = "every side must be 1 to 4096";
+const SIDES: &str = "every side must be 1 to 4096, and no tensor larger than 4 x 4096 x 4096";
 const TURNS: &str = "it must be 0 or 180";
 
 fn sides(sides: &[usize]) -> bool {
-    sides.iter().all(|&n| (1..=MAX_SIDE).contains(&n))
+    sides.iter().all(|&n| (1..=MAX_SIDE).contains(&n)) && sides.iter().product::<usize>() <= MAX_VALUES
 }
 
 fn turn(degrees: u32) -> bool {

@@ -10,7 +10,8 @@ pub enum Target {
     Silhouette,
     /// Model points in space, with the normals of the surface.
     Surface,
-    /// The triangles themselves.
+    /// The triangles themselves; where searching them takes too long, points that stand for them
+    /// ([`crate::domain::tool::ToolModel::instead_of_triangles`]).
     Mesh,
 }
 

@@ -135,7 +135,7 @@ impl<'a> Problem<'a> {
         let model = match config.target {
             Target::Silhouette => Model::Samples(tool.silhouette()),
             Target::Surface => Model::Samples(tool.samples()),
-            Target::Mesh => Model::Mesh(&tool.distance),
+            Target::Mesh => tool.instead_of_triangles().map_or(Model::Mesh(&tool.distance), Model::Samples),
         };
         let arms: Vec<DVec3> = points.iter().map(|p| *p - centroid).collect();
         let normals = if config.residual == Residual::Generalized { normals(points, cloud) } else { Vec::new() };

@@ -1,0 +1,353 @@
+//! The studio's saving under SIGKILL: what was said to be saved is on the disk, whatever the moment.
+//!
+//! One test plays both parts. The parent starts this binary again on the same test with [`ROLE`] set; that child drives
+//! the application model over real files (strokes, clean-ups, undo, navigation, review states, by a seeded script) and
+//! says after each round up to which act a pair is saved, as the model's document has it. The parent plays the same script
+//! by itself, without saving, so that it knows every mask after every act; kills the child at a random moment; and reads
+//! the folder with the product's reader. Each mask and review state must be one that was there at the last confirmation or
+//! later, and every file must parse. The next round goes on in the folder that the last one left.
+
+use std::collections::BTreeMap;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Command as Process, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use touch2touch::app::command::{Command, Opened, Pane};
+use touch2touch::app::document::{PairLabels, Review};
+use touch2touch::app::error::TaskError;
+use touch2touch::app::jobs::JobCx;
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::library::{BundleInfo, Place};
+use touch2touch::app::runtime::Runtime;
+use touch2touch::app::services::live::{LiveSource, open_source};
+use touch2touch::app::services::{DataSource, GenerateItem, Generated, Services};
+use touch2touch::app::settings::{RuntimeChoice, Settings};
+use touch2touch::app::state::{Lookup, State};
+use touch2touch::domain::dataset::{Index, PairId, Problem};
+use touch2touch::domain::grid::{DepthMap, Grid, Mask};
+use touch2touch::domain::mesh::TriMesh;
+use touch2touch::domain::sample::Sample;
+use touch2touch::domain::sensor::Finger;
+use touch2touch::io::images;
+use touch2touch::io::masks::{FOLDER, MaskStore};
+
+/// What the child plays: `FOLDER` and the script's seed.
+const ROLE: &str = "TOUCH2TOUCH_KILL_TEST";
+/// Kills of one run of the test; the next number of rounds in one folder.
+const KILLS: usize = 200;
+const ROUNDS: usize = 10;
+const PAIRS: u32 = 3;
+/// Acts of a script: more than fit in before the latest kill.
+const ACTS: usize = 400;
+
+/// A folder of pictures as the studio opens it, with labels on the disk; both fingers felt the same.
+struct Source {
+    live: LiveSource,
+    saves: bool,
+}
+
+impl DataSource for Source {
+    fn title(&self) -> &str {
+        self.live.title()
+    }
+    fn root(&self) -> Option<&Path> {
+        self.live.root()
+    }
+    fn index(&self) -> &Index {
+        self.live.index()
+    }
+    fn problems(&self) -> &[Problem] {
+        self.live.problems()
+    }
+    fn load(&self, pair: PairId) -> Result<Sample, TaskError> {
+        let mut sample = self.live.load(pair)?;
+        sample.fingers[1] = sample.fingers[0].clone();
+        Ok(sample)
+    }
+    fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
+        self.live.tool_mesh(tool)
+    }
+    fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {
+        self.live.load_labels(name)
+    }
+    fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError> {
+        if self.saves { self.live.save_labels(name, labels) } else { Ok(()) }
+    }
+    fn export_masks(&self, _: &BTreeMap<String, PairLabels>, _: &Path, _: &JobCx) -> Result<String, TaskError> {
+        Err(TaskError::new("Export", "not part of this test"))
+    }
+}
+
+/// Services without models and without settings of their own.
+struct Files {
+    saves: bool,
+}
+
+impl Services for Files {
+    fn open(&self, place: &Place) -> Result<Opened, TaskError> {
+        let live = open_source(place)?;
+        let index = live.index();
+        let mut reviews = BTreeMap::new();
+        for entry in &index.pairs {
+            let review = live.load_labels(&entry.name)?.review;
+            if review != Review::Todo {
+                reviews.insert(entry.name.clone(), review);
+            }
+        }
+        Ok(Opened { source: Arc::new(Source { live, saves: self.saves }), reviews })
+    }
+    fn find_bundles(&self, _: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
+        Default::default()
+    }
+    fn generate(&self, _: &BundleInfo, _: &[GenerateItem<'_>], _: &JobCx) -> Result<Vec<Generated>, TaskError> {
+        Err(TaskError::new("Generate", "there is no model"))
+    }
+    fn mask_by_model(&self, _: &BundleInfo, _: RuntimeChoice, _: &DepthMap) -> Result<Mask, TaskError> {
+        Err(TaskError::new("Mask", "there is no model"))
+    }
+    fn load_settings(&self) -> (Settings, Option<TaskError>) {
+        (Settings::default(), None)
+    }
+    fn save_settings(&self, _: &Settings) -> Result<(), TaskError> {
+        Ok(())
+    }
+}
+
+/// The script of a seed: what a person does, one gesture an act.
+fn script(seed: u64) -> Vec<Vec<Command>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut acts = vec![vec![Command::Select(PairId(rng.random_range(0..PAIRS)))]];
+    while acts.len() < ACTS {
+        let finger = if rng.random() { Finger::Right } else { Finger::Left };
+        acts.push(match rng.random_range(0..20) {
+            0..11 => {
+                let mut at = || [rng.random_range(0.0..175.0f32), rng.random_range(0.0..140.0f32)];
+                let (at_px, to) = (at(), at());
+                let begin =
+                    Command::BeginStroke { finger, source: ImprintSource::Measured, at_px, erase: rng.random() };
+                vec![Command::SelectFinger(finger), begin, Command::StrokeTo(to), Command::EndStroke]
+            }
+            11 => vec![Command::SelectFinger(finger), Command::FillHoles],
+            12 => vec![Command::SelectFinger(finger), Command::ResetMask],
+            13 | 14 => vec![Command::Undo],
+            15 => vec![Command::Redo],
+            16 => vec![Command::SetReview([Review::Done, Review::Flagged, Review::Skip][rng.random_range(0..3)])],
+            _ => vec![Command::Select(PairId(rng.random_range(0..PAIRS)))],
+        });
+    }
+    acts
+}
+
+/// An open folder in the application model.
+fn start(mut runtime: Runtime, folder: &Path) -> (Runtime, State) {
+    let mut state = State::default();
+    runtime.start(&mut state, Some(Place::Path(folder.to_owned())));
+    let panes = [Pane::Measured, Pane::Masks].into_iter().collect();
+    runtime.tick(&mut state, vec![Command::ShowPanes(panes), Command::ShowBothFingers(true)]);
+    (runtime, state)
+}
+
+/// Whether the selected pair can be drawn on: everything a stroke starts from is there.
+fn ready(state: &State) -> bool {
+    let known = |finger| {
+        let mask = state.mask_in_force(ImprintSource::Measured, finger);
+        let imprint = state.imprint(ImprintSource::Measured, finger).ready().is_some();
+        imprint && !matches!(mask, Err(Lookup::Waiting | Lookup::Stale(_)))
+    };
+    state.entry().is_some() && state.document.is_editable(state.pair_name()) && Finger::BOTH.into_iter().all(known)
+}
+
+/// The child: acts, and says what is saved, until it is killed.
+fn act(role: &str) -> ! {
+    let (folder, seed) = role.rsplit_once(' ').unwrap();
+    let seed: u64 = seed.parse().unwrap();
+    let runtime = Runtime::threads(Arc::new(Files { saves: true }), Arc::new(|| {}));
+    let (mut runtime, mut state) = start(runtime, Path::new(folder));
+    let mut rng = ChaCha8Rng::seed_from_u64(!seed);
+    // Not by `println!`, which the test harness may hold back.
+    let mut said = std::io::stdout();
+    let mut say = |line: String| said.write_all(format!("\n{line}\n").as_bytes()).and_then(|()| said.flush()).unwrap();
+    let mut unsaved = state.document.unsaved.clone();
+    let mut confirm = |state: &State, act: usize| {
+        for name in unsaved.difference(&state.document.unsaved) {
+            say(format!("saved {act} {name}"));
+        }
+        unsaved.clone_from(&state.document.unsaved);
+    };
+    for (i, commands) in script(seed).into_iter().enumerate() {
+        loop {
+            runtime.tick(&mut state, Vec::new());
+            confirm(&state, i);
+            if i == 0 && state.library.open.is_some() || ready(&state) {
+                break;
+            }
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        std::io::stdout().write_all(format!("\nact {}\n", i + 1).as_bytes()).unwrap();
+        runtime.tick(&mut state, commands);
+        confirm(&state, i + 1);
+        std::thread::sleep(Duration::from_micros(rng.random_range(0..4000)));
+    }
+    loop {
+        runtime.tick(&mut state, Vec::new());
+        confirm(&state, ACTS);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+type Labels = ([Option<Mask>; 2], Review);
+
+fn plain(labels: &PairLabels) -> Labels {
+    (labels.masks.clone().map(|mask| mask.map(|hand| (*hand.mask).clone())), labels.review)
+}
+
+/// What each pair says before the first act and after each one.
+fn played(folder: &Path, seed: u64) -> Vec<BTreeMap<String, Labels>> {
+    let (mut runtime, mut state) = start(Runtime::inline(Arc::new(Files { saves: false })), folder);
+    runtime.settle(&mut state);
+    let source = state.library.open.as_ref().unwrap().source.clone();
+    let mut now: BTreeMap<String, Labels> = BTreeMap::new();
+    for entry in &source.index().pairs {
+        now.insert(entry.name.clone(), plain(&source.load_labels(&entry.name).unwrap()));
+    }
+    let mut all = vec![now.clone()];
+    for commands in script(seed) {
+        assert!(all.len() == 1 || ready(&state));
+        runtime.tick(&mut state, commands);
+        runtime.settle(&mut state);
+        for (name, labels) in &state.document.labels {
+            now.insert(name.clone(), plain(labels));
+        }
+        all.push(now.clone());
+    }
+    all
+}
+
+/// What a child said before its end.
+#[derive(Default)]
+struct Said {
+    /// The last act that was begun.
+    begun: usize,
+    /// Per pair the last act up to which it is saved.
+    saved: BTreeMap<String, usize>,
+    confirmations: usize,
+}
+
+fn kill_one(folder: &Path, seed: u64, after: Duration) -> Said {
+    let mut child = Process::new(std::env::current_exe().unwrap())
+        .args(["--exact", "kill::no_confirmed_stroke_is_lost_to_a_kill", "--nocapture", "--test-threads", "1"])
+        .env(ROLE, format!("{} {seed}", folder.display()))
+        // Labels lie beside the pictures; nothing of the user's is looked at.
+        .env("XDG_DATA_HOME", folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::inherit())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let mut said = Said::default();
+    let note = |said: &mut Said, line: &str| {
+        let mut words = line.splitn(3, ' ');
+        match (words.next(), words.next().and_then(|n| n.parse().ok()), words.next()) {
+            (Some("act"), Some(act), None) => said.begun = act,
+            (Some("saved"), Some(act), Some(pair)) => {
+                said.saved.insert(pair.to_owned(), act);
+                said.confirmations += 1;
+            }
+            _ => {}
+        }
+    };
+    // The clock runs from the first act: how long a program takes to start is not asked here.
+    while said.begun == 0 {
+        note(&mut said, &lines.next().expect("the child ended before its first act").unwrap());
+    }
+    std::thread::scope(|scope| {
+        let reader = scope.spawn(|| {
+            for line in lines {
+                note(&mut said, &line.unwrap());
+            }
+        });
+        std::thread::sleep(after);
+        assert!(child.try_wait().unwrap().is_none(), "the child ended by itself");
+        child.kill().unwrap();
+        child.wait().unwrap();
+        reader.join().unwrap();
+    });
+    said
+}
+
+/// Reads the folder with the product's reader and compares; answers how many masks were newer than confirmed.
+fn compare(folder: &Path, played: &[BTreeMap<String, Labels>], said: &Said) -> usize {
+    let source = open_source(&Place::Path(folder.to_owned())).unwrap();
+    assert_eq!(source.problems(), [], "a file does not parse");
+    let store = MaskStore::in_folder(folder.join(FOLDER));
+    for (pair, finger) in store.masks() {
+        store.load(&pair, finger).unwrap();
+    }
+    let mut newer = 0;
+    for entry in &source.index().pairs {
+        let (masks, review) = plain(&source.load_labels(&entry.name).unwrap());
+        let confirmed = said.saved.get(&entry.name).copied().unwrap_or(0);
+        // A line may be on its way when the kill comes, an act is announced before it is begun.
+        let may_be = &played[confirmed..=said.begun];
+        for finger in Finger::BOTH.map(Finger::index) {
+            let fits = |labels: &BTreeMap<String, Labels>| labels[&entry.name].0[finger] == masks[finger];
+            assert!(
+                may_be.iter().any(fits),
+                "{}, finger {finger}: confirmed at act {confirmed}, begun {}; on the disk is the mask of acts {:?}",
+                entry.name,
+                said.begun,
+                (0..played.len()).filter(|&act| fits(&played[act])).collect::<Vec<_>>()
+            );
+            newer += usize::from(!fits(&may_be[0]));
+        }
+        assert!(may_be.iter().any(|labels| labels[&entry.name].1 == review), "{}: {review:?}", entry.name);
+    }
+    newer
+}
+
+#[test]
+fn no_confirmed_stroke_is_lost_to_a_kill() {
+    if let Ok(role) = std::env::var(ROLE) {
+        act(&role);
+    }
+    let next = AtomicUsize::new(0);
+    let totals = Mutex::new((0, 0, 0));
+    let workers = std::thread::available_parallelism().map_or(1, usize::from).clamp(1, 4);
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                loop {
+                    let series = next.fetch_add(1, Ordering::Relaxed);
+                    if series * ROUNDS >= KILLS {
+                        break;
+                    }
+                    let dir = tempfile::tempdir().unwrap();
+                    for pair in 0..PAIRS {
+                        let file = |kind: &str| dir.path().join(format!("touch_{pair}_{kind}.png"));
+                        let grey = Grid::from_fn(32, 32, |x, y| ((x * y * (pair as usize + 1)) % 256) as u8);
+                        images::write_grey8(&file("bubble"), &grey).unwrap();
+                        images::write_rgb8(&file("gelslim"), &Grid::from_fn(32, 32, |x, _| [x as f32; 3])).unwrap();
+                    }
+                    for round in 0..ROUNDS {
+                        let seed = (series * ROUNDS + round) as u64;
+                        let after = ChaCha8Rng::seed_from_u64(seed + 1_000_000).random_range(0..150_000);
+                        let played = played(dir.path(), seed);
+                        let said = kill_one(dir.path(), seed, Duration::from_micros(after));
+                        let newer = compare(dir.path(), &played, &said);
+                        let mut totals = totals.lock().unwrap();
+                        *totals = (totals.0 + said.begun, totals.1 + said.confirmations, totals.2 + newer);
+                    }
+                }
+            });
+        }
+    });
+    let (acts, confirmations, newer) = *totals.lock().unwrap();
+    eprintln!("{KILLS} kills, {acts} acts, {confirmations} confirmed saves, {newer} masks newer than confirmed");
+    // Kills that come before anything happens, or long after, would show nothing.
+    assert!(acts > 5 * KILLS && confirmations > 2 * KILLS && newer > 0);
+}
