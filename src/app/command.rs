@@ -24,8 +24,9 @@ use super::tasks::{Progress, Ticket};
 use super::workbench::WorkbenchCommand;
 use crate::domain::align::basin::Basin;
 use crate::domain::ambiguity::Ambiguity;
+use crate::domain::contact::ContactMask;
 use crate::domain::dataset::PairId;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::DepthMap;
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::io::statistics::ShiftStatistics;
@@ -380,7 +381,7 @@ pub enum Computed {
     /// Of [`Request::Ensemble`].
     Ensemble(Arc<Ensemble>),
     /// Of [`Request::Mask`].
-    Mask(Arc<Mask>),
+    Mask(Box<ContactMask>),
     /// Of [`Request::Cloud`].
     Cloud(Arc<Clouds>),
     /// Of [`Request::Pose`] and [`Request::Run`].

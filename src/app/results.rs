@@ -15,6 +15,7 @@ use crate::domain::align::basin::Basin;
 use crate::domain::align::reason::{Reason, ReasonCounts};
 use crate::domain::align::{AlignReport, Directions, PointFit, TraceStep};
 use crate::domain::ambiguity::Ambiguity;
+use crate::domain::contact::MaskBasis;
 use crate::domain::ensemble::Spread;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
@@ -321,6 +322,10 @@ pub struct Results {
     pub ambiguities: Cache<TouchKey, Option<Ambiguity>>,
     /// Automatic masks.
     pub masks: Cache<MaskKey, Mask>,
+    /// Of the masks that are not made of what their recipe names, what they are made of.
+    pub mask_bases: BTreeMap<MaskKey, MaskBasis>,
+    /// Pairs whose notes of loading were said.
+    pub noted: BTreeSet<PairKey>,
     /// Clouds.
     pub clouds: Cache<CloudKey, Clouds>,
     /// Poses.
@@ -366,6 +371,8 @@ impl Default for Results {
             ledgers: Cache::new(24 * MIB),
             ambiguities: Cache::new(MIB),
             masks: Cache::new(32 * MIB),
+            mask_bases: BTreeMap::new(),
+            noted: BTreeSet::new(),
             clouds: Cache::new(128 * MIB),
             poses: Cache::new(32 * MIB),
             runs: Cache::new(32 * MIB),
@@ -396,6 +403,8 @@ impl Results {
         self.ledgers.clear();
         self.ambiguities.clear();
         self.masks.clear();
+        self.mask_bases.clear();
+        self.noted.clear();
         self.clouds.clear();
         self.poses.clear();
         self.runs.clear();

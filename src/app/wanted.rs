@@ -15,6 +15,7 @@ use super::services::NamedTool;
 use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use super::workbench::PoseOf;
+use crate::domain::contact::MaskBasis;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
 use crate::domain::sensor::Finger;
@@ -218,11 +219,24 @@ impl State {
         let lookup = self.automatic_mask(source, finger);
         match (lookup, self.mask_recipe(finger)) {
             (Lookup::Ready(mask), Ok(recipe)) => {
-                let label = self.mask_label(&recipe);
+                let label = self.automatic_label(source, finger, &recipe);
                 Ok(MaskInForce { mask, version: MaskVersion::Auto(recipe), label })
             }
             (Lookup::Ready(_), Err(absent)) => Err(Lookup::Absent(absent)),
             (other, _) => Err(other),
+        }
+    }
+
+    /// What an automatic mask that is there is made of, in words.
+    pub fn automatic_label(&self, source: ImprintSource, finger: Finger, recipe: &MaskRecipe) -> String {
+        let label = self.mask_label(recipe);
+        let key = self.imprint_key(source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
+        match key.ok().and_then(|key| self.results.mask_bases.get(&key)) {
+            None | Some(MaskBasis::Source) => label,
+            Some(MaskBasis::Flat) => "No contact: the imprint is flat".into(),
+            Some(MaskBasis::Depth(min_m)) => {
+                format!("Depth {}: {label} found no contact", units::text_mm(f64::from(*min_m)))
+            }
         }
     }
 

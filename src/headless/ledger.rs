@@ -5,12 +5,14 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::app::jobs::compute::LAB_PEAK_M;
 use crate::app::jobs::ledger::reading_chains;
 use crate::domain::ambiguity::{Ambiguity, ambiguity};
 use crate::domain::colormap::{ColorMap, NAN_COLOR, Range};
+use crate::domain::findings::Finding;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::metrics::Line;
 use crate::domain::postprocess::{
@@ -109,6 +111,8 @@ struct Report {
     readings: Vec<ChainReading>,
     ambiguity: Option<Ambiguity>,
     flags: Vec<Flag>,
+    /// What is odd about the files.
+    notes: Vec<Finding>,
 }
 
 pub(super) fn run(args: &LedgerArgs) -> VerbResult {
@@ -128,6 +132,8 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let truth = touch.bubble.as_ref().map(|b| &b.imprint);
 
     let output = Output::new(args.common, "generating", 1);
+    let mut notes = Notes::default();
+    notes.take(&output, &sample.notes);
     let mut predictor = Predictor::new(&args.model);
     let config = predictor.config()?;
     let shift = predictor.shift();
@@ -169,6 +175,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
         readings,
         ambiguity: ambiguity(&gelslim.difference),
         flags: found.flags,
+        notes: notes.into_list(&output),
     };
     output.finish(&report, || text(&report))?;
     Ok(true)

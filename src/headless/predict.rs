@@ -332,8 +332,8 @@ impl Predictor {
         Ok(self.mask_model.as_mut().expect("it was just loaded"))
     }
 
-    /// The mask model's contact mask of an imprint.
-    pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<Mask> {
-        Ok(self.load_mask_model()?.predict(imprint)?)
+    /// The mask model's contact mask of an imprint, and what it is made of in the end.
+    pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<ContactMask> {
+        Ok(self.load_mask_model()?.contact(imprint)?)
     }
 }

@@ -17,9 +17,10 @@ use touch2touch::app::services::{DataSource, GenerateItem, Generated, Services};
 use touch2touch::app::settings::{RuntimeChoice, Settings};
 use touch2touch::app::state::State;
 use touch2touch::app::tasks::Level;
+use touch2touch::domain::contact::{ContactMask, settled_model};
 use touch2touch::domain::dataset::{Index, PairEntry, PairId, Problem, Split};
 use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use touch2touch::domain::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift};
 use touch2touch::domain::resample::Resampling;
@@ -262,8 +263,8 @@ impl Services for Double {
             .collect()
     }
 
-    fn mask_by_model(&self, _: &BundleInfo, _: RuntimeChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
-        Ok(imprint.map(|v| *v > 0.006))
+    fn mask_by_model(&self, _: &BundleInfo, _: RuntimeChoice, imprint: &DepthMap) -> Result<ContactMask, TaskError> {
+        Ok(settled_model(imprint, imprint.map(|v| *v > 0.006)))
     }
 
     fn load_settings(&self) -> (Settings, Option<TaskError>) {

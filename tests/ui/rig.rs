@@ -14,8 +14,9 @@ use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::services::{GenerateItem, Generated, Services};
 use touch2touch::app::settings::{RuntimeChoice, Settings};
 use touch2touch::app::state::State;
+use touch2touch::domain::contact::ContactMask;
 use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use touch2touch::domain::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch::domain::postprocess::{
     DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift, ShiftMode, ShiftStats,
 };
@@ -139,7 +140,7 @@ impl Services for QuickGenerator {
         bundle: &BundleInfo,
         runtime: RuntimeChoice,
         imprint: &DepthMap,
-    ) -> Result<Mask, TaskError> {
+    ) -> Result<ContactMask, TaskError> {
         self.live.mask_by_model(bundle, runtime, imprint)
     }
 

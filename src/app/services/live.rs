@@ -16,8 +16,9 @@ use super::super::library::{BundleInfo, BundleKind, GeneratorInfo, Place};
 use super::super::results::Prediction;
 use super::super::settings::{RuntimeChoice, SETTINGS_VERSION, Settings};
 use super::{DataSource, Following, GenerateItem, Generated, Services};
+use crate::domain::contact::ContactMask;
 use crate::domain::dataset::{Index, PairId, Problem};
-use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
@@ -350,7 +351,7 @@ impl Services for LiveServices {
         bundle: &BundleInfo,
         runtime: RuntimeChoice,
         imprint: &DepthMap,
-    ) -> Result<Mask, TaskError> {
+    ) -> Result<ContactMask, TaskError> {
         let what = format!("Mask with {}", bundle.name);
         let key = (bundle.id.clone(), runtime);
         let mut loaded = lock(&self.mask_model);
@@ -361,7 +362,7 @@ impl Services for LiveServices {
             *loaded = Some((key, model));
         }
         let Some((_, model)) = loaded.as_mut() else { return Err(TaskError::new(what, "no model is loaded")) };
-        model.predict(imprint).map_err(|err| TaskError::from_error(what, &err))
+        model.contact(imprint).map_err(|err| TaskError::from_error(what, &err))
     }
 
     fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {
@@ -483,6 +484,7 @@ impl From<RuntimeChoice> for EngineChoice {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::grid::Mask;
     use crate::domain::frames::PlanarPose;
     use crate::domain::hand::{AcceptedPose, HandPose};
 
