@@ -73,7 +73,8 @@ fn kind(problem: &Problem) -> String {
     let part = |name: Option<&std::ffi::OsStr>| name.map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut text = format!("{} {}", problem.what, problem.hint);
     // The longest first: each is part of the one before.
-    let names = [problem.file.to_string_lossy().into_owned(), part(problem.file.file_name()), part(problem.file.file_stem())];
+    let names =
+        [problem.file.to_string_lossy().into_owned(), part(problem.file.file_name()), part(problem.file.file_stem())];
     for name in names.iter().filter(|name| name.len() > 1) {
         text = text.replace(name.as_str(), "FILE");
     }
@@ -134,8 +135,14 @@ mod tests {
         for [a, b] in [
             ["the right imprint reaches from -0.0001 to 0.5000", "the left imprint reaches from 0.1 to 12.25"],
             ["damaged file: too short (/d/a_1.pt)", "damaged file: too short (/d/b_22.pt)"],
-            ["theta, x, y [0.1, 0.2, 0.3] differ from [1.0, NaN, -3e-7] in /e/a_1.pt", "theta, x, y [inf, 4, 5] differ from [-1.0, 0, 3] in /e/b_22.pt"],
-            ["key \"K\", right finger: Intrinsics { fx: 1.5, fy: NaN }", "key \"K\", left finger: Intrinsics { fx: -2, fy: 3e9 }"],
+            [
+                "theta, x, y [0.1, 0.2, 0.3] differ from [1.0, NaN, -3e-7] in /e/a_1.pt",
+                "theta, x, y [inf, 4, 5] differ from [-1.0, 0, 3] in /e/b_22.pt",
+            ],
+            [
+                "key \"K\", right finger: Intrinsics { fx: 1.5, fy: NaN }",
+                "key \"K\", left finger: Intrinsics { fx: -2, fy: 3e9 }",
+            ],
             ["its other half is missing: no a_1 in gelslims", "its other half is missing: no b_22 in gelslims"],
             ["0.31 % of pixels (3 NaN, 0 infinite)", "22.00 % of pixels (1200 NaN, 7 infinite)"],
         ] {

@@ -115,7 +115,8 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     };
     let mut notes = Notes::default();
     notes.take(&output, &sample.notes);
-    let FingerMasks { masks, made_of, notes: mask_notes } = pose::masks(&args.mask, &sample, &tool, &imprints, predicted, &mut predictor)?;
+    let FingerMasks { masks, made_of, notes: mask_notes } =
+        pose::masks(&args.mask, &sample, &tool, &imprints, predicted, &mut predictor)?;
     let fingers = Finger::BOTH.map(|f| {
         let camera = sample.finger(f)?.camera()?;
         Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::Predictor;
+use crate::domain::contact::MaskBasis;
 use crate::domain::ensemble::{AngleFan, Spread, channel_spread, seeds};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
@@ -120,7 +121,8 @@ pub(super) struct PoseFan {
     mean_deg: Option<f64>,
     /// Circular standard deviation.
     std_deg: Option<f64>,
-    /// Why masks were not made of the source that was asked, and of how many of the predictions and their mean.
+    /// How many of the masks (one per seed and one of the mean imprint) are not of the source that was asked, and of what
+    /// instead (`depth`, `flat`).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     mask_notes: BTreeMap<String, usize>,
     /// Farthest to either side of the mean, as differences from it.
@@ -174,8 +176,9 @@ pub(super) fn fan(
             let (Some(imprint), Some(touch)) = (imprints[finger.index()], sample.finger(finger)) else { continue };
             let truth = sample.grasp_from_object;
             let found = contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?;
-            if let Some(note) = found.basis.note() {
-                *made_otherwise.entry(format!("{} finger: {note}", finger.name())).or_insert(0) += 1;
+            if found.basis != MaskBasis::Source {
+                let made_of = format!("{} finger: {}", finger.name(), found.basis.key(source.key()));
+                *made_otherwise.entry(made_of).or_insert(0) += 1;
             }
             masks[finger.index()] = Some(found.mask);
         }

@@ -9,8 +9,8 @@ use super::super::results::{Clouds, Comparison, Ensemble, FingerCloud, PoseResul
 use super::super::services::NamedTool;
 use super::JobCx;
 use crate::domain::align::basin::{Basin, BasinConfig, Plane};
-use crate::domain::ensemble::{Spread, channel_spread};
 use crate::domain::contact::ContactMask;
+use crate::domain::ensemble::{Spread, channel_spread};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::inspect::{basin_map, recorded};
@@ -173,9 +173,7 @@ pub fn mask(
     const WHAT: &str = "Contact mask";
     let mask = match recipe {
         MaskRecipe::Threshold(min_m) => contact::threshold(imprint, min_m.get()),
-        MaskRecipe::TopPercent(percent) => {
-            contact::top_percent(imprint, f64::from(percent.get()), f32::NEG_INFINITY)
-        }
+        MaskRecipe::TopPercent(percent) => contact::top_percent(imprint, f64::from(percent.get()), f32::NEG_INFINITY),
         MaskRecipe::Cad(limit_m) => {
             let camera = touch
                 .and_then(FingerTouch::camera)

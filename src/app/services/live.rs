@@ -484,8 +484,8 @@ impl From<RuntimeChoice> for EngineChoice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::grid::Mask;
     use crate::domain::frames::PlanarPose;
+    use crate::domain::grid::Mask;
     use crate::domain::hand::{AcceptedPose, HandPose};
 
     /// A folder with one pair of pictures.

@@ -260,7 +260,12 @@ impl<'a> Worker<'a> {
         };
         let mut out = Vec::new();
         for ((finger, _), raw) in touched.iter().zip(&raw) {
-            out.push(FingerResult { finger: *finger, imprint: generator.depth(raw, shift)?, mask: None, basis: MaskBasis::Source });
+            out.push(FingerResult {
+                finger: *finger,
+                imprint: generator.depth(raw, shift)?,
+                mask: None,
+                basis: MaskBasis::Source,
+            });
         }
         Ok(Some(out))
     }

@@ -74,10 +74,7 @@ pub struct ToolFile {
 pub fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, MeshError> {
     let (scale, said_by) = match scale {
         Some(scale) => (scale, "the caller".to_owned()),
-        None => (
-            ToolScale::beside(path)?.unwrap_or_default(),
-            format!("{}", path.with_file_name(UNIT_FILE).display()),
-        ),
+        None => (ToolScale::beside(path)?.unwrap_or_default(), format!("{}", path.with_file_name(UNIT_FILE).display())),
     };
     let stl::StlFile { mut mesh, degenerate, .. } = stl::read(path)?;
     let size = mesh.bounds().map_or(0.0, |[lo, hi]| (hi - lo).max_element());

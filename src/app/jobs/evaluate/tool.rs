@@ -107,7 +107,9 @@ impl Tool {
                     let why = match basis {
                         MaskBasis::Source => return Some(mask),
                         MaskBasis::Flat => "are empty: the imprints are flat",
-                        MaskBasis::Depth(_) => "are by depth: the mask model found no contact in imprints that have some",
+                        MaskBasis::Depth(_) => {
+                            "are by depth: the mask model found no contact in imprints that have some"
+                        }
                     };
                     *made_otherwise.entry((method.name().to_owned(), why)).or_insert(0) += 1;
                     Some(mask)

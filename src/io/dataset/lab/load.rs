@@ -124,7 +124,9 @@ fn bubble_touches(
         let reference = reference.as_ref().map(|r| depth_map(halves(r)[index]));
         invalid[index] = invalid_to_nan(&mut map, reference.as_ref());
         let pixels = map.len();
-        most_invalid(dict.file(), invalid[index].total(), pixels, || format!("pixels of the {} imprint", finger.name()))?;
+        most_invalid(dict.file(), invalid[index].total(), pixels, || {
+            format!("pixels of the {} imprint", finger.name())
+        })?;
         let bad = reference.as_ref().map_or(0, |r| r.as_slice().iter().filter(|v| !v.is_finite()).count());
         if bad > 0 {
             let percent = 100.0 * bad as f64 / pixels as f64;
