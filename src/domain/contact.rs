@@ -75,7 +75,7 @@ const CONTACT_SHARE: f32 = 0.6;
 
 /// Rest and top of an imprint, metres: the depth that a quarter of it stays below, and that of its deepest parts, both
 /// of medians over small squares, so that neither noise nor flying pixels count. `None` if nothing was measured.
-fn rest_and_top(imprint: &DepthMap) -> Option<[f32; 2]> {
+pub fn rest_and_top(imprint: &DepthMap) -> Option<[f32; 2]> {
     let side = imprint.width().div_ceil(SQUARES_ACROSS).max(1);
     let mut medians = Vec::new();
     let mut values: Vec<f32> = Vec::with_capacity(side * side);
@@ -242,6 +242,53 @@ mod tests {
         assert_eq!(count(&top_percent(&imprint, f64::NAN, 0.0)), 0);
         assert_eq!(count(&top_percent(&imprint, -5.0, 0.0)), 0);
         assert_eq!(count(&top_percent(&DepthMap::filled(0, 0, 0.0), 40.0, 0.0)), 0);
+    }
+
+    /// A bump of `height` over a rest of `rest`, with noise of half a millimetre.
+    fn bump(rest: f32, height: f32) -> DepthMap {
+        let noise = |x: usize, y: usize| ((x * 37 + y * 91) % 11) as f32 / 10.0 * 1e-3 - 5e-4;
+        DepthMap::from_fn(175, 140, |x, y| {
+            let (dx, dy) = (x as f32 - 80.0, y as f32 - 60.0);
+            rest + height * (-(dx * dx + dy * dy) / 400.0).exp() + noise(x, y)
+        })
+    }
+
+    #[test]
+    fn a_flat_imprint_has_no_contact_whatever_the_source_says() {
+        let all = Mask::filled(175, 140, true);
+        let mut dots = DepthMap::filled(175, 140, 0.0);
+        // Flying pixels and holes are no contact either.
+        (dots[(3, 3)], dots[(90, 70)], dots[(91, 70)]) = (0.05, 0.09, f32::NAN);
+        for flat in [DepthMap::filled(175, 140, 0.0), DepthMap::filled(175, 140, 0.004), bump(0.001, 0.0), dots] {
+            for found in [settled(&flat, all.clone()), settled_model(&flat, all.clone())] {
+                assert_eq!((count(&found.mask), found.basis), (0, MaskBasis::Flat), "{}", rise(&flat));
+            }
+        }
+        for none in [DepthMap::filled(175, 140, f32::NAN), DepthMap::filled(0, 0, 0.0)] {
+            assert_eq!(settled(&none, Mask::filled(none.width(), none.height(), true)).basis, MaskBasis::Flat);
+        }
+        let deep = settled(&bump(0.0, 0.008), all.clone());
+        assert_eq!((deep.mask, deep.basis), (all, MaskBasis::Source));
+    }
+
+    #[test]
+    fn where_a_model_finds_nothing_depth_decides() {
+        let none = Mask::filled(175, 140, false);
+        for (rest, height) in [(0.0, 0.003), (-0.002, 0.005), (0.001, 0.012)] {
+            let imprint = bump(rest, height);
+            let found = settled_model(&imprint, none.clone());
+            let MaskBasis::Depth(min_m) = found.basis else { panic!("{:?}", found.basis) };
+            assert_eq!(found.mask, threshold(&imprint, min_m));
+            assert!(found.mask[(80, 60)] && !found.mask[(5, 130)], "{min_m}");
+            assert!((100..3000).contains(&count(&found.mask)), "{}", count(&found.mask));
+            assert!(found.basis.note().is_some_and(|note| note.contains("mm")) && found.basis.key("unet") == "depth");
+        }
+        // What the model found stays; what is neither flat nor clearly deep stays without contact.
+        let mut one = none.clone();
+        one[(80, 60)] = true;
+        assert_eq!(settled_model(&bump(0.0, 0.006), one.clone()).mask, one);
+        let faint = settled_model(&bump(0.0, 0.001_5), none);
+        assert_eq!((count(&faint.mask), faint.basis), (0, MaskBasis::Source));
     }
 
     #[test]

@@ -107,6 +107,46 @@ fn everything_wrong_is_listed_and_the_rest_opens() {
 }
 
 #[test]
+fn what_is_mostly_no_measurement_is_refused_with_its_share() {
+    for (finger, share, refused) in [(0, 0.4, false), (0, 0.6, true), (1, 1.0, true)] {
+        for sensor in ["GelSlim", "imprint", "reference"] {
+            let dir = tempfile::tempdir().unwrap();
+            let mut sample = touch(1.0);
+            let touch = sample.fingers[finger].as_mut().unwrap();
+            let cut = |len: usize| (share * len as f64) as usize;
+            match sensor {
+                "GelSlim" => {
+                    let raw = &mut touch.gelslim.as_mut().unwrap().images.as_mut().unwrap().raw;
+                    let cut = cut(raw.len());
+                    raw.as_mut_slice()[..cut].fill([f32::NAN; 3]);
+                }
+                "imprint" => {
+                    let imprint = &mut touch.bubble.as_mut().unwrap().imprint;
+                    let cut = cut(imprint.len());
+                    imprint.as_mut_slice()[..cut].fill(f32::NAN);
+                }
+                _ => {
+                    let reference = &mut touch.bubble.as_mut().unwrap().camera.as_mut().unwrap().depth_reference;
+                    let cut = cut(reference.len());
+                    reference.as_mut_slice()[..cut].fill(f32::INFINITY);
+                }
+            }
+            write_pair(dir.path(), Layout::Test, "rod", 0, &sample).unwrap();
+            let loaded = Dataset::open(dir.path()).unwrap().load(PairId(0));
+            if refused {
+                let error = loaded.unwrap_err();
+                let (text, percent) = (error.to_string(), format!("{:.0} %", 100.0 * share));
+                assert!(matches!(error, LoadError::MostlyInvalid { .. }), "{text}");
+                assert!(text.contains(&percent) && text.contains(sensor) && text.contains("_data_0.pt"), "{text}");
+            } else {
+                let notes = loaded.unwrap().notes;
+                assert!(notes.iter().any(|n| n.what.contains("%") && n.file.is_file()), "{sensor}: {notes:#?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn halves_of_different_grasps_and_camera_zeros_are_noticed() {
     let dir = tempfile::tempdir().unwrap();
     let mut sample = touch(1.0);

@@ -214,3 +214,21 @@ fn round_trip(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut i
         );
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_rounded_to_32_bits_far_from_the_origin_are_noticed() {
+        let rotation = [0.5, 0.5, 0.5, 0.5];
+        let place = |x: f64| [&[x, 0.25, -1.5][..], &rotation].concat();
+        let file = Path::new("t.pt");
+        let note = rounded_place(file, "grasp_frame_quat", &place(f64::from(4000.1f32))).unwrap();
+        assert!(note.what.contains("grasp_frame_quat") && note.what.contains("32 bits"), "{}", note.what);
+        // Near the origin, or with 64 bits, they are known well enough.
+        assert_eq!(rounded_place(file, "k", &place(f64::from(1.1f32))), None);
+        assert_eq!(rounded_place(file, "k", &place(4000.1)), None);
+        assert_eq!(rounded_place(file, "k", &place(f64::NAN)), None);
+    }
+}
