@@ -44,6 +44,8 @@ pub(crate) struct Source {
     pub(crate) damaged: Mutex<BTreeSet<String>>,
     pub(crate) full_disk: AtomicBool,
     pub(crate) saves: AtomicU64,
+    /// What is odd about every pair loaded from now on.
+    pub(crate) notes: Mutex<Vec<Problem>>,
 }
 
 impl Source {
@@ -68,6 +70,7 @@ impl Source {
             damaged: Mutex::default(),
             full_disk: AtomicBool::new(false),
             saves: AtomicU64::new(0),
+            notes: Mutex::default(),
         }
     }
 
@@ -135,7 +138,8 @@ impl DataSource for Source {
                 rig: None,
             })
         };
-        Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, ..Sample::default() })
+        let notes = self.notes.lock().unwrap().clone();
+        Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, notes, ..Sample::default() })
     }
 
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
@@ -182,6 +186,8 @@ pub(crate) struct Double {
     pub(crate) batches: AtomicU64,
     /// Times the disk was looked through.
     pub(crate) looked_up: AtomicU64,
+    /// The mask model sees no contact anywhere.
+    pub(crate) blind: AtomicBool,
     /// What lies on the disk.
     pub(crate) kept: Mutex<Vec<Prediction>>,
     bundles: bool,
@@ -197,6 +203,7 @@ impl Double {
             settings_saved: AtomicU64::new(0),
             batches: AtomicU64::new(0),
             looked_up: AtomicU64::new(0),
+            blind: AtomicBool::new(false),
             kept: Mutex::default(),
             bundles,
         }
@@ -264,7 +271,8 @@ impl Services for Double {
     }
 
     fn mask_by_model(&self, _: &BundleInfo, _: RuntimeChoice, imprint: &DepthMap) -> Result<ContactMask, TaskError> {
-        Ok(settled_model(imprint, imprint.map(|v| *v > 0.006)))
+        let blind = self.blind.load(Ordering::Relaxed);
+        Ok(settled_model(imprint, imprint.map(|v| !blind && *v > 0.006)))
     }
 
     fn load_settings(&self) -> (Settings, Option<TaskError>) {
