@@ -15,7 +15,6 @@ use super::services::NamedTool;
 use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use super::workbench::PoseOf;
-use crate::domain::contact::MaskBasis;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
 use crate::domain::sensor::Finger;
@@ -231,13 +230,8 @@ impl State {
     pub fn automatic_label(&self, source: ImprintSource, finger: Finger, recipe: &MaskRecipe) -> String {
         let label = self.mask_label(recipe);
         let key = self.imprint_key(source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
-        match key.ok().and_then(|key| self.results.mask_bases.get(&key)) {
-            None | Some(MaskBasis::Source) => label,
-            Some(MaskBasis::Flat) => "No contact: the imprint is flat".into(),
-            Some(MaskBasis::Depth(min_m)) => {
-                format!("Depth {}: {label} found no contact", units::text_mm(f64::from(*min_m)))
-            }
-        }
+        let basis = key.ok().and_then(|key| self.results.mask_bases.get(&key));
+        basis.map_or_else(|| label.clone(), |basis| basis.label(&label))
     }
 
     /// An automatic source in words, with its number.

@@ -133,6 +133,15 @@ impl MaskBasis {
         }
     }
 
+    /// For a label, `source` being that of the source that was asked.
+    pub fn label(self, source: &str) -> String {
+        match self {
+            Self::Source => source.to_owned(),
+            Self::Flat => "No contact: the imprint is flat".to_owned(),
+            Self::Depth(min_m) => format!("Depth {}: {source} found no contact", text_mm(f64::from(min_m))),
+        }
+    }
+
     /// In words, if it is not the source that was asked.
     pub fn note(self) -> Option<String> {
         match self {

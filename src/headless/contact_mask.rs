@@ -15,7 +15,8 @@ use crate::domain::sensor::Finger;
 /// Where masks come from.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct MaskArgs {
-    /// Where the contact masks come from. `auto`: the CAD model at the true pose for measured imprints whose truth is
+    /// Where the contact masks come from. A flat imprint has no contact whatever the source; where the mask UNet finds none
+    /// in an imprint that is clearly not flat, depth decides (`mask` in the JSON says so). `auto`: the CAD model at the true pose for measured imprints whose truth is
     /// known (the lab's labels, an upper bound), else the mask UNet.
     #[arg(long, value_enum, default_value_t = MaskFrom::Auto)]
     pub mask: MaskFrom,
@@ -52,7 +53,8 @@ impl MaskFrom {
     }
 }
 
-/// The mask of one imprint, by the studio's own functions, and what it is made of. `truth` is `grasp_from_object`; `auto` means the mask model here.
+/// The mask of one imprint, by the studio's own functions, and what it is made of. `truth` is `grasp_from_object`; `auto`
+/// means the mask model here.
 ///
 /// # Errors
 /// In words, if what the source needs is not there.

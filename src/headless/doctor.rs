@@ -10,7 +10,8 @@ use super::{Common, Output, VerbResult};
 use crate::domain::findings::Finding;
 use crate::io::doctor;
 
-/// Arguments of `doctor`.
+/// Arguments of `doctor`. Findings that differ only in file, finger or numbers are one entry, in the text and in the JSON
+/// (`problems`: `file`, `what`, `hint` of the first, `count`, `examples`).
 #[derive(Debug, Args)]
 pub(super) struct DoctorArgs {
     /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.

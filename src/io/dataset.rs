@@ -99,7 +99,11 @@ pub enum LoadError {
         sizes: [[usize; 2]; 2],
     },
     /// More of an image is no measurement than is one.
-    #[error("{:.0} % of the {what} are no measurement (NaN, infinite or depth 0): too few are left ({})", 100.0 * share, file.display())]
+    #[error(
+        "{:.0} % of the {what} are no measurement (NaN, infinite or depth 0): too few are left ({})",
+        100.0 * share,
+        file.display()
+    )]
     MostlyInvalid {
         /// The file.
         file: PathBuf,
