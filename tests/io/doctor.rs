@@ -103,7 +103,7 @@ fn cad_in_millimetres_is_found_and_progress_can_end_it() {
     }
     let report = doctor(dir.path());
     assert_eq!(report.problems.len(), 1, "{:#?}", report.problems);
-    assert!(report.problems[0].what.contains("not metres") && report.problems[0].hint.contains("0.001"));
+    assert!(report.problems[0].what.contains("cannot be metres: scale it by 0.001"));
     let dataset = Dataset::open(dir.path()).unwrap();
     let mut calls = Vec::new();
     let stopped = examine(&dataset, &mut |done, total| {
