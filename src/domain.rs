@@ -13,6 +13,7 @@ pub mod dataset;
 pub mod diffusion;
 pub mod ensemble;
 pub mod evaluation;
+pub mod findings;
 pub mod frames;
 pub mod grid;
 pub mod hand;

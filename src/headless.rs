@@ -13,6 +13,7 @@ mod generate;
 mod ledger;
 mod masks;
 mod models;
+mod notes;
 mod output;
 mod pose;
 mod predict;

@@ -417,3 +417,45 @@ fn stored_predictions_get_a_row() {
     assert!((mean - 26.0).abs() < 0.1, "26.0 dB over all pictures: {mean}");
     assert!(lab[0]["angle_deg"].is_null() && lab[0]["frechet"].is_null());
 }
+
+/// A grasp of the simulator in the lab's layout, spoilt.
+fn write_spoilt(root: &Path, number: u64, spoil: impl Fn(&mut touch2touch::domain::sample::BubbleTouch)) {
+    use touch2touch::domain::sim;
+    use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+    let tool = &sim::tools()[0];
+    let grasp = sim::Grasp { theta_rad: 0.2, x_m: 0.001, y_m: -0.001 };
+    let mut sample = sim::simulate(tool, grasp, 7, &sim::SimConfig::default());
+    for touch in sample.fingers.iter_mut().flatten() {
+        spoil(touch.bubble.as_mut().unwrap());
+    }
+    write_tools(root, &[(tool.name.as_str(), true, tool.mesh())]).unwrap();
+    write_pair(root, Layout::Test, &tool.name, number, &sample).unwrap();
+}
+
+#[test]
+fn a_flat_imprint_has_no_pose_and_implausible_intrinsics_are_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let (flat, twice) = (dir.path().join("flat"), dir.path().join("twice"));
+    write_spoilt(&flat, 0, |b| b.imprint = b.imprint.map(|_| 0.0));
+    // The default mask comes from the CAD model at the true pose, and would know where the tool is.
+    for mask in ["auto", "cad", "truth", "threshold"] {
+        let out = run(&["pose", flat.to_str().unwrap(), "--mask", mask, "--json"], dir.path());
+        assert_eq!(out.status.code(), Some(1), "{mask}: {}", error_text(&out));
+        let case = &json(&out)["cases"][0];
+        assert!(case["angle_deg"].is_null() && case["mask"] == "flat", "{mask}: {case}");
+        assert!(error_text(&out).contains("flat"), "{}", error_text(&out));
+    }
+    for number in 0..3 {
+        write_spoilt(&twice, number, |b| {
+            let k = &mut b.camera.as_mut().unwrap().intrinsics;
+            (k.fx, k.fy, k.cx, k.cy) = (2.0 * k.fx, 2.0 * k.fy, 2.0 * k.cx, 2.0 * k.cy);
+        });
+    }
+    let out = run(&["pose", twice.to_str().unwrap(), "--json"], dir.path());
+    let (report, said) = (json(&out), error_text(&out));
+    let note = &report["notes"][0];
+    assert!(note["what"].as_str().unwrap().contains("K is implausible") && note["count"] == 6, "{report}");
+    assert!(said.contains("K is implausible") && said.contains("_data_0.pt") && said.contains("6 times"), "{said}");
+    let doctor = json(&run(&["doctor", twice.to_str().unwrap(), "--json"], dir.path()));
+    assert!(doctor["problems"].as_array().unwrap().contains(note), "{doctor}");
+}

@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use strum::IntoEnumIterator as _;
 use touch2touch::domain::align::{AlignConfig, AlignReport, DistanceField, align};
-use touch2touch::domain::contact::{LAB_CAD_DISTANCE_M, cad_signed_distance};
+use touch2touch::domain::contact::{
+    LAB_CAD_DISTANCE_M, MaskBasis, cad_signed_distance, rest_and_top, settled_model, threshold,
+};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
 use touch2touch::domain::pose::{Engine, FingerInput, ToolModel, contact_cloud, estimate, fingers_of};
@@ -166,4 +168,56 @@ fn the_labs_files_with_the_mask_from_the_cad_give_the_stored_angle() {
         seen += 1;
     }
     assert_eq!(seen, 4);
+}
+
+/// The angle's error with the masks that stand in where the mask model finds nothing, degrees, and their share.
+fn error_by_depth(dataset: &Dataset, id: PairId, share: Option<f32>) -> (f64, usize) {
+    let sample = dataset.load(id).unwrap();
+    let name = dataset.index.get(id).unwrap().tool.as_ref().unwrap();
+    let tool = ToolModel::new(dataset.tool_mesh(name).unwrap().unwrap()).unwrap();
+    let masks: [Option<Mask>; 2] = Finger::BOTH.map(|finger| {
+        let imprint = &sample.finger(finger)?.bubble.as_ref()?.imprint;
+        if let Some(share) = share {
+            let [rest, top] = rest_and_top(imprint).unwrap();
+            return Some(threshold(imprint, rest + share * (top - rest)));
+        }
+        let found = settled_model(imprint, Mask::filled(imprint.width(), imprint.height(), false));
+        assert!(matches!(found.basis, MaskBasis::Depth(_)), "{name}: {:?}", found.basis);
+        Some(found.mask)
+    });
+    let pose =
+        estimate(&fingers_of(&sample, [masks[0].as_ref(), masks[1].as_ref()]), &tool, Engine::DistanceField, false);
+    let truth = sample.grasp_from_object.unwrap().inverse().theta_rad;
+    pose.map_or((f64::NAN, 0), |pose| {
+        (angle_error(pose.object_from_grasp.theta_rad, truth).to_degrees(), pose.cloud.points.len())
+    })
+}
+
+#[test]
+fn depth_stands_in_where_the_mask_model_finds_nothing() {
+    let demo = Dataset::demo();
+    let some = (0..demo.index.pairs.len()).step_by(23).map(|i| PairId(i as u32));
+    let mut sets = vec![("demo", some.collect::<Vec<_>>(), demo, 6.0)];
+    if let Some(folder) = shared().map(|s| s.join("lab-sample")) {
+        let lab = Dataset::open(&folder).unwrap();
+        sets.push(("lab-sample", (0..4).map(PairId).collect(), lab, 12.0));
+    }
+    for (name, ids, dataset, limit) in sets {
+        let errors = |share| ids.iter().map(|&id| error_by_depth(&dataset, id, share).0).collect::<Vec<f64>>();
+        if std::env::var_os("TOUCH2TOUCH_SHARES").is_some() {
+            for id in &ids {
+                let sample = dataset.load(*id).unwrap();
+                let rises =
+                    Finger::BOTH.map(|f| rest_and_top(&sample.finger(f).unwrap().bubble.as_ref().unwrap().imprint));
+                eprintln!("{name} {id:?}: rest and top {rises:?}");
+            }
+            for share in [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9] {
+                let found = errors(Some(share));
+                eprintln!("{name}, share {share}: median {:.2}, {found:.2?}", median(&found));
+            }
+        }
+        let found = errors(None);
+        eprintln!("{name}: median {:.2}, {found:.2?}", median(&found));
+        assert!(median(&found) < limit, "{name}: {found:.2?}");
+    }
 }

@@ -221,7 +221,24 @@ fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>) {
     {
         state.log.error(err);
     }
+    say_notes(state);
     preferences::follow_range(state);
+}
+
+/// What is odd about the files of the selected pair, once it is loaded; each pair once.
+fn say_notes(state: &mut State) {
+    let Some((key, sample)) = state.pair_key().and_then(|key| Some((key, state.results.samples.get(&key)?.clone())))
+    else {
+        return;
+    };
+    if sample.notes.is_empty() || !state.results.noted.insert(key) {
+        return;
+    }
+    let name = state.pair_name().to_owned();
+    for note in &sample.notes {
+        let detail = format!("{} ({})", note.what, note.file.display());
+        state.log.push(Level::Warning, format!("{name} is odd"), Some(detail), Some(note.hint.clone()));
+    }
 }
 
 fn cancel_all(state: &mut State, effects: &mut Vec<Effect>) {

@@ -23,8 +23,9 @@ use super::tasks::Ticket;
 use super::workbench::WorkbenchCommand;
 use crate::domain::align::basin::Basin;
 use crate::domain::ambiguity::Ambiguity;
+use crate::domain::contact::ContactMask;
 use crate::domain::dataset::PairId;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::DepthMap;
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::infer::engine::EngineChoice;
@@ -390,7 +391,7 @@ pub enum Computed {
     /// Of [`Request::Ensemble`].
     Ensemble(Arc<Ensemble>),
     /// Of [`Request::Mask`].
-    Mask(Arc<Mask>),
+    Mask(Box<ContactMask>),
     /// Of [`Request::Cloud`].
     Cloud(Arc<Clouds>),
     /// Of [`Request::Pose`] and [`Request::Run`].

@@ -11,6 +11,7 @@ use super::keys::{
 };
 use crate::domain::align::basin::Basin;
 use crate::domain::ambiguity::Ambiguity;
+use crate::domain::contact::MaskBasis;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::Sample;
 use crate::work::cloud::Clouds;
@@ -143,6 +144,10 @@ pub struct Results {
     pub ambiguities: Cache<TouchKey, Option<Ambiguity>>,
     /// Automatic masks.
     pub masks: Cache<MaskKey, Mask>,
+    /// Of the masks that are not made of what their recipe names, what they are made of.
+    pub mask_bases: BTreeMap<MaskKey, MaskBasis>,
+    /// Pairs whose notes of loading were said.
+    pub noted: BTreeSet<PairKey>,
     /// Clouds.
     pub clouds: Cache<CloudKey, Clouds>,
     /// Poses.
@@ -188,6 +193,8 @@ impl Default for Results {
             ledgers: Cache::new(24 * MIB),
             ambiguities: Cache::new(MIB),
             masks: Cache::new(32 * MIB),
+            mask_bases: BTreeMap::new(),
+            noted: BTreeSet::new(),
             clouds: Cache::new(128 * MIB),
             poses: Cache::new(32 * MIB),
             runs: Cache::new(32 * MIB),
@@ -218,6 +225,8 @@ impl Results {
         self.ledgers.clear();
         self.ambiguities.clear();
         self.masks.clear();
+        self.mask_bases.clear();
+        self.noted.clear();
         self.clouds.clear();
         self.poses.clear();
         self.runs.clear();

@@ -13,9 +13,10 @@ use super::document::PairLabels;
 use super::keys::{PredictionKey, TouchKey};
 use super::library::Place;
 use super::settings::Settings;
+use crate::domain::contact::ContactMask;
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
-use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
@@ -145,11 +146,17 @@ pub trait Services: Send + Sync {
         Vec::new()
     }
 
-    /// Runs the mask model on an imprint in metres. Called on the same lane as [`Self::generate`].
+    /// Runs the mask model on an imprint in metres; the mask says what it is made of in the end. Called on the same lane as
+    /// [`Self::generate`].
     ///
     /// # Errors
     /// If the model cannot be loaded or run.
-    fn mask_by_model(&self, bundle: &BundleInfo, runtime: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError>;
+    fn mask_by_model(
+        &self,
+        bundle: &BundleInfo,
+        runtime: EngineChoice,
+        imprint: &DepthMap,
+    ) -> Result<ContactMask, TaskError>;
 
     /// The stored settings (defaults where there are none), and what was wrong if they were set aside.
     fn load_settings(&self) -> (Settings, Option<TaskError>);

@@ -221,12 +221,20 @@ impl State {
         let lookup = self.automatic_mask(source, finger);
         match (lookup, self.mask_recipe(finger)) {
             (Lookup::Ready(mask), Ok(recipe)) => {
-                let label = self.mask_label(&recipe);
+                let label = self.automatic_label(source, finger, &recipe);
                 Ok(MaskInForce { mask, version: MaskVersion::Auto(recipe), label })
             }
             (Lookup::Ready(_), Err(absent)) => Err(Lookup::Absent(absent)),
             (other, _) => Err(other),
         }
+    }
+
+    /// What an automatic mask that is there is made of, in words.
+    pub fn automatic_label(&self, source: ImprintSource, finger: Finger, recipe: &MaskRecipe) -> String {
+        let label = self.mask_label(recipe);
+        let key = self.imprint_key(source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
+        let basis = key.ok().and_then(|key| self.results.mask_bases.get(&key));
+        basis.map_or_else(|| label.clone(), |basis| basis.label(&label))
     }
 
     /// An automatic source in words, with its number.

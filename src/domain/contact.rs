@@ -6,6 +6,7 @@ use super::frames::PlanarPose;
 use super::grid::{DepthMap, Grid, Mask};
 use super::mesh::MeshDistance;
 use super::sample::BubbleCamera;
+use super::units::text_mm;
 
 /// Depth of the lab's older contact rule: pushed in by at least this, metres (`ICP_dataset_cal.py` line 214).
 pub const LAB_THRESHOLD_M: f32 = 0.007;
@@ -58,6 +59,120 @@ pub fn cad_signed_distance(
         cloud::lift_pixel(imprint, camera, x, y)
             .is_some_and(|p| tool.within(object_from_grasp.transform_point3(p), max_m))
     }))
+}
+
+/// Side of the squares whose medians [`rise`] compares, as a share of the imprint's width: 7 px of 175.
+const SQUARES_ACROSS: usize = 25;
+/// Share of the squares that lie lower than the imprint's rest, and of those that lie higher than its top.
+const REST_SHARE: f64 = 0.25;
+const TOP_SHARE: f64 = 0.02;
+/// An imprint that rises less than this holds no contact: a bubble that is touched at all gives way by more.
+pub const FLAT_M: f32 = 0.000_5;
+/// An imprint that rises by this holds contact somewhere, whatever a model says.
+pub const CLEAR_M: f32 = 0.002;
+/// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
+const CONTACT_SHARE: f32 = 0.6;
+
+/// Rest and top of an imprint, metres: the depth that a quarter of it stays below, and that of its deepest parts, both
+/// of medians over small squares, so that neither noise nor flying pixels count. `None` if nothing was measured.
+pub fn rest_and_top(imprint: &DepthMap) -> Option<[f32; 2]> {
+    let side = imprint.width().div_ceil(SQUARES_ACROSS).max(1);
+    let mut medians = Vec::new();
+    let mut values: Vec<f32> = Vec::with_capacity(side * side);
+    for y in (0..imprint.height()).step_by(side) {
+        for x in (0..imprint.width()).step_by(side) {
+            values.clear();
+            for row in y..imprint.height().min(y + side) {
+                let pixels = &imprint.row(row)[x..imprint.width().min(x + side)];
+                values.extend(pixels.iter().copied().filter(|d| d.is_finite()));
+            }
+            if !values.is_empty() {
+                let middle = values.len() / 2;
+                medians.push(*values.select_nth_unstable_by(middle, f32::total_cmp).1);
+            }
+        }
+    }
+    let last = medians.len().checked_sub(1)?;
+    let mut at = |share: f64| *medians.select_nth_unstable_by((share * last as f64) as usize, f32::total_cmp).1;
+    Some([at(REST_SHARE), at(1.0 - TOP_SHARE)])
+}
+
+/// How far an imprint rises out of its rest, metres; 0 if nothing was measured.
+pub fn rise(imprint: &DepthMap) -> f32 {
+    rest_and_top(imprint).map_or(0.0, |[rest, top]| top - rest)
+}
+
+/// What a contact mask is made of in the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum MaskBasis {
+    /// The source that was asked.
+    #[default]
+    Source,
+    /// Nothing: the imprint is flat, so that there is no contact, whatever the source says.
+    Flat,
+    /// Depth of at least so many metres, because the source found no contact in an imprint that clearly has some.
+    Depth(f32),
+}
+
+/// A contact mask and what it is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ContactMask {
+    /// The pixels in contact.
+    pub mask: Mask,
+    /// What it is made of.
+    pub basis: MaskBasis,
+}
+
+impl MaskBasis {
+    /// The key in JSON, `source` being that of the source that was asked.
+    pub fn key(self, source: &'static str) -> &'static str {
+        match self {
+            Self::Source => source,
+            Self::Flat => "flat",
+            Self::Depth(_) => "depth",
+        }
+    }
+
+    /// For a label, `source` being that of the source that was asked.
+    pub fn label(self, source: &str) -> String {
+        match self {
+            Self::Source => source.to_owned(),
+            Self::Flat => "No contact: the imprint is flat".to_owned(),
+            Self::Depth(min_m) => format!("Depth {}: {source} found no contact", text_mm(f64::from(min_m))),
+        }
+    }
+
+    /// In words, if it is not the source that was asked.
+    pub fn note(self) -> Option<String> {
+        match self {
+            Self::Source => None,
+            Self::Flat => Some("the imprint is flat, so there is no contact".into()),
+            Self::Depth(min_m) => Some(format!(
+                "the mask model found no contact; all that is pushed in by at least {} was taken instead",
+                text_mm(f64::from(min_m))
+            )),
+        }
+    }
+}
+
+/// A mask with the last word on it: a flat imprint has no contact, whatever the mask's source.
+pub fn settled(imprint: &DepthMap, mask: Mask) -> ContactMask {
+    if rise(imprint) >= FLAT_M {
+        return ContactMask { mask, basis: MaskBasis::Source };
+    }
+    ContactMask { mask: Mask::filled(imprint.width(), imprint.height(), false), basis: MaskBasis::Flat }
+}
+
+/// The mask of a model with the last word on it: as [`settled`], and where the model found nothing in an imprint that
+/// is clearly not flat, depth relative to that imprint's own rest and top decides.
+pub fn settled_model(imprint: &DepthMap, mask: Mask) -> ContactMask {
+    match rest_and_top(imprint) {
+        Some([rest, top]) if top - rest >= CLEAR_M && !mask.as_slice().contains(&true) => {
+            let min_m = rest + CONTACT_SHARE * (top - rest);
+            ContactMask { mask: threshold(imprint, min_m), basis: MaskBasis::Depth(min_m) }
+        }
+        _ => settled(imprint, mask),
+    }
 }
 
 /// How a value outside 0..255 becomes a byte.
@@ -136,6 +251,53 @@ mod tests {
         assert_eq!(count(&top_percent(&imprint, f64::NAN, 0.0)), 0);
         assert_eq!(count(&top_percent(&imprint, -5.0, 0.0)), 0);
         assert_eq!(count(&top_percent(&DepthMap::filled(0, 0, 0.0), 40.0, 0.0)), 0);
+    }
+
+    /// A bump of `height` over a rest of `rest`, with noise of half a millimetre.
+    fn bump(rest: f32, height: f32) -> DepthMap {
+        let noise = |x: usize, y: usize| ((x * 37 + y * 91) % 11) as f32 / 10.0 * 1e-3 - 5e-4;
+        DepthMap::from_fn(175, 140, |x, y| {
+            let (dx, dy) = (x as f32 - 80.0, y as f32 - 60.0);
+            rest + height * (-(dx * dx + dy * dy) / 400.0).exp() + noise(x, y)
+        })
+    }
+
+    #[test]
+    fn a_flat_imprint_has_no_contact_whatever_the_source_says() {
+        let all = Mask::filled(175, 140, true);
+        let mut dots = DepthMap::filled(175, 140, 0.0);
+        // Flying pixels and holes are no contact either.
+        (dots[(3, 3)], dots[(90, 70)], dots[(91, 70)]) = (0.05, 0.09, f32::NAN);
+        for flat in [DepthMap::filled(175, 140, 0.0), DepthMap::filled(175, 140, 0.004), bump(0.001, 0.0), dots] {
+            for found in [settled(&flat, all.clone()), settled_model(&flat, all.clone())] {
+                assert_eq!((count(&found.mask), found.basis), (0, MaskBasis::Flat), "{}", rise(&flat));
+            }
+        }
+        for none in [DepthMap::filled(175, 140, f32::NAN), DepthMap::filled(0, 0, 0.0)] {
+            assert_eq!(settled(&none, Mask::filled(none.width(), none.height(), true)).basis, MaskBasis::Flat);
+        }
+        let deep = settled(&bump(0.0, 0.008), all.clone());
+        assert_eq!((deep.mask, deep.basis), (all, MaskBasis::Source));
+    }
+
+    #[test]
+    fn where_a_model_finds_nothing_depth_decides() {
+        let none = Mask::filled(175, 140, false);
+        for (rest, height) in [(0.0, 0.003), (-0.002, 0.005), (0.001, 0.012)] {
+            let imprint = bump(rest, height);
+            let found = settled_model(&imprint, none.clone());
+            let MaskBasis::Depth(min_m) = found.basis else { panic!("{:?}", found.basis) };
+            assert_eq!(found.mask, threshold(&imprint, min_m));
+            assert!(found.mask[(80, 60)] && !found.mask[(5, 130)], "{min_m}");
+            assert!((100..3000).contains(&count(&found.mask)), "{}", count(&found.mask));
+            assert!(found.basis.note().is_some_and(|note| note.contains("mm")) && found.basis.key("unet") == "depth");
+        }
+        // What the model found stays; what is neither flat nor clearly deep stays without contact.
+        let mut one = none.clone();
+        one[(80, 60)] = true;
+        assert_eq!(settled_model(&bump(0.0, 0.006), one.clone()).mask, one);
+        let faint = settled_model(&bump(0.0, 0.001_5), none);
+        assert_eq!((count(&faint.mask), faint.basis), (0, MaskBasis::Source));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 
+use super::dataset::Problem;
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Mask, RgbGrid};
 use super::sensor::{Finger, Intrinsics};
@@ -20,6 +21,8 @@ pub struct Sample {
     pub scale: Scale,
     /// How the source's images lay before they were laid upright; upright for whatever comes from a sensor.
     pub laid: Turn,
+    /// What is odd about its files and numbers: whoever answers from this sample says so.
+    pub notes: Vec<Problem>,
 }
 
 /// Where the metres of a sample come from.

@@ -33,9 +33,12 @@ pub fn text_percent(share: f64) -> String {
 /// of mm, cm, inch, µm or of a mesh scaled twice, whichever makes it as large as a hand-held tool first.
 /// `None` if none does.
 pub fn scale_to_metres(size: f64) -> Option<f64> {
-    /// Longest side of a hand-held tool, metres.
-    const PLAUSIBLE_M: std::ops::RangeInclusive<f64> = 0.004..=0.4;
-    [1.0, 1e-3, 1e-2, 0.0254, 1e-6, 1e3].into_iter().find(|scale| PLAUSIBLE_M.contains(&(size * scale)))
+    [1.0, 1e-3, 1e-2, 0.0254, 1e-6, 1e3].into_iter().find(|scale| is_tool_length(size * scale))
+}
+
+/// Whether a hand-held tool can be so long, metres.
+pub fn is_tool_length(metres: f64) -> bool {
+    (0.004..=0.4).contains(&metres)
 }
 
 /// A number of unknown unit for a message: four significant digits.

@@ -8,11 +8,13 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
-use super::contact_mask::MaskArgs;
+use super::contact_mask::{FingerMasks, MaskArgs};
+use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult, pose};
 use crate::domain::align::Run;
 use crate::domain::align::basin::{Basin, BasinConfig, Plane};
+use crate::domain::findings::Finding;
 use crate::domain::frames::PlanarPose;
 use crate::domain::inspect::basin_map;
 use crate::domain::pose::{Engine, FingerInput, contact_cloud, register};
@@ -81,7 +83,11 @@ struct Report {
     pair: String,
     engine: &'static str,
     imprint: &'static str,
-    mask: &'static str,
+    mask: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    mask_notes: Vec<String>,
+    /// What is odd about the files.
+    notes: Vec<Finding>,
     /// The true pose, `grasp_from_object`, where known.
     truth: Option<PlanarPose>,
     /// The registration's own starts and where they lead.
@@ -108,7 +114,10 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     } else {
         Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
     };
-    let (mask, masks) = pose::masks(&args.mask, &sample, &tool, &imprints, predicted, &mut predictor)?;
+    let mut notes = Notes::default();
+    notes.take(&output, &sample.notes);
+    let FingerMasks { masks, made_of, notes: mask_notes } =
+        pose::masks(&args.mask, &sample, &tool, &imprints, predicted, &mut predictor)?;
     let fingers = Finger::BOTH.map(|f| {
         let camera = sample.finger(f)?.camera()?;
         Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
@@ -124,7 +133,9 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
         pair: entry.name.clone(),
         engine: args.engine.key(),
         imprint: if predicted { "predicted" } else { "measured" },
-        mask,
+        mask: made_of,
+        mask_notes,
+        notes: notes.into_list(&output),
         truth: sample.grasp_from_object,
         own_starts: own.runs,
         ms: started.elapsed().as_secs_f64() * 1e3,

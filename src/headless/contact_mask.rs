@@ -3,18 +3,20 @@
 use clap::{Args, ValueEnum};
 
 use super::predict::Predictor;
-use crate::domain::contact::LAB_CAD_DISTANCE_M;
+use crate::domain::contact::{ContactMask, LAB_CAD_DISTANCE_M};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::pose::ToolModel;
 use crate::domain::sample::FingerTouch;
+use crate::domain::sensor::Finger;
 use crate::work::mask;
 use crate::work::mask::MaskRecipe;
 
 /// Where masks come from.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct MaskArgs {
-    /// Where the contact masks come from. `auto`: the CAD model at the true pose for measured imprints whose truth is
+    /// Where the contact masks come from. A flat imprint has no contact whatever the source; where the mask UNet finds none
+    /// in an imprint that is clearly not flat, depth decides (`mask` in the JSON says so). `auto`: the CAD model at the true pose for measured imprints whose truth is
     /// known (the lab's labels, an upper bound), else the mask UNet.
     #[arg(long, value_enum, default_value_t = MaskFrom::Auto)]
     pub mask: MaskFrom,
@@ -51,7 +53,8 @@ impl MaskFrom {
     }
 }
 
-/// The mask of one imprint, by the studio's own functions. `truth` is `grasp_from_object`; `auto` means the mask model here.
+/// The mask of one imprint, by the studio's own functions, and what it is made of. `truth` is `grasp_from_object`; `auto`
+/// means the mask model here.
 ///
 /// # Errors
 /// In words, if what the source needs is not there.
@@ -63,7 +66,7 @@ pub(super) fn contact_mask(
     tool: Option<&ToolModel>,
     truth: Option<PlanarPose>,
     predictor: &mut Predictor,
-) -> anyhow::Result<Mask> {
+) -> anyhow::Result<ContactMask> {
     let recipe = match source {
         MaskFrom::Unet | MaskFrom::Auto => return predictor.mask(imprint),
         MaskFrom::Threshold => MaskRecipe::Threshold((args.threshold_mm / 1e3).into()),
@@ -71,4 +74,27 @@ pub(super) fn contact_mask(
         MaskFrom::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
     };
     mask::mask(&recipe, imprint, Some(touch), tool, truth).map_err(|err| anyhow::anyhow!("{err}"))
+}
+
+/// The masks of both fingers, with what is to be said about them.
+pub(super) struct FingerMasks {
+    /// By [`Finger::index`].
+    pub masks: [Option<Mask>; 2],
+    /// What they are made of: the key of the source, `depth` where the model found nothing, `flat` where there is no
+    /// contact; of both fingers (right, left) where they differ.
+    pub made_of: String,
+    /// The same in words, where it is not the source that was asked.
+    pub notes: Vec<String>,
+}
+
+impl FingerMasks {
+    /// From the masks that `source` gave.
+    pub(super) fn new(source: MaskFrom, found: [Option<ContactMask>; 2]) -> Self {
+        let mut keys: Vec<&'static str> = found.iter().flatten().map(|m| m.basis.key(source.key())).collect();
+        keys.dedup();
+        let made_of = if keys.is_empty() { source.key().to_owned() } else { keys.join(", ") };
+        let note = |f: Finger| Some(format!("{} finger: {}", f.name(), found[f.index()].as_ref()?.basis.note()?));
+        let notes = Finger::BOTH.into_iter().filter_map(note).collect();
+        Self { masks: found.map(|m| m.map(|m| m.mask)), made_of, notes }
+    }
 }

@@ -7,10 +7,11 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{Common, Output, VerbResult};
-use crate::domain::dataset::Problem;
+use crate::domain::findings::Finding;
 use crate::io::doctor;
 
-/// Arguments of `doctor`.
+/// Arguments of `doctor`. Findings that differ only in file, finger or numbers are one entry, in the text and in the JSON
+/// (`problems`: `file`, `what`, `hint` of the first, `count`, `examples`).
 #[derive(Debug, Args)]
 pub(super) struct DoctorArgs {
     /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.
@@ -19,10 +20,12 @@ pub(super) struct DoctorArgs {
     common: Common,
 }
 
+/// `problems` has an entry for each kind of problem: `file`, `what` and `hint` are of the first of its kind; `count` says
+/// how many there are that differ only in file, finger or numbers, and `examples` names some of their files.
 #[derive(Serialize)]
 struct Report<'a> {
     pairs: usize,
-    problems: &'a [Problem],
+    problems: &'a [Finding],
 }
 
 /// Done means examined: problems found are the result, not a failure.
@@ -34,11 +37,31 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         ControlFlow::Continue(())
     });
     output.finish(&Report { pairs: report.pairs, problems: &report.problems }, || {
-        let mut text = format!("{}: {} pairs, {} problems\n", dataset.title, report.pairs, report.problems.len());
+        let all: usize = report.problems.iter().map(|p| p.count).sum();
+        let kinds = match report.problems.len() {
+            kinds if kinds == all => String::new(),
+            kinds => format!(" of {kinds} kinds"),
+        };
+        let mut text = format!("{}: {} pairs, {all} problems{kinds}\n", dataset.title, report.pairs);
         for p in &report.problems {
             text += &format!("\n{}\n  {}\n  {}\n", p.file.display(), p.what, p.hint);
+            if p.count > 1 {
+                text += &format!("  {} times like this, but for file, finger and numbers", p.count);
+                text += &also(p);
+            }
         }
         text
     })?;
     Ok(true)
+}
+
+/// The other examples, by the names of their files.
+fn also(finding: &Finding) -> String {
+    let others: Vec<String> = finding
+        .examples
+        .iter()
+        .skip(1)
+        .map(|file| file.file_name().unwrap_or(file.as_os_str()).to_string_lossy().into_owned())
+        .collect();
+    if others.is_empty() { "\n".into() } else { format!(", such as {}\n", others.join(", ")) }
 }

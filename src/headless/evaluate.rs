@@ -118,6 +118,10 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let cx = JobCx::new(Cancel::default(), Arc::new(watch));
     let evaluation = evaluate(&dataset, &setup, &cx).map_err(|err| anyhow::anyhow!("{err}"))?;
     drop(cx);
+    for odd in &evaluation.findings {
+        let (file, times) = (odd.file.display(), odd.count);
+        output.note(&format!("note: {file}: {} ({}); {times} like this", odd.what, odd.hint));
+    }
     for skipped in &evaluation.skipped {
         let by = if skipped.method.is_empty() { String::new() } else { format!(" ({})", skipped.method) };
         output.note(&format!("{}{by}: {}", skipped.what, skipped.why));

@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::seeds::{self, SeedArgs, SeedFigures};
 use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
+use crate::domain::findings::Finding;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::sensor::Finger;
@@ -146,6 +148,8 @@ struct Report {
     steps: u32,
     seed: u64,
     guidance: f64,
+    /// What is odd about the files, by kind.
+    notes: Vec<Finding>,
 }
 
 /// What PSNR and SSIM mean here.
@@ -166,6 +170,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let mut predictor = Predictor::new(&args.model);
     let config = predictor.config()?;
     let mut pairs = Vec::new();
+    let mut notes = Notes::default();
     let mut complete = !ids.is_empty();
     let mut scale = Scale::Measured;
     for id in ids {
@@ -174,6 +179,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
         output.step(&name);
         let done = dataset.load(id).map_err(anyhow::Error::from).and_then(|sample| {
             scale = sample.scale;
+            notes.take(&output, &sample.notes);
             // An image folder has one finger, whichever it was.
             let present: Vec<Finger> = fingers.iter().copied().filter(|f| sample.finger(*f).is_some()).collect();
             let fingers = if present.is_empty() { Finger::BOTH.to_vec() } else { present };
@@ -223,6 +229,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
         steps: config.steps,
         seed: config.seed,
         guidance: config.guidance,
+        notes: notes.into_list(&output),
         pairs,
     };
     let file = args.out.join("generate.json");

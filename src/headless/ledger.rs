@@ -5,10 +5,12 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, ambiguity};
 use crate::domain::colormap::{ColorMap, NAN_COLOR, Range};
+use crate::domain::findings::Finding;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::metrics::Line;
 use crate::domain::postprocess::{ChainReading, Flag, Histogram, Ledger, Orientation, Stats};
@@ -106,6 +108,8 @@ struct Report {
     readings: Vec<ChainReading>,
     ambiguity: Option<Ambiguity>,
     flags: Vec<Flag>,
+    /// What is odd about the files.
+    notes: Vec<Finding>,
 }
 
 pub(super) fn run(args: &LedgerArgs) -> VerbResult {
@@ -125,6 +129,8 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let truth = touch.bubble.as_ref().map(|b| &b.imprint);
 
     let output = Output::new(args.common, "generating", 1);
+    let mut notes = Notes::default();
+    notes.take(&output, &sample.notes);
     let mut predictor = Predictor::new(&args.model);
     let config = predictor.config()?;
     let shift = predictor.shift();
@@ -160,6 +166,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
         readings,
         ambiguity: ambiguity(&gelslim.difference),
         flags: found.flags,
+        notes: notes.into_list(&output),
     };
     output.finish(&report, || text(&report))?;
     Ok(true)

@@ -125,8 +125,11 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
             other => other,
         };
         let truth = sample.grasp_from_object;
-        let mask = contact_mask(source, &args.mask, &bubble.imprint, touch, tool, truth, &mut predictor)?;
-        Ok((bubble.imprint.clone(), mask))
+        let found = contact_mask(source, &args.mask, &bubble.imprint, touch, tool, truth, &mut predictor)?;
+        if let Some(note) = found.basis.note() {
+            output.note(&format!("note: {}, {} finger: {note}", entry.pair, entry.finger.name()));
+        }
+        Ok((bubble.imprint.clone(), found.mask))
     })?;
     let exported = Exported {
         out: args.out.clone(),

@@ -9,21 +9,24 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
-use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
+use super::contact_mask::{FingerMasks, MaskArgs, MaskFrom, contact_mask};
+use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::seeds::{self, FanArgs, PoseFan, SeedArgs};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::align::{AlignReport, Ask, LabIcpConfig, PaperTrap, Register, lab_starts};
 use crate::domain::ambiguity::{Ambiguity, ambiguity};
-use crate::domain::dataset::PairId;
+use crate::domain::dataset::{PairId, Problem};
+use crate::domain::findings::Finding;
 use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::DepthMap;
 use crate::domain::hand::{AcceptedPose, HandPose};
 use crate::domain::metrics::AngleSummary;
 use crate::domain::pose::{self, Engine, FingerInput, ToolModel};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
+use crate::io::dataset::Dataset;
 use crate::io::masks::MaskStore;
 use crate::work::job::JobCx;
 
@@ -137,7 +140,11 @@ struct Case {
     name: String,
     engine: &'static str,
     imprint: &'static str,
-    mask: &'static str,
+    /// What the masks are made of: the source's key, `depth` where the mask model found nothing, `flat` where the imprint
+    /// is flat; of both fingers (right, left) where they differ.
+    mask: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    mask_notes: Vec<String>,
     angle_deg: Option<f64>,
     truth_deg: Option<f64>,
     error_deg: Option<f64>,
@@ -205,6 +212,8 @@ struct Summary {
 struct Report {
     cases: Vec<Case>,
     summary: Summary,
+    /// What is odd about the files and the numbers in them, by kind.
+    notes: Vec<Finding>,
 }
 
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
@@ -225,6 +234,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let output = Output::new(args.common, "aligning", ids.len());
     let mut predictor = Predictor::new(&args.model);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
+    let mut notes = Notes::default();
     let mut cases = Vec::new();
     let store = MaskStore::for_dataset(&dataset).ok();
     let mut complete = true;
@@ -239,13 +249,17 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
                 continue;
             }
         };
+        notes.take(&output, &sample.notes);
         let Some(tool_name) = entry.tool.clone() else {
             output.note(&format!("{}: no tool is named, so there is no CAD model to align", entry.name));
             complete = false;
             continue;
         };
-        let tool = tools.entry(tool_name.clone()).or_insert_with(|| match tool_model(&dataset, &tool_name) {
-            Ok(tool) => Some(tool),
+        let tool = tools.entry(tool_name.clone()).or_insert_with(|| match tool_with_notes(&dataset, &tool_name) {
+            Ok((tool, odd)) => {
+                notes.take(&output, &odd);
+                Some(tool)
+            }
             Err(err) => {
                 output.note(&format!("{tool_name}: {err:#}"));
                 None
@@ -266,6 +280,9 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             let accepted = reviewed.as_ref().and_then(|r| r.accepted[usize::from(imprint == "predicted")]);
             match pose_cases(args, &entry.name, &sample, tool, (imprint, accepted), engines, &mut predictor) {
                 Ok(found) => {
+                    for note in found.first().iter().flat_map(|case| &case.mask_notes) {
+                        output.note(&format!("note: {} ({imprint} imprint), {note}", entry.name));
+                    }
                     complete &= found.iter().all(|c| c.angle_deg.is_some());
                     cases.extend(found);
                 }
@@ -277,17 +294,23 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         }
     }
     complete &= !cases.is_empty();
-    let report = Report { summary: summary(&cases, imprints[0], engines[0]), cases };
+    let notes = notes.into_list(&output);
+    let report = Report { summary: summary(&cases, imprints[0], engines[0]), cases, notes };
     output.finish(&report, || text(&report))?;
     Ok(complete)
 }
 
-pub(super) fn tool_model(dataset: &crate::io::dataset::Dataset, name: &str) -> anyhow::Result<ToolModel> {
-    let mesh = dataset
-        .tool_mesh(name)
+pub(super) fn tool_model(dataset: &Dataset, name: &str) -> anyhow::Result<ToolModel> {
+    tool_with_notes(dataset, name).map(|(tool, _)| tool)
+}
+
+/// The tool, and what is odd about its file.
+fn tool_with_notes(dataset: &Dataset, name: &str) -> anyhow::Result<(ToolModel, Vec<Problem>)> {
+    let file = dataset
+        .tool_with_notes(name)
         .map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))?
         .ok_or_else(|| anyhow::anyhow!("no CAD model (expected tools_stls/{name}.stl), so its grasps have no pose"))?;
-    Ok(ToolModel::new(mesh)?)
+    Ok((ToolModel::new(file.mesh)?, file.notes))
 }
 
 /// One case per engine for one pair and one kind of imprint.
@@ -306,7 +329,7 @@ fn pose_cases(
     } else {
         Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
     };
-    let (mask_name, masks) = masks(&args.mask, sample, tool, &imprints, predicted, predictor)?;
+    let FingerMasks { masks, made_of, notes } = masks(&args.mask, sample, tool, &imprints, predicted, predictor)?;
     let fingers = Finger::BOTH.map(|f| {
         let camera = sample.finger(f)?.camera()?;
         Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
@@ -334,7 +357,8 @@ fn pose_cases(
                 name: name.to_owned(),
                 engine: engine.key(),
                 imprint,
-                mask: mask_name,
+                mask: made_of.clone(),
+                mask_notes: notes.clone(),
                 angle_deg: found.map(|p| p.theta_rad.to_degrees()),
                 truth_deg: truth.map(f64::to_degrees),
                 error_deg: found.zip(truth).map(|(p, t)| angle_error(p.theta_rad, t).to_degrees()),
@@ -354,7 +378,7 @@ fn pose_cases(
         .collect()
 }
 
-/// The contact masks and the name of their source.
+/// The contact masks and what they are made of.
 pub(super) fn masks(
     args: &MaskArgs,
     sample: &Sample,
@@ -362,7 +386,7 @@ pub(super) fn masks(
     imprints: &[Option<DepthMap>; 2],
     predicted: bool,
     predictor: &mut Predictor,
-) -> anyhow::Result<(&'static str, [Option<Mask>; 2])> {
+) -> anyhow::Result<FingerMasks> {
     let source = match args.mask {
         MaskFrom::Auto if !predicted && sample.grasp_from_object.is_some() => MaskFrom::Cad,
         // The truth must not leak into the pose of a prediction unless it was asked for.
@@ -375,7 +399,7 @@ pub(super) fn masks(
         let truth = sample.grasp_from_object;
         masks[finger.index()] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
     }
-    Ok((source.key(), masks))
+    Ok(FingerMasks::new(source, masks))
 }
 
 fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> Figures {

@@ -6,8 +6,9 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
 
+use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
-use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{DepthChain, RefitShift, ShiftMode};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
@@ -296,8 +297,8 @@ impl Predictor {
         Ok(out)
     }
 
-    /// The mask model's contact mask of an imprint.
-    pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<Mask> {
+    /// The mask model's contact mask of an imprint, and what it is made of in the end.
+    pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<ContactMask> {
         if self.mask_model.is_none() {
             self.mask_model = Some(self.take(BundleKind::Mask, self.args.mask_bundle.clone())?);
         }

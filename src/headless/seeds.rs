@@ -1,5 +1,6 @@
 //! Several seeds of one touch: what `generate --seeds` and `pose --seeds` share.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -8,6 +9,7 @@ use serde::Serialize;
 
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::Predictor;
+use crate::domain::contact::MaskBasis;
 use crate::domain::ensemble::{AngleFan, Spread, seeds};
 use crate::domain::grid::DepthMap;
 use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
@@ -124,6 +126,10 @@ pub(super) struct PoseFan {
     mean_deg: Option<f64>,
     /// Circular standard deviation.
     std_deg: Option<f64>,
+    /// How many of the masks (one per seed and one of the mean imprint) are not of the source that was asked, and of what
+    /// instead (`depth`, `flat`).
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    mask_notes: BTreeMap<String, usize>,
     /// Farthest to either side of the mean, as differences from it.
     extremes_deg: Option<[f64; 2]>,
     /// Of the pose of the mean imprint.
@@ -168,12 +174,18 @@ pub(super) fn fan(
         MaskFrom::Auto => MaskFrom::Unet,
         other => other,
     };
+    let mut made_otherwise = BTreeMap::new();
     let mut angle = |imprints: [Option<&DepthMap>; 2]| -> anyhow::Result<Option<f64>> {
         let mut masks = [None, None];
         for finger in Finger::BOTH {
             let (Some(imprint), Some(touch)) = (imprints[finger.index()], sample.finger(finger)) else { continue };
             let truth = sample.grasp_from_object;
-            masks[finger.index()] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
+            let found = contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?;
+            if found.basis != MaskBasis::Source {
+                let made_of = format!("{} finger: {}", finger.name(), found.basis.key(source.key()));
+                *made_otherwise.entry(made_of).or_insert(0) += 1;
+            }
+            masks[finger.index()] = Some(found.mask);
         }
         let inputs = Finger::BOTH.map(|f| {
             let camera = sample.finger(f)?.camera()?;
@@ -197,6 +209,7 @@ pub(super) fn fan(
         mean_deg: mean.map(f64::to_degrees),
         std_deg: fan.as_ref().and_then(|f| finite(f.std_rad)),
         extremes_deg: fan.as_ref().map(|f| f.extremes_rad).filter(|e| e[0].is_finite()).map(|e| e.map(f64::to_degrees)),
+        mask_notes: made_otherwise,
         of_mean_deg: of_mean.map(f64::to_degrees),
         mean_error_deg: error(mean),
         of_mean_error_deg: error(of_mean),

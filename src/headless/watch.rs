@@ -239,6 +239,12 @@ fn touch(
 
 fn report(output: &Output, done: &Done, summary: &mut Summary) -> anyhow::Result<()> {
     summary.add(&done.latency, done.fresh);
+    for note in &done.notes {
+        output.note(&super::notes::line(note));
+    }
+    for note in &done.mask_notes {
+        output.note(&format!("note: {}, {note}", done.name));
+    }
     let mut event = json!({"event": "done"});
     if let (Some(event), serde_json::Value::Object(rest)) = (event.as_object_mut(), serde_json::to_value(done)?) {
         event.extend(rest);

@@ -3,6 +3,7 @@
 use super::bundle::{Bundle, Cast, MaskInput, MaskSpec, Role};
 use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
 use super::trial::admit;
+use crate::domain::contact::{ContactMask, settled_model};
 use crate::domain::diffusion::{ModelError, Tensor};
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::resample::{bilinear, nearest_mask};
@@ -66,7 +67,16 @@ impl MaskModel {
         self.engine
     }
 
-    /// The contact mask of an imprint (metres, raw orientation), at the imprint's size.
+    /// The contact mask of an imprint (metres, raw orientation), at the imprint's size, and what it is made of in the end
+    /// ([`settled_model`]).
+    ///
+    /// # Errors
+    /// See [`MaskError`].
+    pub fn contact(&mut self, imprint: &DepthMap) -> Result<ContactMask, MaskError> {
+        Ok(settled_model(imprint, self.predict(imprint)?))
+    }
+
+    /// What the model itself says, at the imprint's size.
     ///
     /// Pixels without measurement (NaN) are given to the graph as 0 m.
     ///

@@ -12,6 +12,7 @@ mod error;
 mod grow;
 mod lab;
 mod pictures;
+mod plausible;
 mod tool_scale;
 
 use std::path::{Path, PathBuf};
@@ -29,7 +30,7 @@ pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
 pub use grow::{Growth, OUTPUT_MARK, RIG_FILE, cameras_of, is_output};
 pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, assumed_metres};
-pub use tool_scale::{ToolScale, UNIT_FILE, read_in_metres};
+pub use tool_scale::{ToolFile, ToolScale, UNIT_FILE, read_in_metres, read_tool};
 
 /// Which kind of source a dataset is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,16 +43,21 @@ pub enum SourceKind {
     Demo,
 }
 
-/// A sample with what was odd about its files.
+/// A sample with what is invalid in its files.
 #[derive(Clone, Debug, Default)]
 pub struct Loaded {
-    /// The sample.
+    /// The sample; its notes say what is odd: values that are not numbers, missing keys that it can do without, halves
+    /// that disagree, numbers that cannot be those of a touch.
     pub sample: Sample,
-    /// What is odd: values that are not numbers, missing keys that the sample can do without, halves that disagree.
-    pub notes: Vec<Problem>,
     /// Pixels of each finger's imprint that are no measurement; they are NaN in the sample.
     pub invalid: [InvalidPixels; 2],
 }
+
+/// A larger share of an imprint's pixels without measurement than this is worth a note of its own, because every depth
+/// camera drops some.
+const MANY_INVALID: f64 = 0.02;
+/// A larger share of an image that is no measurement than this leaves nothing to answer from.
+const MOST_INVALID: f64 = 0.5;
 
 /// Why pixels of an imprint are no measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,6 +74,11 @@ impl InvalidPixels {
     /// All of them.
     pub fn total(self) -> usize {
         self.nan + self.infinite + self.dropped
+    }
+
+    /// Whether they are worth a note of their own: more than a depth camera drops anyway.
+    pub fn are_many(self, pixels: usize) -> bool {
+        self.infinite > 0 || self.total() as f64 > MANY_INVALID * pixels as f64
     }
 }
 
@@ -164,18 +175,19 @@ impl Dataset {
     /// Loads a pair. Takes tens of milliseconds: not for the thread that draws.
     ///
     /// Pixels without measurement are NaN in the imprint, also where the file has infinities or the camera said 0.
+    /// What is odd about the files or implausible in them is in the sample's notes.
     ///
     /// # Errors
     /// [`LoadError`] naming the file, and for tensors the key.
     pub fn load(&self, id: PairId) -> Result<Sample, LoadError> {
-        self.load_with_notes(id).map(|loaded| loaded.sample)
+        self.load_with_counts(id).map(|loaded| loaded.sample)
     }
 
-    /// [`Dataset::load`], together with what is odd about the files.
+    /// [`Dataset::load`], together with how many pixels are invalid.
     ///
     /// # Errors
     /// As [`Dataset::load`].
-    pub fn load_with_notes(&self, id: PairId) -> Result<Loaded, LoadError> {
+    pub fn load_with_counts(&self, id: PairId) -> Result<Loaded, LoadError> {
         if self.index.get(id).is_none() {
             return Err(LoadError::NoSuchPair { id });
         }
@@ -185,9 +197,12 @@ impl Dataset {
                 Source::Pictures(pictures) => pictures.load(id)?,
                 Source::BuiltIn(set) => {
                     let sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
-                    Loaded { sample, notes: Vec::new(), invalid: Default::default() }
+                    return Ok(Loaded { sample, invalid: Default::default() });
                 }
             };
+            // The bubble's file is the last one.
+            let file = self.pair_files(id).pop().unwrap_or_default();
+            plausible::notes(&mut loaded, &file);
             self.lend_cameras(&mut loaded.sample);
             Ok(loaded)
         })
@@ -204,13 +219,18 @@ impl Dataset {
     /// # Errors
     /// [`MeshError`] if there is a file that cannot be used, or whose size cannot be metres.
     pub fn tool_mesh(&self, tool: &str) -> Result<Option<TriMesh>, MeshError> {
+        Ok(self.tool_with_notes(tool)?.map(|file| file.mesh))
+    }
+
+    /// [`Dataset::tool_mesh`], together with what is odd about the file.
+    ///
+    /// # Errors
+    /// As [`Dataset::tool_mesh`].
+    pub fn tool_with_notes(&self, tool: &str) -> Result<Option<ToolFile>, MeshError> {
         if let Source::BuiltIn(set) = self.source {
-            return Ok(set.mesh(tool));
+            return Ok(set.mesh(tool).map(|mesh| ToolFile { mesh, notes: Vec::new() }));
         }
-        match self.tool_mesh_file(tool) {
-            Some(path) => tool_scale::read_in_metres(path, self.tool_scale).map(Some),
-            None => Ok(None),
-        }
+        self.tool_mesh_file(tool).map(|path| read_tool(path, self.tool_scale)).transpose()
     }
 
     /// The file of the tool's CAD model, if the source has files.
@@ -281,6 +301,15 @@ fn last_integer(text: &str) -> u64 {
         .rfind(|c: char| !c.is_ascii_digit())
         .map_or(0, |i| i + text[i..].chars().next().map_or(1, char::len_utf8));
     text[start..=end].parse().unwrap_or(u64::MAX)
+}
+
+/// Refuses an image of which more than half (`bad` of `all`) is no measurement; `what` names it.
+fn most_invalid(file: &Path, bad: usize, all: usize, what: impl FnOnce() -> String) -> Result<(), LoadError> {
+    let share = bad as f64 / all.max(1) as f64;
+    if share > MOST_INVALID {
+        return Err(LoadError::MostlyInvalid { file: file.to_owned(), what: what(), share });
+    }
+    Ok(())
 }
 
 fn problem(file: impl Into<PathBuf>, what: impl Into<String>, hint: impl Into<String>) -> Problem {

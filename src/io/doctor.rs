@@ -1,15 +1,13 @@
 //! The doctor: loads every pair of a dataset and lists what is wrong with it, in words that say what to do.
 
-mod checks;
-
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use rayon::prelude::*;
 
 use super::dataset::{Dataset, Loaded};
-use super::stl;
 use crate::domain::dataset::{PairId, Problem};
+use crate::domain::findings::{Finding, Findings};
 use crate::domain::upright::Turn;
 
 /// What the doctor found.
@@ -19,15 +17,13 @@ pub struct DoctorReport {
     pub pairs: usize,
     /// Pairs that were loaded or tried before the examination ended.
     pub examined: usize,
-    /// Everything wrong, dataset first, then CAD models, then pairs in the order of the index.
-    pub problems: Vec<Problem>,
+    /// Everything wrong, dataset first, then CAD models, then pairs in the order of the index. What differs only in file,
+    /// finger or numbers is one entry.
+    pub problems: Vec<Finding>,
 }
 
 /// Pairs loaded between two reports of progress.
 const BATCH: usize = 16;
-/// A larger share of pixels without measurement than this is a problem of its file; smaller ones are summed up in
-/// one entry, because every depth camera drops some.
-const MANY_INVALID: f64 = 0.02;
 
 /// Loads every pair, on all cores, and lists what is wrong. `progress` is told `(done, total)` on the calling
 /// thread and may end the examination.
@@ -37,33 +33,37 @@ const MANY_INVALID: f64 = 0.02;
 /// that do not survive the way from depth to cloud and back.
 pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>) -> DoctorReport {
     let total = dataset.index.pairs.len();
-    let mut report = DoctorReport { pairs: total, examined: 0, problems: dataset.problems.clone() };
+    let mut findings = Findings::default();
+    findings.extend(dataset.problems.iter().cloned());
     for tool in dataset.index.tools() {
-        report.problems.extend(tool_problems(dataset, &tool));
+        // A missing file is found when the dataset is opened.
+        findings.extend(match dataset.tool_with_notes(&tool) {
+            Ok(file) => file.map_or_else(Vec::new, |file| file.notes),
+            Err(err) => vec![Problem { file: err.file().to_owned(), what: err.to_string(), hint: err.hint().into() }],
+        });
     }
     let mut few = FewInvalid::default();
     let mut turned = Turned::default();
-    let ids: Vec<PairId> = (0..total as u32).map(PairId).collect();
-    if progress(0, total).is_break() {
-        return report;
-    }
-    for batch in ids.chunks(BATCH) {
-        let found: Vec<_> = batch.par_iter().map(|&id| pair_problems(dataset, id)).collect();
-        for (id, (problems, invalid, laid)) in batch.iter().zip(found) {
-            report.problems.extend(problems);
-            turned.add(dataset, *id, laid);
-            if let Some((count, pixels)) = invalid {
-                few.add(dataset, *id, count, pixels);
+    let mut examined = 0;
+    let mut go_on = progress(0, total).is_continue();
+    while go_on && examined < total {
+        let batch: Vec<PairId> = (examined..total.min(examined + BATCH)).map(|id| PairId(id as u32)).collect();
+        let found: Vec<_> = batch.par_iter().map(|&id| look_at(dataset, id)).collect();
+        for (id, look) in batch.iter().zip(found) {
+            findings.extend(look.problems);
+            turned.add(dataset, *id, look.laid);
+            if look.few_invalid > 0 {
+                few.add(dataset, *id, look.few_invalid, look.pixels);
             }
         }
-        report.examined += batch.len();
-        if progress(report.examined, total).is_break() {
-            break;
-        }
+        examined += batch.len();
+        go_on = progress(examined, total).is_continue();
     }
-    report.problems.extend(few.problem(report.examined));
-    report.problems.extend(turned.problem(report.examined));
-    report
+    if examined > 0 {
+        findings.extend(few.problem(examined));
+        findings.extend(turned.problem(examined));
+    }
+    DoctorReport { pairs: total, examined, problems: findings.into_list() }
 }
 
 /// Small numbers of invalid pixels, summed over pairs.
@@ -125,68 +125,29 @@ impl Turned {
     }
 }
 
-fn tool_problems(dataset: &Dataset, tool: &str) -> Vec<Problem> {
-    // A missing file is found when the dataset is opened.
-    let Some(path) = dataset.tool_mesh_file(tool) else { return Vec::new() };
-    let problem = |what: String, hint: String| Problem { file: path.to_owned(), what, hint };
-    match stl::read(path) {
-        Err(err) => vec![problem(err.to_string(), err.hint().into())],
-        Ok(file) => {
-            let mut problems = Vec::new();
-            if let (Some(scale), Some([lo, hi])) = (file.suggested_scale, file.mesh.bounds()) {
-                let extent = crate::domain::units::significant((hi - lo).max_element());
-                problems.push(problem(
-                    format!("the CAD model is {extent} units long: not metres"),
-                    format!(
-                        "export it in metres (multiply by {scale}), or accept the scale: --tool-scale auto, or a file \
-                         {} beside it that says auto",
-                        super::dataset::UNIT_FILE
-                    ),
-                ));
-            }
-            if file.degenerate > 0 {
-                problems.push(problem(
-                    format!("{} triangles of the CAD model have no area", file.degenerate),
-                    "they are left out; repair the mesh if edges look frayed".into(),
-                ));
-            }
-            problems
-        }
-    }
+/// What there is to say about one pair.
+#[derive(Default)]
+struct Look {
+    problems: Vec<Problem>,
+    /// Invalid pixels that are worth no problem of their own, of how many.
+    few_invalid: usize,
+    pixels: usize,
+    /// How its pictures lay.
+    laid: Turn,
 }
 
-/// The problems of one pair, how many pixels of how many are invalid if that is worth no problem of its own, and how
-/// its pictures lay.
-fn pair_problems(dataset: &Dataset, id: PairId) -> (Vec<Problem>, Option<(usize, usize)>, Turn) {
-    let Loaded { sample, notes, invalid } = match dataset.load_with_notes(id) {
+fn look_at(dataset: &Dataset, id: PairId) -> Look {
+    let Loaded { sample, invalid } = match dataset.load_with_counts(id) {
         Ok(loaded) => loaded,
-        Err(err) => return (vec![err.to_problem()], None, Turn::default()),
+        Err(err) => return Look { problems: vec![err.to_problem()], ..Look::default() },
     };
-    let mut problems = notes;
-    // The bubble's file is the last one.
-    let file = dataset.pair_files(id).pop().unwrap_or_default();
-    let (mut few, mut pixels) = (0, 0);
+    let (mut few_invalid, mut pixels) = (0, 0);
     for (touch, invalid) in sample.fingers.iter().zip(invalid) {
         let Some(bubble) = touch.as_ref().and_then(|t| t.bubble.as_ref()) else { continue };
         pixels += bubble.imprint.len();
-        let share = invalid.total() as f64 / bubble.imprint.len() as f64;
-        if invalid.infinite == 0 && share <= MANY_INVALID {
-            few += invalid.total();
-            continue;
+        if !invalid.are_many(bubble.imprint.len()) {
+            few_invalid += invalid.total();
         }
-        problems.push(Problem {
-            file: file.clone(),
-            what: format!(
-                "key \"bubble_imprint\": {:.2} % of a finger's pixels are no measurement ({} NaN, {} infinite, {} at \
-                 depth 0)",
-                100.0 * share,
-                invalid.nan,
-                invalid.infinite,
-                invalid.dropped
-            ),
-            hint: "these pixels are left out everywhere; record the grasp again if they cover the contact".into(),
-        });
     }
-    checks::sample(&sample, &file, &mut problems);
-    (problems, (few > 0).then_some((few, pixels)), sample.laid)
+    Look { problems: sample.notes, few_invalid, pixels, laid: sample.laid }
 }

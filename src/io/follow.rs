@@ -230,7 +230,7 @@ impl Follower {
     /// Reads a touch that [`Follower::poll`] gave.
     pub fn load(&mut self, ready: &Ready, now: Instant) -> Arrival {
         let Some(dataset) = self.dataset.clone() else { return Arrival::Gone };
-        let result = dataset.load_with_notes(ready.id);
+        let result = dataset.load_with_counts(ready.id);
         let Some(seen) = self.seen.get_mut(&ready.name) else { return Arrival::Gone };
         let Some(stamp) = Stamp::of(&ready.file) else {
             self.seen.remove(&ready.name);
@@ -341,6 +341,7 @@ fn may_heal(err: &LoadError) -> bool {
         err,
         LoadError::Pt(PtError::MissingKey { .. } | PtError::NotATensor { .. } | PtError::WrongShape { .. })
             | LoadError::Sizes { .. }
+            | LoadError::MostlyInvalid { .. }
             | LoadError::NoSuchPair { .. }
     )
 }

@@ -49,7 +49,7 @@ pub enum MeshError {
     /// The model is too large or too small to be a tool in metres.
     #[error(
         "the CAD model is {} long, which cannot be metres: scale it by {offered} ({})",
-        crate::domain::units::significant(*size),
+        number(*size),
         file.display()
     )]
     Unit {
@@ -59,6 +59,16 @@ pub enum MeshError {
         size: f64,
         /// The factor that would bring it to metres.
         offered: f64,
+    },
+    /// Neither the unit that was named nor any other makes the model as large as a tool.
+    #[error("the CAD model is {} long: that is no tool {unit} ({})", number(*size), file.display())]
+    NotATool {
+        /// The file.
+        file: PathBuf,
+        /// Longest side of the bounding box, in the file's unit.
+        size: f64,
+        /// In which unit, and who said so.
+        unit: String,
     },
     /// The file that names the unit of the models does not name one.
     #[error("{reason} ({})", file.display())]
@@ -87,6 +97,7 @@ impl MeshError {
             | Self::Truncated { file, .. }
             | Self::NotFinite { file, .. }
             | Self::Unit { file, .. }
+            | Self::NotATool { file, .. }
             | Self::UnitFile { file, .. }
             | Self::Empty { file, .. } => file,
         }
@@ -102,10 +113,20 @@ impl MeshError {
                 "accept the scale with --tool-scale auto on the command line, or for good (in the studio, too) with a \
                  file unit.txt beside the model that says auto, m, cm, mm, um, in or a factor"
             }
+            Self::NotATool { .. } => {
+                "tools are 4 mm to 0.4 m long: name the right unit in unit.txt beside the model or with --tool-scale, or \
+                 export the model again"
+            }
             Self::UnitFile { .. } => "write m, cm, mm, um, in, auto or a factor to metres into the file",
             Self::NotFinite { .. } | Self::Empty { .. } => "repair the mesh in the CAD program and export it again",
         }
     }
+}
+
+/// A length of unknown unit for a message, however large.
+fn number(size: f64) -> String {
+    let size = crate::domain::units::significant(size);
+    if (1e-4..1e6).contains(&size) { size.to_string() } else { format!("{size:e}") }
 }
 
 /// A mesh as read, with what was noticed.

@@ -16,6 +16,7 @@ use serde::Serialize;
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Group, Row, Scores};
+use crate::domain::findings::{Finding, Findings};
 use crate::domain::pose::Engine;
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::sample::Scale;
@@ -124,6 +125,8 @@ pub struct Evaluation {
     pub conventions: &'static str,
     /// What the columns mean, and what is missing and why.
     pub notes: Vec<String>,
+    /// What is odd about the files, by kind.
+    pub findings: Vec<Finding>,
     /// What was left out.
     pub skipped: Vec<Skipped>,
     /// Whether everything asked for was scored: false if stopped early.
@@ -164,6 +167,7 @@ pub fn evaluate(dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluati
             measured_features: Vec::new(),
         })
         .collect();
+    let mut findings = Findings::default();
     let (mut done, mut scale) = (0, Scale::Measured);
     load::ahead(dataset, setup, &work, cx, |batch| {
         let mut tool = tool::Tool::new(dataset, batch.tool.clone(), &mut skipped);
@@ -180,6 +184,7 @@ pub fn evaluate(dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluati
             };
             let loaded = cases.good.len() + cases.bad.len();
             skipped.extend(cases.bad);
+            findings.extend(cases.good.iter().flat_map(|case| case.sample.notes.iter().cloned()));
             if let Some(case) = cases.good.first() {
                 scale = case.sample.scale;
             }
@@ -205,12 +210,14 @@ pub fn evaluate(dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluati
     let rows = scores.iter().map(|s| evaluation::row(s, &groups, setup.resamples)).collect();
     let mut notes: Vec<String> = evaluation::NOTES.iter().map(|&n| n.to_owned()).collect();
     notes.append(&mut models.missing(setup, scale));
+    notes.append(&mut models.masks_made_otherwise());
     Ok(Evaluation {
         dataset: dataset.title.clone(),
         rows,
         groups,
         conventions: evaluation::conventions(scale),
         notes,
+        findings: findings.into_list(),
         skipped,
         complete: done == total && !cx.cancel.is_cancelled(),
         setup: setup.clone(),

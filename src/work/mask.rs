@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::error::TaskError;
 use crate::domain::bits::Bits;
-use crate::domain::contact;
+use crate::domain::contact::{self, ContactMask};
 use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::DepthMap;
 use crate::domain::pose::ToolModel;
 use crate::domain::sample::FingerTouch;
 
@@ -25,7 +25,7 @@ pub enum MaskRecipe {
     Truth,
 }
 
-/// An automatic mask that needs no model.
+/// An automatic mask that needs no model, and what it is made of in the end: a flat imprint has no contact.
 ///
 /// `tool` and `truth` (`grasp_from_object`) are needed for [`MaskRecipe::Cad`], `touch` for it and for
 /// [`MaskRecipe::Truth`].
@@ -38,13 +38,11 @@ pub fn mask(
     touch: Option<&FingerTouch>,
     tool: Option<&ToolModel>,
     truth: Option<PlanarPose>,
-) -> Result<Mask, TaskError> {
+) -> Result<ContactMask, TaskError> {
     const WHAT: &str = "Contact mask";
-    match recipe {
-        MaskRecipe::Threshold(min_m) => Ok(contact::threshold(imprint, min_m.get())),
-        MaskRecipe::TopPercent(percent) => {
-            Ok(contact::top_percent(imprint, f64::from(percent.get()), f32::NEG_INFINITY))
-        }
+    let mask = match recipe {
+        MaskRecipe::Threshold(min_m) => contact::threshold(imprint, min_m.get()),
+        MaskRecipe::TopPercent(percent) => contact::top_percent(imprint, f64::from(percent.get()), f32::NEG_INFINITY),
         MaskRecipe::Cad(limit_m) => {
             let camera = touch
                 .and_then(FingerTouch::camera)
@@ -52,14 +50,15 @@ pub fn mask(
             let tool = tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
             let truth = truth.ok_or_else(|| TaskError::new(WHAT, "the true pose is not known"))?;
             contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), f64::from(limit_m.get()))
-                .map_err(|err| TaskError::from_error(WHAT, &err))
+                .map_err(|err| TaskError::from_error(WHAT, &err))?
         }
         MaskRecipe::Truth => {
             let truth = touch
                 .and_then(|t| t.bubble.as_ref()?.truth.as_ref())
                 .ok_or_else(|| TaskError::new(WHAT, "only simulated data knows the true contact"))?;
-            Ok(truth.contact.clone())
+            truth.contact.clone()
         }
-        MaskRecipe::Unet(_) => Err(TaskError::new(WHAT, "the mask model runs on another lane")),
-    }
+        MaskRecipe::Unet(_) => return Err(TaskError::new(WHAT, "the mask model runs on another lane")),
+    };
+    Ok(contact::settled(imprint, mask))
 }

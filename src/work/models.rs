@@ -11,8 +11,9 @@ use super::bundles::BundleInfo;
 use super::error::TaskError;
 use super::imprint::in_metres;
 use super::job::{JobCx, PreviewPicture};
+use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GenerateConfig, Progress};
-use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{DepthChain, RawPrediction, ShiftMode};
 use crate::domain::sensor::gelslim;
 use crate::infer::bundle::GeneratorSpec;
@@ -289,17 +290,22 @@ impl Models {
         kept
     }
 
-    /// What the mask model says of an imprint in metres.
+    /// What the mask model says of an imprint in metres, and what the mask is made of in the end.
     ///
     /// # Errors
     /// If the model cannot be loaded or run.
-    pub fn mask(&self, bundle: &BundleInfo, engine: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
+    pub fn mask(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        imprint: &DepthMap,
+    ) -> Result<ContactMask, TaskError> {
         let what = format!("Mask with {}", bundle.name);
         let mut loaded = lock(&self.masks);
         let model = ready(&mut loaded, (bundle.id.clone(), engine), 1, || {
             MaskModel::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
         })?;
-        model.predict(imprint).map_err(|err| TaskError::from_error(&what, &err))
+        model.contact(imprint).map_err(|err| TaskError::from_error(&what, &err))
     }
 }
 

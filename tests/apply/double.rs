@@ -14,9 +14,10 @@ use touch2touch::app::services::{DataSource, Services};
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::State;
 use touch2touch::app::tasks::Level;
+use touch2touch::domain::contact::{ContactMask, settled_model};
 use touch2touch::domain::dataset::{Index, PairEntry, PairId, Problem, Split};
 use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use touch2touch::domain::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift};
 use touch2touch::domain::resample::Resampling;
@@ -45,6 +46,8 @@ pub(crate) struct Source {
     pub(crate) damaged: Mutex<BTreeSet<String>>,
     pub(crate) full_disk: AtomicBool,
     pub(crate) saves: AtomicU64,
+    /// What is odd about every pair loaded from now on.
+    pub(crate) notes: Mutex<Vec<Problem>>,
 }
 
 impl Source {
@@ -69,6 +72,7 @@ impl Source {
             damaged: Mutex::default(),
             full_disk: AtomicBool::new(false),
             saves: AtomicU64::new(0),
+            notes: Mutex::default(),
         }
     }
 
@@ -136,7 +140,8 @@ impl DataSource for Source {
                 rig: None,
             })
         };
-        Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, ..Sample::default() })
+        let notes = self.notes.lock().unwrap().clone();
+        Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, notes, ..Sample::default() })
     }
 
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
@@ -183,6 +188,8 @@ pub(crate) struct Double {
     pub(crate) batches: AtomicU64,
     /// Times the disk was looked through.
     pub(crate) looked_up: AtomicU64,
+    /// The mask model sees no contact anywhere.
+    pub(crate) blind: AtomicBool,
     /// What lies on the disk.
     pub(crate) kept: Mutex<Vec<(PredictionKey, Prediction)>>,
     bundles: bool,
@@ -198,6 +205,7 @@ impl Double {
             settings_saved: AtomicU64::new(0),
             batches: AtomicU64::new(0),
             looked_up: AtomicU64::new(0),
+            blind: AtomicBool::new(false),
             kept: Mutex::default(),
             bundles,
         }
@@ -277,8 +285,9 @@ impl Services for Double {
             .collect()
     }
 
-    fn mask_by_model(&self, _: &BundleInfo, _: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
-        Ok(imprint.map(|v| *v > 0.006))
+    fn mask_by_model(&self, _: &BundleInfo, _: EngineChoice, imprint: &DepthMap) -> Result<ContactMask, TaskError> {
+        let blind = self.blind.load(Ordering::Relaxed);
+        Ok(settled_model(imprint, imprint.map(|v| !blind && *v > 0.006)))
     }
 
     fn load_settings(&self) -> (Settings, Option<TaskError>) {

@@ -1,5 +1,6 @@
 //! With a simulated grasp: masks, clouds, poses; with threads; without models.
 
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex};
 
 use touch2touch::app::action::Action;
@@ -9,6 +10,8 @@ use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::settings::{MaskSource, MaskTool};
 use touch2touch::app::state::{Absent, Lookup, State};
+use touch2touch::app::tasks::Entry;
+use touch2touch::domain::dataset::{PairId, Problem};
 use touch2touch::domain::sensor::Finger;
 
 use super::double::{Bench, Double, SIMULATED};
@@ -78,6 +81,42 @@ fn a_source_without_camera_says_why_there_is_no_pose() {
     bench.send(Command::SetMaskSource(MaskSource::Unet));
     bench.settle();
     assert!(bench.state.mask_in_force(MEASURED, Finger::Right).is_ok());
+}
+
+#[test]
+fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
+    let mut bench = Bench::open();
+    bench.services.blind.store(true, Ordering::Relaxed);
+    bench.send(panes(&[Pane::Measured]));
+    bench.send(Command::SetMaskSource(MaskSource::Unet));
+    bench.settle();
+    let shown = bench.state.mask_in_force(MEASURED, Finger::Right).unwrap();
+    assert!(shown.label.starts_with("Depth ") && shown.label.contains("found no contact"), "{}", shown.label);
+    assert_eq!(shown.mask.as_slice().iter().filter(|m| **m).count(), 35 + 4, "the ring and the spot");
+    let said = |bench: &Bench| bench.state.log.entries.iter().filter(|e| e.text.contains("found no contact")).count();
+    assert_eq!(said(&bench), 1, "{:#?}", bench.state.log.entries);
+    // The other finger says so when it is looked at, and a source that finds contact says nothing.
+    bench.send(Command::SetMaskSource(MaskSource::Threshold));
+    bench.settle();
+    assert_eq!(bench.state.mask_in_force(MEASURED, Finger::Right).unwrap().label, "Threshold 5.00 mm");
+    assert_eq!(said(&bench), 1);
+}
+
+#[test]
+fn what_is_odd_about_a_pair_is_logged_once_when_it_is_looked_at() {
+    let mut bench = Bench::open();
+    let note = Problem { file: "x.pt".into(), what: "the K is implausible".into(), hint: "check it".into() };
+    bench.services.source.notes.lock().unwrap().push(note);
+    bench.send(panes(&[Pane::Measured]));
+    let said = |bench: &Bench| {
+        let odd = |e: &&Entry| e.detail.as_ref().is_some_and(|d| d.contains("implausible") && d.contains("x.pt"));
+        bench.state.log.entries.iter().filter(odd).count()
+    };
+    for (pair, count) in [(9, 1), (10, 2), (9, 2)] {
+        bench.send(Command::Select(PairId(pair)));
+        bench.settle();
+        assert_eq!(said(&bench), count, "pair {pair}: {:#?}", bench.state.log.entries);
+    }
 }
 
 #[test]

@@ -32,8 +32,8 @@ fn a_written_touch_reads_back_whole() {
     );
     for (i, pair) in dataset.index.pairs.iter().enumerate() {
         let want = touch(pair.split as u8 as f32);
-        let loaded = dataset.load_with_notes(PairId(i as u32)).unwrap();
-        assert_eq!(loaded.notes, []);
+        let loaded = dataset.load_with_counts(PairId(i as u32)).unwrap();
+        assert_eq!(loaded.sample.notes, []);
         let got = loaded.sample;
         let (a, b) = (got.grasp_from_object.unwrap(), want.grasp_from_object.unwrap());
         assert!((a.theta_rad - b.theta_rad).abs() < 1e-15 && (a.y_m - b.y_m).abs() < 1e-15);
@@ -95,15 +95,55 @@ fn everything_wrong_is_listed_and_the_rest_opens() {
     assert!(error(2).contains("[2, 1, 1, 2]") && error(2).contains("[2, 1, 140, 175]"), "{}", error(2));
     assert!(error(3).contains("bubble_imprint") && error(3).contains("missing"), "{}", error(3));
     assert!(error(5).contains("empty") && error(6).contains("not a PyTorch file"));
-    let odd = dataset.load_with_notes(id(4)).unwrap();
+    let odd = dataset.load_with_counts(id(4)).unwrap();
     assert_eq!((odd.invalid[0].nan, odd.invalid[0].infinite, odd.invalid[1].nan), (1, 1, 1));
     let right = odd.sample.finger(Finger::Right).unwrap().bubble.as_ref().unwrap();
     assert!(right.imprint[(5, 0)].is_nan() && right.imprint[(6, 0)].is_nan() && right.camera.is_none());
     for key in ["bubble_depth_ref", "\"K\"", "bubbles_tr_quat"] {
-        assert!(odd.notes.iter().any(|n| n.what.contains(key)), "{key}: {:#?}", odd.notes);
+        assert!(odd.sample.notes.iter().any(|n| n.what.contains(key)), "{key}: {:#?}", odd.sample.notes);
     }
     assert!(dataset.load(id(7)).is_ok() && dataset.load(id(8)).is_ok());
     assert!(matches!(dataset.load(PairId(99)), Err(LoadError::NoSuchPair { .. })));
+}
+
+#[test]
+fn what_is_mostly_no_measurement_is_refused_with_its_share() {
+    for (finger, share, refused) in [(0, 0.4, false), (0, 0.6, true), (1, 1.0, true)] {
+        for sensor in ["GelSlim", "imprint", "reference"] {
+            let dir = tempfile::tempdir().unwrap();
+            let mut sample = touch(1.0);
+            let touch = sample.fingers[finger].as_mut().unwrap();
+            let cut = |len: usize| (share * len as f64) as usize;
+            match sensor {
+                "GelSlim" => {
+                    let raw = &mut touch.gelslim.as_mut().unwrap().images.as_mut().unwrap().raw;
+                    let cut = cut(raw.len());
+                    raw.as_mut_slice()[..cut].fill([f32::NAN; 3]);
+                }
+                "imprint" => {
+                    let imprint = &mut touch.bubble.as_mut().unwrap().imprint;
+                    let cut = cut(imprint.len());
+                    imprint.as_mut_slice()[..cut].fill(f32::NAN);
+                }
+                _ => {
+                    let reference = &mut touch.bubble.as_mut().unwrap().camera.as_mut().unwrap().depth_reference;
+                    let cut = cut(reference.len());
+                    reference.as_mut_slice()[..cut].fill(f32::INFINITY);
+                }
+            }
+            write_pair(dir.path(), Layout::Test, "rod", 0, &sample).unwrap();
+            let loaded = Dataset::open(dir.path()).unwrap().load(PairId(0));
+            if refused {
+                let error = loaded.unwrap_err();
+                let (text, percent) = (error.to_string(), format!("{:.0} %", 100.0 * share));
+                assert!(matches!(error, LoadError::MostlyInvalid { .. }), "{text}");
+                assert!(text.contains(&percent) && text.contains(sensor) && text.contains("_data_0.pt"), "{text}");
+            } else {
+                let notes = loaded.unwrap().notes;
+                assert!(notes.iter().any(|n| n.what.contains("%") && n.file.is_file()), "{sensor}: {notes:#?}");
+            }
+        }
+    }
 }
 
 #[test]
@@ -117,9 +157,9 @@ fn halves_of_different_grasps_and_camera_zeros_are_noticed() {
     let [gel0, _] = pair_paths(dir.path(), Layout::Test, "rod", 0);
     let [gel1, _] = pair_paths(dir.path(), Layout::Test, "rod", 1);
     std::fs::copy(gel1, gel0).unwrap();
-    let loaded = Dataset::open(dir.path()).unwrap().load_with_notes(PairId(0)).unwrap();
+    let loaded = Dataset::open(dir.path()).unwrap().load_with_counts(PairId(0)).unwrap();
     assert_eq!(loaded.invalid[1].dropped, 1);
-    assert!(loaded.notes[0].what.contains("differ"), "{:#?}", loaded.notes);
+    assert!(loaded.sample.notes[0].what.contains("differ"), "{:#?}", loaded.sample.notes);
 }
 
 #[test]

@@ -22,10 +22,10 @@ fn every_tensor_of_the_reference_set_is_right() {
         let number: u64 = number.parse().unwrap();
         let is_it = |p: &touch2touch::domain::dataset::PairEntry| p.tool.as_deref() == Some(tool) && p.number == number;
         let id = PairId(dataset.index.pairs.iter().position(is_it).unwrap() as u32);
-        let loaded = dataset.load_with_notes(id).unwrap();
+        let loaded = dataset.load_with_counts(id).unwrap();
         // The set's cameras are mirrored, which no quaternion can say: the loader repairs that and says so.
-        assert_eq!(loaded.notes.len(), 1, "{:#?}", loaded.notes);
-        assert!(loaded.notes[0].what.contains("mirrored camera frame"));
+        assert_eq!(loaded.sample.notes.len(), 1, "{:#?}", loaded.sample.notes);
+        assert!(loaded.sample.notes[0].what.contains("mirrored camera frame"));
         let sample = loaded.sample;
         let pose = sample.grasp_from_object.unwrap().inverse();
         let number = |key: &str| want[key].as_f64().unwrap();
@@ -108,8 +108,8 @@ fn the_real_pictures_open_without_a_problem() {
     // Pictures that the lab's colour jitter left alone; see the module's documentation of the gain.
     let clean = [2, 3, 7, 8, 12, 13, 14, 16, 17, 19, 21, 22, 23, 24, 26, 32, 33, 34, 35];
     for i in 0..36 {
-        let loaded = dataset.load_with_notes(PairId(i)).unwrap();
-        assert_eq!(loaded.notes, []);
+        let loaded = dataset.load_with_counts(PairId(i)).unwrap();
+        assert_eq!(loaded.sample.notes, []);
         let touch = loaded.sample.finger(Finger::Right).unwrap();
         let imprint = &touch.bubble.as_ref().unwrap().imprint;
         assert_eq!(imprint.size(), [175, 140]);

@@ -11,8 +11,9 @@ use touch2touch::app::services::Services;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::State;
+use touch2touch::domain::contact::ContactMask;
 use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use touch2touch::domain::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch::domain::postprocess::{
     DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift, ShiftMode, ShiftStats,
 };
@@ -141,7 +142,12 @@ impl Services for QuickGenerator {
         Ok(wanted.iter().map(one).collect())
     }
 
-    fn mask_by_model(&self, bundle: &BundleInfo, runtime: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
+    fn mask_by_model(
+        &self,
+        bundle: &BundleInfo,
+        runtime: EngineChoice,
+        imprint: &DepthMap,
+    ) -> Result<ContactMask, TaskError> {
         self.live.mask_by_model(bundle, runtime, imprint)
     }
 

@@ -7,11 +7,14 @@ use super::super::command::{Command, Computed, Opened};
 use super::super::document::{Document, PairLabels, Stored};
 use super::super::effect::Effect;
 use super::super::jobs::generate::Keyed;
-use super::super::keys::{DatasetSeq, ImprintKey, ImprintSource, PairKey, PoseKey, PredictionKey, Request, TouchKey};
+use super::super::keys::{
+    DatasetSeq, ImprintKey, ImprintSource, MaskKey, PairKey, PoseKey, PredictionKey, Request, TouchKey,
+};
 use super::super::library::{OpenDataset, Place};
 use super::super::state::State;
 use super::super::tasks::{Level, Task, Ticket};
 use super::{cancel_all, follow, inspect, is_selected, masks, preferences, refit, remember, reorder, workbench};
+use crate::domain::contact::ContactMask;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
 use crate::work::bundles::BundleKind;
@@ -159,6 +162,7 @@ fn store(state: &mut State, request: Request, computed: Computed) {
             results.samples.insert(key, sample, size);
             if is_selected(state, key) {
                 preferences::follow_range(state);
+                super::say_notes(state);
             }
         }
         (Request::Labels(key), Computed::Labels(labels)) => store_labels(state, key, *labels),
@@ -207,10 +211,7 @@ fn store(state: &mut State, request: Request, computed: Computed) {
         (Request::Ambiguity(touch), Computed::Ambiguity(found)) => {
             results.ambiguities.insert(touch, Arc::new(found), size_of_val(&found));
         }
-        (Request::Mask(key), Computed::Mask(mask)) => {
-            let size = mask.len();
-            results.masks.insert(key, mask, size);
-        }
+        (Request::Mask(key), Computed::Mask(found)) => mask_arrived(state, key, *found),
         (Request::Cloud(key), Computed::Cloud(clouds)) => {
             // One of a single finger is of the table of poses, not what the panes show.
             if let Some(at) =
@@ -254,6 +255,20 @@ fn store(state: &mut State, request: Request, computed: Computed) {
         }
         (request, _) => log::error!("the result of {request:?} is of another kind"),
     }
+}
+
+/// Keeps a mask, and what it is made of where that is not what its recipe names; then the log says so, once.
+fn mask_arrived(state: &mut State, key: MaskKey, found: ContactMask) {
+    if let Some(why) = found.basis.note() {
+        let touch = key.imprint.touch();
+        let said = state.results.mask_bases.insert(key.clone(), found.basis) == Some(found.basis);
+        if let Some(entry) = state.library.entry(touch.pair.pair).filter(|_| !said && is_selected(state, touch.pair)) {
+            let text = format!("{}, {} finger: {why}", entry.name, touch.finger.name());
+            state.log.push(Level::Warning, text, None, None);
+        }
+    }
+    let size = found.mask.len();
+    state.results.masks.insert(key, Arc::new(found.mask), size);
 }
 
 /// The pair and imprint a cloud belongs to.

@@ -205,7 +205,7 @@ pub(super) fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
     let source = edited_source(state, finger);
     match (state.automatic_mask(source, finger), state.mask_recipe(finger)) {
         (Lookup::Ready(mask), Ok(recipe)) => {
-            let adopted = (mask.clone(), state.mask_label(&recipe));
+            let adopted = (mask.clone(), state.automatic_label(source, finger, &recipe));
             set_hand_mask(state, "automatic mask taken over", finger, Some(adopted), effects);
         }
         (Lookup::Failed(err), _) => {

@@ -214,7 +214,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                     "Contact mask by the mask model".into(),
                     Box::new(move |_| {
                         let imprint = imprint.get().ok_or_else(gone)?;
-                        Ok(Computed::Mask(Arc::new(services.mask_by_model(&bundle, runtime, imprint)?)))
+                        Ok(Computed::Mask(Box::new(services.mask_by_model(&bundle, runtime, imprint)?)))
                     }),
                 );
             }
@@ -233,7 +233,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                         tool.as_deref().map(|t| &t.model),
                         sample.grasp_from_object,
                     )?;
-                    Ok(Computed::Mask(Arc::new(mask)))
+                    Ok(Computed::Mask(Box::new(mask)))
                 }),
             )
         }

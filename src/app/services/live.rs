@@ -13,9 +13,10 @@ use super::super::keys::{PredictionKey, TouchKey};
 use super::super::library::Place;
 use super::super::settings::{SETTINGS_VERSION, Settings};
 use super::{DataSource, Following, Services};
+use crate::domain::contact::ContactMask;
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
-use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
@@ -210,7 +211,12 @@ impl Services for LiveServices {
         self.models.kept(bundles, engine, difference).into_iter().map(keyed).collect()
     }
 
-    fn mask_by_model(&self, bundle: &BundleInfo, engine: EngineChoice, imprint: &DepthMap) -> Result<Mask, TaskError> {
+    fn mask_by_model(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        imprint: &DepthMap,
+    ) -> Result<ContactMask, TaskError> {
         self.models.mask(bundle, engine, imprint)
     }
 
@@ -293,6 +299,7 @@ fn parse_settings(bytes: &[u8]) -> Result<Settings, String> {
 mod tests {
     use super::*;
     use crate::domain::frames::PlanarPose;
+    use crate::domain::grid::Mask;
     use crate::domain::hand::{AcceptedPose, HandPose};
 
     /// A folder with one pair of pictures.

@@ -13,6 +13,8 @@ use super::super::predict::Predictor;
 use super::summary::Latency;
 use super::write::{self, FingerResult};
 use super::{Source, WatchArgs};
+use crate::domain::contact::MaskBasis;
+use crate::domain::dataset::Problem;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{Grid, RgbGrid};
 use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
@@ -46,6 +48,9 @@ pub(super) struct FingerFigures {
     max_m: f64,
     mean_m: f64,
     contact_px: Option<usize>,
+    /// What the mask is made of: the source's key, `depth` where the mask model found nothing, `flat` where there is no
+    /// contact.
+    mask: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     psnr_db: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -72,12 +77,17 @@ pub(super) struct PoseFigures {
 /// A result, as it is written and said.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Done {
-    name: String,
+    pub name: String,
     source: Source,
     recipe: Value,
     files: Vec<String>,
+    /// What is odd about the touch's files.
+    pub notes: Vec<Problem>,
     scale: &'static str,
     fingers: Vec<FingerFigures>,
+    /// Why masks are not made of the source that was asked.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub mask_notes: Vec<String>,
     pose: Option<PoseFigures>,
     /// Why there is no pose.
     no_pose: Option<String>,
@@ -169,14 +179,20 @@ impl<'a> Worker<'a> {
         latency.generate = ms(step);
         let step = Instant::now();
         for f in &mut fingers {
-            f.mask = Some(match self.args.mask.mask {
+            let found = match self.args.mask.mask {
                 MaskFrom::Threshold => {
                     let recipe = MaskRecipe::Threshold((self.args.mask.threshold_mm / 1e3).into());
                     mask::mask(&recipe, &f.imprint, None, None, None).map_err(|err| anyhow::anyhow!("{err}"))?
                 }
                 _ => self.predictor.mask(&f.imprint)?,
-            });
+            };
+            f.basis = found.basis;
+            f.mask = Some(found.mask);
         }
+        let source_key = match self.args.mask.mask {
+            MaskFrom::Auto => MaskFrom::Unet.key(),
+            asked => asked.key(),
+        };
         latency.mask = ms(step);
         let step = Instant::now();
         let (pose, no_pose) = match self.pose(dataset, sample, tool, &fingers) {
@@ -194,8 +210,13 @@ impl<'a> Worker<'a> {
             source: source.clone(),
             recipe: recipe.clone(),
             files,
+            notes: sample.notes.clone(),
             scale: sample.scale.key(),
-            fingers: fingers.iter().map(|f| figures(sample, f)).collect(),
+            mask_notes: fingers
+                .iter()
+                .filter_map(|f| Some(format!("{} finger: {}", f.finger.name(), f.basis.note()?)))
+                .collect(),
+            fingers: fingers.iter().map(|f| figures(sample, f, source_key)).collect(),
             pose,
             no_pose,
             latency,
@@ -227,7 +248,7 @@ impl<'a> Worker<'a> {
         let mut out = Vec::new();
         for ((finger, _), made) in touched.iter().zip(&made) {
             let imprint = imprint_of(made, shift, sample, *finger)?;
-            out.push(FingerResult { finger: *finger, imprint, mask: None });
+            out.push(FingerResult { finger: *finger, imprint, mask: None, basis: MaskBasis::Source });
         }
         Ok(Some(out))
     }
@@ -290,7 +311,7 @@ fn load_tool(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<
 }
 
 /// Numbers of one prediction, against the measurement where there is one.
-fn figures(sample: &Sample, result: &FingerResult) -> FingerFigures {
+fn figures(sample: &Sample, result: &FingerResult, source: &'static str) -> FingerFigures {
     let stats = crate::domain::postprocess::Stats::of(&result.imprint);
     let measured = sample.finger(result.finger).and_then(|t| t.bubble.as_ref()).map(|b| &b.imprint);
     let measured = measured.filter(|m| m.size() == result.imprint.size());
@@ -302,6 +323,7 @@ fn figures(sample: &Sample, result: &FingerResult) -> FingerFigures {
         max_m: stats.max,
         mean_m: stats.mean,
         contact_px: result.mask.as_ref().map(count),
+        mask: result.basis.key(source),
         psnr_db: compared.as_ref().and_then(|c| c.psnr_db),
         ssim: compared.as_ref().and_then(|c| c.ssim),
     }

@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::Source;
+use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sensor::Finger;
@@ -46,6 +47,7 @@ pub(super) struct FingerResult {
     pub finger: Finger,
     pub imprint: DepthMap,
     pub mask: Option<Mask>,
+    pub basis: MaskBasis,
 }
 
 /// Writes the predictions.

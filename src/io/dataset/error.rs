@@ -61,6 +61,20 @@ pub enum LoadError {
         /// Width and height of each.
         sizes: [[usize; 2]; 2],
     },
+    /// More of an image is no measurement than is one.
+    #[error(
+        "{:.0} % of the {what} are no measurement (NaN, infinite or depth 0): too few are left ({})",
+        100.0 * share,
+        file.display()
+    )]
+    MostlyInvalid {
+        /// The file.
+        file: PathBuf,
+        /// What of it, such as "pixels of the right imprint".
+        what: String,
+        /// The share that is no measurement.
+        share: f64,
+    },
     /// The program failed on the pair's files.
     #[error("reading the pair failed, which is a bug: {message} ({})", names(files))]
     Bug {
@@ -83,7 +97,7 @@ impl LoadError {
         match self {
             Self::Pt(err) => Some(err.file()),
             Self::Picture(err) => Some(err.file()),
-            Self::Sizes { file, .. } => Some(file),
+            Self::Sizes { file, .. } | Self::MostlyInvalid { file, .. } => Some(file),
             Self::Bug { files, .. } => files.first().map(PathBuf::as_path),
             Self::NoSuchPair { .. } => None,
         }
@@ -95,6 +109,7 @@ impl LoadError {
             Self::Pt(err) => err.hint(),
             Self::Picture(err) => err.hint(),
             Self::Sizes { .. } => "take both images with the same camera settings",
+            Self::MostlyInvalid { .. } => "record the grasp again, or remove the file",
             Self::Bug { .. } => "please report it with these files; the other pairs are not affected",
             Self::NoSuchPair { .. } => "open the dataset again",
         }

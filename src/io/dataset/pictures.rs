@@ -212,8 +212,8 @@ impl Pictures {
             touch.bubble = Some(BubbleTouch { imprint: imprint_from_tile(&tile), camera: None, truth: None });
             scale = Scale::Assumed;
         }
-        let sample = Sample { fingers: [Some(touch), None], grasp_from_object: None, scale, laid };
-        Ok(Loaded { sample, notes, invalid: Default::default() })
+        let sample = Sample { fingers: [Some(touch), None], grasp_from_object: None, scale, laid, notes };
+        Ok(Loaded { sample, invalid: Default::default() })
     }
 }
 

@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use super::problem;
+use crate::domain::dataset::Problem;
 use crate::domain::mesh::TriMesh;
+use crate::domain::units::{is_tool_length, scale_to_metres};
 use crate::io::files;
 use crate::io::stl::{self, MeshError};
 
@@ -61,31 +64,62 @@ impl ToolScale {
     }
 }
 
-/// Reads a CAD model and brings it to metres: by `scale`, else as [`UNIT_FILE`] beside it says, else as it is.
+/// A CAD model that can be worked with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ToolFile {
+    /// The model in metres.
+    pub mesh: TriMesh,
+    /// What is odd about its file.
+    pub notes: Vec<Problem>,
+}
+
+/// Reads a CAD model and brings it to metres: by `scale`, else as [`UNIT_FILE`] beside it says, else as it is. The one
+/// verdict on CAD files, for the doctor and for whoever uses them.
 ///
 /// # Errors
-/// [`MeshError`]; [`MeshError::Unit`], with the factor that would fit, if the model cannot be in metres.
-pub fn read_in_metres(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, MeshError> {
-    let scale = match scale {
-        Some(scale) => scale,
-        None => ToolScale::beside(path)?.unwrap_or_default(),
+/// [`MeshError`]; [`MeshError::Unit`], with the factor that would fit, if the model cannot be in metres, and
+/// [`MeshError::NotATool`] if no unit makes it a tool, or not the one that was named.
+pub fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, MeshError> {
+    let (scale, said_by) = match scale {
+        Some(scale) => (scale, "the caller".to_owned()),
+        None => (ToolScale::beside(path)?.unwrap_or_default(), format!("{}", path.with_file_name(UNIT_FILE).display())),
     };
-    let stl::StlFile { mut mesh, suggested_scale, .. } = stl::read(path)?;
-    let factor = match (scale, suggested_scale) {
-        (ToolScale::Factor(factor), _) => factor,
-        (ToolScale::Auto, offered) => offered.unwrap_or(1.0),
-        (ToolScale::Metres, None) => 1.0,
-        (ToolScale::Metres, Some(offered)) => {
-            let size = mesh.bounds().map_or(0.0, |[lo, hi]| (hi - lo).max_element());
-            return Err(MeshError::Unit { file: path.to_owned(), size, offered });
+    let stl::StlFile { mut mesh, degenerate, .. } = stl::read(path)?;
+    let size = mesh.bounds().map_or(0.0, |[lo, hi]| (hi - lo).max_element());
+    let fitting = scale_to_metres(size);
+    let not_a_tool = |unit: String| MeshError::NotATool { file: path.to_owned(), size, unit };
+    let factor = match (scale, fitting) {
+        (ToolScale::Factor(factor), _) if is_tool_length(size * factor) => factor,
+        (ToolScale::Factor(factor), fitting) => {
+            let instead = fitting.map_or(String::new(), |fitting| format!("; {fitting} would fit"));
+            return Err(not_a_tool(format!("with the factor {factor} to metres that {said_by} gives{instead}")));
         }
+        (ToolScale::Auto, Some(factor)) => factor,
+        (ToolScale::Metres, Some(1.0)) => 1.0,
+        (ToolScale::Metres, Some(offered)) => return Err(MeshError::Unit { file: path.to_owned(), size, offered }),
+        (ToolScale::Metres | ToolScale::Auto, None) => return Err(not_a_tool("in metres or any other unit".into())),
     };
     if factor != 1.0 {
         for vertex in &mut mesh.vertices {
             *vertex *= factor;
         }
     }
-    Ok(mesh)
+    let notes = (degenerate > 0).then(|| {
+        problem(
+            path,
+            format!("{degenerate} triangles of the CAD model have no area"),
+            "they are left out; repair the mesh if edges look frayed",
+        )
+    });
+    Ok(ToolFile { mesh, notes: notes.into_iter().collect() })
+}
+
+/// The mesh of [`read_tool`].
+///
+/// # Errors
+/// As [`read_tool`].
+pub fn read_in_metres(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, MeshError> {
+    read_tool(path, scale).map(|file| file.mesh)
 }
 
 #[cfg(test)]
@@ -129,6 +163,33 @@ mod tests {
         std::fs::write(dir.path().join(UNIT_FILE), "furlong").unwrap();
         let error = read_in_metres(&path, None).unwrap_err();
         assert!(error.to_string().contains("furlong") && error.file().ends_with(UNIT_FILE), "{error}");
+    }
+
+    #[test]
+    fn a_unit_that_makes_no_tool_is_refused_whoever_names_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.stl");
+        // Too large or too small in every unit.
+        for unit in [1e-30, 1e20] {
+            write(&path, unit);
+            for scale in [None, Some(ToolScale::Auto), Some(ToolScale::Metres), Some(ToolScale::Factor(1.0))] {
+                let error = read_tool(&path, scale).unwrap_err();
+                assert!(matches!(error, MeshError::NotATool { .. }) && error.to_string().contains("t.stl"), "{error}");
+                assert!(error.to_string().len() < 200 + path.as_os_str().len(), "{error}");
+            }
+        }
+        // A model in millimetres: the right unit in the file is right, a wrong one is not taken.
+        write(&path, 1e-3);
+        let unit_file = dir.path().join(UNIT_FILE);
+        for right in ["mm", "auto", "0.001"] {
+            std::fs::write(&unit_file, right).unwrap();
+            assert!((length(&read_tool(&path, None).unwrap().mesh) - 0.04).abs() < 1e-8, "{right}");
+        }
+        for wrong in ["um", "in", "1"] {
+            std::fs::write(&unit_file, wrong).unwrap();
+            let error = read_tool(&path, None).unwrap_err().to_string();
+            assert!(error.contains(UNIT_FILE) && error.contains("0.001 would fit"), "{wrong}: {error}");
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The models of an evaluation, and what each method makes of a few touches.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
@@ -57,6 +58,8 @@ pub(super) struct Models {
     pub(super) mask: Option<MaskModel>,
     pub(super) classifier: Option<ToolClassifier>,
     engine: String,
+    /// How many masks were not made of the source that was asked, by row and reason.
+    pub(super) made_otherwise: BTreeMap<(String, &'static str), usize>,
 }
 
 fn open<T, E: std::error::Error>(
@@ -112,12 +115,18 @@ impl Models {
         if engine.is_empty() {
             engine = mask.as_ref().map_or("no model", |m| m.engine().label()).to_owned();
         }
-        Ok(Self { methods, mask, classifier, engine })
+        Ok(Self { methods, mask, classifier, engine, made_otherwise: BTreeMap::new() })
     }
 
     /// The engine's name.
     pub(super) fn engine(&self) -> &str {
         &self.engine
+    }
+
+    /// Masks that were not made of the source that was asked, in words.
+    pub(super) fn masks_made_otherwise(&self) -> Vec<String> {
+        let line = |((method, why), count): (&(String, &'static str), &usize)| format!("{method}: {count} masks {why}");
+        self.made_otherwise.iter().map(line).collect()
     }
 
     /// What is missing from the table, and why.

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::load::Case;
 use super::methods::{Made, Method, Models};
 use super::{MaskBy, Setup, Skipped};
-use crate::domain::contact::LAB_CAD_DISTANCE_M;
+use crate::domain::contact::{ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::metrics::{SsimRange, ssim_ranges, unit_range};
@@ -74,7 +74,7 @@ impl Tool {
         cx: &JobCx,
         say: &mut dyn FnMut(&str),
     ) {
-        let Models { methods, mask, classifier, .. } = models;
+        let Models { methods, mask, classifier, made_otherwise, .. } = models;
         self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
@@ -98,11 +98,21 @@ impl Tool {
                     }
                     let imprint = made.imprints[f.index()].as_ref()?;
                     let found = match (setup.mask, mask.as_mut()) {
-                        (MaskBy::Unet, Some(model)) => model.predict(imprint).map_err(|err| err.to_string()),
+                        (MaskBy::Unet, Some(model)) => model.contact(imprint).map_err(|err| err.to_string()),
                         (MaskBy::Unet, None) => return None,
                         _ => self.mask(setup.mask, &case.sample, f, imprint),
                     };
-                    found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", f.name()))).ok()
+                    let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", f.name())));
+                    let ContactMask { mask, basis } = found.ok()?;
+                    let why = match basis {
+                        MaskBasis::Source => return Some(mask),
+                        MaskBasis::Flat => "are empty: the imprints are flat",
+                        MaskBasis::Depth(_) => {
+                            "are by depth: the mask model found no contact in imprints that have some"
+                        }
+                    };
+                    *made_otherwise.entry((method.name().to_owned(), why)).or_insert(0) += 1;
+                    Some(mask)
                 });
                 kept.push((case, made, masks));
             }
@@ -136,7 +146,7 @@ impl Tool {
     }
 
     /// A mask that needs no model.
-    fn mask(&self, by: MaskBy, sample: &Sample, finger: Finger, imprint: &DepthMap) -> Result<Mask, String> {
+    fn mask(&self, by: MaskBy, sample: &Sample, finger: Finger, imprint: &DepthMap) -> Result<ContactMask, String> {
         let recipe = match by {
             MaskBy::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
             MaskBy::Threshold(m) => MaskRecipe::Threshold(m.into()),

@@ -94,7 +94,7 @@ impl Judge {
     }
 
     fn error_rad(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Option<f64>> {
-        let masks = [self.masks.predict(&imprints[0])?, self.masks.predict(&imprints[1])?];
+        let masks = [self.masks.contact(&imprints[0])?.mask, self.masks.contact(&imprints[1])?.mask];
         let mut fingers: [Option<FingerInput<'_>>; 2] = [None, None];
         for finger in Finger::BOTH {
             let camera = bubble(&case.sample, finger)?.camera.as_ref();

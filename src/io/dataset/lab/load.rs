@@ -9,7 +9,7 @@ use crate::domain::frames::{PlanarPose, affine_from_xyz_quat};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, GelSlimTouch, Sample};
 use crate::domain::sensor::{Finger, Intrinsics, bubble, gelslim};
-use crate::io::dataset::{InvalidPixels, LoadError, Loaded, problem};
+use crate::io::dataset::{InvalidPixels, LoadError, Loaded, most_invalid, plausible, problem};
 use crate::io::pt::{PtDict, PtError, read_dict};
 
 use super::mirrored::{UNIT_TOLERANCE, recover};
@@ -55,8 +55,8 @@ pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> R
     }
     let grasp_from_object =
         poses.first().map(|(_, [theta, x, y])| PlanarPose::object_from_grasp_of_lab(*theta, *x, *y).inverse());
-    let sample = Sample { fingers: fingers.map(Some), grasp_from_object, ..Sample::default() };
-    Ok(Loaded { sample, notes, invalid })
+    let sample = Sample { fingers: fingers.map(Some), grasp_from_object, notes, ..Sample::default() };
+    Ok(Loaded { sample, invalid })
 }
 
 /// A value that the sample can do without: absent is a note, wrong is an error.
@@ -107,7 +107,7 @@ fn bubble_touches(
     dict: &PtDict,
     notes: &mut Vec<Problem>,
     invalid: &mut [InvalidPixels; 2],
-) -> Result<[BubbleTouch; 2], PtError> {
+) -> Result<[BubbleTouch; 2], LoadError> {
     let imprint = dict.f32s("bubble_imprint", &[&BUBBLE_SHAPE])?;
     let without = "points cannot be lifted to the grasp frame";
     let reference = optional(dict, dict.f32s("bubble_depth_ref", &[&BUBBLE_SHAPE]), without, notes)?;
@@ -118,20 +118,25 @@ fn bubble_touches(
     } else {
         None
     };
-    let mut touch = |finger: Finger| {
+    let mut touch = |finger: Finger| -> Result<BubbleTouch, LoadError> {
         let index = finger.index();
         let mut map = depth_map(halves(&imprint)[index]);
         let reference = reference.as_ref().map(|r| depth_map(halves(r)[index]));
         invalid[index] = invalid_to_nan(&mut map, reference.as_ref());
+        let pixels = map.len();
+        most_invalid(dict.file(), invalid[index].total(), pixels, || {
+            format!("pixels of the {} imprint", finger.name())
+        })?;
         let bad = reference.as_ref().map_or(0, |r| r.as_slice().iter().filter(|v| !v.is_finite()).count());
         if bad > 0 {
-            let percent = 100.0 * bad as f64 / map.len() as f64;
+            let percent = 100.0 * bad as f64 / pixels as f64;
             let what = format!(
                 "key \"bubble_depth_ref\", {} finger: {bad} pixels ({percent:.2} %) are NaN or infinite",
                 finger.name()
             );
             notes.push(problem(dict.file(), what, "these pixels are left out of every cloud"));
         }
+        most_invalid(dict.file(), bad, pixels, || format!("pixels of the {} reference depth", finger.name()))?;
         let camera = match (reference, cameras[index]) {
             (Some(depth_reference), Some((intrinsics, grasp_from_camera))) => {
                 Some(BubbleCamera { depth_reference, intrinsics, grasp_from_camera })
@@ -142,9 +147,9 @@ fn bubble_touches(
             imprint: depth_map(halves(clean)[index]),
             contact: depth_map(halves(contact)[index]).map(|&v| v > 0.5),
         });
-        BubbleTouch { imprint: map, camera, truth }
+        Ok(BubbleTouch { imprint: map, camera, truth })
     };
-    Ok([touch(Finger::Right), touch(Finger::Left)])
+    Ok([touch(Finger::Right)?, touch(Finger::Left)?])
 }
 
 /// Everything that is no measurement becomes NaN, and is counted.
@@ -182,6 +187,8 @@ fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Op
     if (length - 1.0).abs() > UNIT_TOLERANCE {
         notes.push(not_unit(dict, "grasp_frame_quat", length, "normalised"));
     }
+    notes.extend(plausible::rounded_place(dict.file(), "grasp_frame_quat", &grasp));
+    notes.extend(plausible::rounded_place(dict.file(), "bubbles_tr_quat", &bubbles));
     let mut out = [None, None];
     let mut repaired: Option<(f64, &str)> = None;
     for finger in Finger::BOTH {
@@ -232,15 +239,21 @@ fn not_unit(dict: &PtDict, key: &str, length: f64, how: &str) -> Problem {
     problem(dict.file(), what, "expected x y z qx qy qz qw of a rotation; check how the frames were converted")
 }
 
-fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[GelSlimTouch; 2], PtError> {
+fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[GelSlimTouch; 2], LoadError> {
     let mut raw = dict.f32s("gelslim", &[&GELSLIM_SHAPE])?;
     let mut reference = dict.f32s("gelslim_ref", &[&GELSLIM_SHAPE])?;
+    let half = raw.len() / 2;
     let mut bad = 0usize;
-    for (a, b) in raw.iter_mut().zip(&mut reference) {
-        if !(a.is_finite() && b.is_finite()) {
-            bad += 1;
-            (*a, *b) = (0.0, 0.0);
+    let fingers = raw.chunks_exact_mut(half).zip(reference.chunks_exact_mut(half));
+    for ((raw, reference), finger) in fingers.zip(Finger::BOTH) {
+        let before = bad;
+        for (a, b) in raw.iter_mut().zip(reference) {
+            if !(a.is_finite() && b.is_finite()) {
+                bad += 1;
+                (*a, *b) = (0.0, 0.0);
+            }
         }
+        most_invalid(dict.file(), bad - before, half, || format!("values of the {} GelSlim image", finger.name()))?;
     }
     if bad > 0 {
         let percent = 100.0 * bad as f64 / raw.len() as f64;

@@ -1,9 +1,11 @@
-//! What a loaded sample must satisfy to be a touch of the lab's rig.
+//! What a loaded sample must satisfy to be a touch of the lab's rig. The doctor and whoever loads a pair get the same
+//! verdict, in the sample's notes.
 
 use std::path::Path;
 
 use glam::{DAffine3, DQuat, DVec3};
 
+use super::{Loaded, problem};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::DepthMap;
 use crate::domain::sample::{BubbleCamera, Sample};
@@ -15,6 +17,13 @@ const MAX_IMPRINT_M: f64 = 0.08;
 const DEPTH_RANGE_M: [f64; 2] = [0.02, 0.5];
 /// Focal lengths of a camera with 224 x 171 pixels: 13 to 160 degrees of view.
 const FOCAL_RANGE_PX: [f64; 2] = [20.0, 1000.0];
+/// Where a camera's principal point lies, as a share of the image's sides: near the middle. Numbers of an image scaled
+/// by a half or by two are out of it.
+const CENTRE_RANGE: [f64; 2] = [0.3, 0.7];
+/// Pixels are square, but for the calibration's errors.
+const MAX_ASPECT: f64 = 1.25;
+/// Frames that are known less well than this are worth a note: the registration is good to tenths of a millimetre.
+const MAX_ROUNDING_M: f64 = 2e-5;
 /// The tool lies in the grasp frame's origin: what the middle of the image sees cannot be further away.
 const NEAR_GRASP_M: f64 = 0.1;
 /// Angles are within 22.5 degrees in the released data; beyond a right angle they are in degrees.
@@ -24,8 +33,49 @@ const MAX_OFFSET_M: f64 = 0.1;
 /// Pixels by which lifting and projecting again may miss.
 const ROUND_TRIP_PX: f64 = 1e-6;
 
-/// Lists what cannot be right about `sample`, which was read from `file`.
-pub(super) fn sample(sample: &Sample, file: &Path, problems: &mut Vec<Problem>) {
+/// Adds to the sample's notes what cannot be right about it; `file` is its bubble's file.
+pub(super) fn notes(loaded: &mut Loaded, file: &Path) {
+    let mut problems = std::mem::take(&mut loaded.sample.notes);
+    for finger in Finger::BOTH {
+        let bubble = loaded.sample.finger(finger).and_then(|t| t.bubble.as_ref());
+        let (Some(bubble), invalid) = (bubble, loaded.invalid[finger.index()]) else { continue };
+        let pixels = bubble.imprint.len();
+        if invalid.are_many(pixels) {
+            let share = 100.0 * invalid.total() as f64 / pixels as f64;
+            let (name, nan, infinite, dropped) = (finger.name(), invalid.nan, invalid.infinite, invalid.dropped);
+            problems.push(problem(
+                file,
+                format!(
+                    "key \"bubble_imprint\": {share:.2} % of the {name} finger's pixels are no measurement ({nan} NaN, \
+                     {infinite} infinite, {dropped} at depth 0)"
+                ),
+                "these pixels are left out everywhere; record the grasp again if they cover the contact",
+            ));
+        }
+    }
+    sample(&loaded.sample, file, &mut problems);
+    loaded.sample.notes = problems;
+}
+
+/// A note if the place of a frame (`x y z` and a quaternion, as in the file) was rounded to 32 bits so far from the
+/// origin that it is not known well any more. `what` names the frame.
+pub(super) fn rounded_place(file: &Path, what: &str, values: &[f64]) -> Option<Problem> {
+    let in_32_bits = values.iter().all(|&v| f64::from(v as f32) == v);
+    let far = values.iter().take(3).fold(0f64, |far, v| far.max(v.abs()));
+    let rounding = far * f64::from(f32::EPSILON) / 2.0;
+    (in_32_bits && rounding > MAX_ROUNDING_M).then(|| {
+        problem(
+            file,
+            format!(
+                "key \"{what}\": {far:.0} m from the origin and stored with 32 bits, so it is only known to {} mm",
+                crate::domain::units::significant(1e3 * rounding)
+            ),
+            "store poses with 64 bits, or relative to a frame near the rig",
+        )
+    })
+}
+
+fn sample(sample: &Sample, file: &Path, problems: &mut Vec<Problem>) {
     let mut add = |what: String, hint: &str| {
         problems.push(Problem { file: file.to_owned(), what, hint: hint.into() });
     };
@@ -95,9 +145,10 @@ fn imprint(imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
 fn camera(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
     let k = camera.intrinsics;
     let focal_ok = |f: f64| (FOCAL_RANGE_PX[0]..=FOCAL_RANGE_PX[1]).contains(&f);
-    let inside = |c: f64, size: usize| (0.0..=size as f64).contains(&c);
+    let inside = |c: f64, size: usize| (CENTRE_RANGE[0]..=CENTRE_RANGE[1]).contains(&(c / size as f64));
     let centre_ok = inside(k.cx, bubble::FULL_WIDTH) && inside(k.cy, bubble::FULL_HEIGHT);
-    if !(focal_ok(k.fx) && focal_ok(k.fy) && centre_ok) {
+    let square = (k.fx / k.fy).max(k.fy / k.fx) <= MAX_ASPECT;
+    if !(focal_ok(k.fx) && focal_ok(k.fy) && centre_ok && square) {
         add(
             format!("the {name} camera's K is implausible: fx {} fy {} cx {} cy {}", k.fx, k.fy, k.cx, k.cy),
             "K belongs to the full 224 x 171 image, in pixels, row by row",
@@ -161,5 +212,23 @@ fn round_trip(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut i
             format!("{lost} pixels of the {name} finger do not come back from the cloud: they lie behind the camera"),
             "the imprint is deeper than the reference depth there; check units and the reference",
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_rounded_to_32_bits_far_from_the_origin_are_noticed() {
+        let rotation = [0.5, 0.5, 0.5, 0.5];
+        let place = |x: f64| [&[x, 0.25, -1.5][..], &rotation].concat();
+        let file = Path::new("t.pt");
+        let note = rounded_place(file, "grasp_frame_quat", &place(f64::from(4000.1f32))).unwrap();
+        assert!(note.what.contains("grasp_frame_quat") && note.what.contains("32 bits"), "{}", note.what);
+        // Near the origin, or with 64 bits, they are known well enough.
+        assert_eq!(rounded_place(file, "k", &place(f64::from(1.1f32))), None);
+        assert_eq!(rounded_place(file, "k", &place(4000.1)), None);
+        assert_eq!(rounded_place(file, "k", &place(f64::NAN)), None);
     }
 }
