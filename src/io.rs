@@ -10,6 +10,7 @@ pub mod export_unet;
 pub mod follow;
 pub mod images;
 pub mod masks;
+pub mod names;
 pub mod npz;
 pub mod pt;
 pub mod simulated;

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
+use super::args::DatasetArgs;
 use super::contact_mask::MaskArgs;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult, pose};
@@ -22,8 +23,8 @@ use crate::domain::units::{angle_error, fixed, mm, wrap_angle};
 /// Arguments of `basin`.
 #[derive(Debug, Args)]
 pub(super) struct BasinArgs {
-    /// The dataset: a folder in the lab's layout, or `demo`.
-    path: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// The pair, by its name or a part of it that no other has.
     #[arg(long)]
     pair: String,
@@ -92,7 +93,7 @@ struct Report {
 }
 
 pub(super) fn run(args: &BasinArgs) -> VerbResult {
-    let dataset = super::open(&args.path)?;
+    let dataset = args.dataset.open()?;
     let id = super::find_pair(&dataset, &args.pair)?;
     let entry = &dataset.index.pairs[id.0 as usize];
     let output = Output::new(Common { json: false }, "trying starts", 1);

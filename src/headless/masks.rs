@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 
+use super::args::{DatasetArgs, LimitArgs};
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
+use super::output::says;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::PairId;
@@ -25,9 +27,8 @@ pub(super) enum MasksVerb {
 /// Arguments of `masks export`.
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
-    /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.
-    #[arg(long)]
-    input: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// The folder to write; empty, missing, or a previous export.
     #[arg(long)]
     out: PathBuf,
@@ -46,9 +47,8 @@ pub(super) struct ExportArgs {
     /// Decides which pair lands in which part.
     #[arg(long, default_value_t = 0)]
     split_seed: u64,
-    /// Take only this many pairs, spread evenly over the dataset.
-    #[arg(long)]
-    limit: Option<usize>,
+    #[command(flatten)]
+    limit: LimitArgs,
     #[command(flatten)]
     common: Common,
 }
@@ -81,13 +81,12 @@ struct Exported {
 pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let MasksVerb::Export(args) = verb;
     let Format::Unet = args.format;
-    let mut dataset = super::open(&args.input)?;
-    dataset.tool_scale = args.tool.tool_scale;
+    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let store = MaskStore::for_dataset(&dataset)?;
     let stored = store.masks();
     let mut entries = Vec::new();
     let mut ids = Vec::new();
-    for id in super::spread(dataset.index.pairs.len(), args.limit) {
+    for id in args.limit.spread(dataset.index.pairs.len()) {
         let entry = &dataset.index.pairs[id];
         for finger in Finger::BOTH {
             let corrected = stored.iter().any(|(pair, f)| *pair == entry.name && *f == finger);
@@ -103,6 +102,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
             store.folder().display()
         );
     }
+    export_unet::check_stored(&store, entries.iter().zip(&ids).filter(|(_, (_, hand))| *hand).map(|(entry, _)| entry))?;
     let output = Output::new(args.common, "exporting", entries.len());
     let mut predictor = Predictor::new(&args.model);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
@@ -125,7 +125,8 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
             other => other,
         };
         let truth = sample.grasp_from_object;
-        let mask = contact_mask(source, &args.mask, &bubble.imprint, touch, tool, truth, &mut predictor)?;
+        let mask = contact_mask(source, &args.mask, &bubble.imprint, touch, tool, truth, &mut predictor)
+            .map_err(|err| says(&err))?;
         Ok((bubble.imprint.clone(), mask))
     })?;
     let exported = Exported {

@@ -28,7 +28,7 @@ use crate::infer::mask::MaskModel;
 use crate::infer::store::{self, Store};
 use crate::io::atomic;
 use crate::io::dataset::Dataset;
-use crate::io::export_unet::{self, ExportConfig, ExportEntry};
+use crate::io::export_unet::{self, ExportConfig, ExportEntry, LoadFailure};
 use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
 use crate::io::statistics::ShiftStatistics;
 
@@ -279,10 +279,17 @@ impl DataSource for LiveSource {
             return Err(TaskError::new(WHAT, "no mask was corrected yet")
                 .with_hint("Correct masks, or take automatic ones over with \"Threshold to mask\" (T)."));
         }
+        if let Ok(store) = &self.store {
+            // A mask that was changed since is taken from memory, and the file may be anything.
+            let stored = entries
+                .iter()
+                .filter(|e| changed.get(&e.pair).is_none_or(|labels| labels.masks[e.finger.index()].is_none()));
+            export_unet::check_stored(store, stored).map_err(|err| TaskError::from_error(WHAT, &err))?;
+        }
         let total = entries.len() as u64;
         let report = export_unet::export(folder, &entries, &ExportConfig::default(), |at| {
             let entry = &entries[at];
-            cx.check(WHAT)?;
+            cx.check(WHAT).map_err(|_| LoadFailure::Stop)?;
             cx.progress(at as u64, total, format!("{}, {}", entry.pair, entry.finger.name()));
             let sample = self.load(known[entry.pair.as_str()])?;
             let bubble = sample.finger(entry.finger).and_then(|touch| touch.bubble.as_ref());

@@ -8,6 +8,7 @@ use super::super::super::document::{PairLabels, Review};
 use super::super::super::error::TaskError;
 use super::super::{DataSource, Followed, Following};
 use super::LiveSource;
+use crate::domain::dataset::Problem;
 use crate::io::follow::{Arrival, Follower};
 use crate::io::masks::MaskStore;
 
@@ -15,18 +16,32 @@ struct LiveFollowing {
     follower: Follower,
     reviews: BTreeMap<String, Review>,
     saved: Arc<Mutex<BTreeMap<String, PairLabels>>>,
+    /// Troubles of the folder that were said.
+    said: Vec<Problem>,
 }
 
 /// `None` for the demo.
 pub(super) fn start(source: &LiveSource) -> Option<Box<dyn Following>> {
     let follower = Follower::continuing(source.dataset.clone())?;
-    Some(Box::new(LiveFollowing { follower, reviews: source.reviews.clone(), saved: source.saved.clone() }))
+    Some(Box::new(LiveFollowing {
+        follower,
+        reviews: source.reviews.clone(),
+        saved: source.saved.clone(),
+        said: Vec::new(),
+    }))
 }
 
 impl Following for LiveFollowing {
     fn poll(&mut self) -> Option<Followed> {
         let now = Instant::now();
-        let ready = self.follower.poll(now)?;
+        let ready = self.follower.poll(now);
+        if self.follower.troubles() != self.said {
+            for trouble in self.follower.troubles().iter().filter(|trouble| !self.said.contains(trouble)) {
+                log::warn!("{}: {} ({})", trouble.file.display(), trouble.what, trouble.hint);
+            }
+            self.said = self.follower.troubles().to_vec();
+        }
+        let ready = ready?;
         let sample = match self.follower.load(&ready, now) {
             Arrival::Unfinished | Arrival::Gone => return None,
             Arrival::Broken(problem) => {
