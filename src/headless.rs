@@ -1,8 +1,9 @@
 //! The command line: every verb calls the code that the studio's buttons call.
 //!
 //! With `--json`, standard output carries exactly one JSON object (`watch`: one a line, as things happen); progress, notes and errors go to standard error.
-//! The exit code is 0 only when everything asked for was done.
+//! The exit code is 0 only when everything asked for was done; 1: not all of it; 2: an error; 141: standard output was closed.
 
+mod args;
 mod basin;
 mod bench;
 mod cache;
@@ -17,15 +18,19 @@ mod notes;
 mod output;
 mod pose;
 mod predict;
+mod report;
 mod seeds;
 mod simulate;
 mod stats;
 mod watch;
 
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
+
+use output::{PrintError, says};
 
 pub use output::Output;
 
@@ -39,7 +44,7 @@ use crate::io::dataset::ToolScale;
 struct Cli {
     #[command(subcommand)]
     verb: Option<Verb>,
-    /// A dataset to open in the studio: a folder in the lab's layout, or of image pairs.
+    /// A dataset to open in the studio: a folder in the lab's layout or of image pairs, or a built-in one.
     path: Option<PathBuf>,
     /// Start the studio with its default layout and settings.
     #[arg(long)]
@@ -57,6 +62,9 @@ enum Verb {
     /// Statistics of a dataset's predictions and measurements, for the shift `--shift refit`.
     Stats(stats::StatsArgs),
     /// Follow a folder: predict and pose each GelSlim touch that appears, and write the result beside it.
+    ///
+    /// PATH may still be empty: a dataset in the lab's layout (the bubbles may be missing), a folder of GelSlim .pt
+    /// files, of NAME_gelslim.png, or of NAME_touch.png with NAME_reference.png or one reference.png (or .jpg).
     Watch(Box<watch::WatchArgs>),
     /// Estimate in-hand poses from measured or predicted imprints.
     Pose(pose::PoseArgs),
@@ -101,13 +109,98 @@ struct ToolArgs {
 /// What a verb hands back: whether everything asked for was done.
 type VerbResult = anyhow::Result<bool>;
 
+/// What the shell makes of a program that writes into a pipe nobody reads any more.
+const PIPE_CLOSED: u8 = 141;
+
 /// Parses the arguments and runs the verb or the window.
 pub fn main() -> ExitCode {
     output::start_log();
     crate::infer::trial::by_this_program();
-    let cli = Cli::parse();
-    let result = match cli.verb {
-        None => studio(cli.path, cli.reset_ui),
+    match parse(std::env::args_os()).and_then(run) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(err) => match err.downcast_ref::<PrintError>() {
+            Some(PrintError::Closed) => ExitCode::from(PIPE_CLOSED),
+            _ => {
+                output::note(&format!("error: {}", says(&err)));
+                ExitCode::from(2)
+            }
+        },
+    }
+}
+
+/// Whether a command line, the program's name first, is understood; nothing is run, opened or looked for.
+///
+/// # Errors
+/// What the program would say.
+pub fn check_command<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) -> Result<(), String> {
+    match Cli::try_parse_from(arguments) {
+        // Help and version are answers.
+        Err(err) if err.use_stderr() => Err(err.to_string()),
+        _ => Ok(()),
+    }
+}
+
+/// What is asked for; `None` where it was only help or the version, which has been printed.
+fn parse(arguments: impl IntoIterator<Item = OsString>) -> anyhow::Result<Option<Cli>> {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    // Before the parser, which takes any word for a path and complains about what follows it.
+    if let Some(first) = arguments.get(1)
+        && !first.to_string_lossy().starts_with('-')
+        && !is_verb(first)
+    {
+        check_studio_path(Path::new(first))?;
+    }
+    match Cli::try_parse_from(arguments) {
+        Ok(cli) => Ok(Some(cli)),
+        Err(err) if err.use_stderr() => {
+            let text = err.to_string();
+            anyhow::bail!("{}", text.strip_prefix("error: ").unwrap_or(&text).trim_end())
+        }
+        Err(help) => {
+            output::print(help.to_string().trim_end())?;
+            Ok(None)
+        }
+    }
+}
+
+fn verbs() -> Vec<String> {
+    Cli::command().get_subcommands().map(|verb| verb.get_name().to_owned()).chain(["help".to_owned()]).collect()
+}
+
+fn is_verb(word: &std::ffi::OsStr) -> bool {
+    verbs().iter().any(|verb| word == verb.as_str())
+}
+
+/// Refuses what is neither a folder nor a file nor the name of a built-in dataset, before a window opens: most likely it
+/// is a mistyped verb.
+fn check_studio_path(path: &Path) -> anyhow::Result<()> {
+    use crate::io::dataset::BuiltIn;
+    let word = path.to_string_lossy();
+    if path.exists() || BuiltIn::named(&word).is_some() {
+        return Ok(());
+    }
+    let mut near: Vec<(f64, String)> =
+        verbs().into_iter().map(|verb| (strsim::jaro_winkler(&word.to_lowercase(), &verb), verb)).collect();
+    near.sort_by(|a, b| b.0.total_cmp(&a.0));
+    /// From here on two words look alike.
+    const ALIKE: f64 = 0.75;
+    let hint = match near.first() {
+        Some((alike, verb)) if *alike >= ALIKE => format!("did you mean `touch2touch {verb}`?"),
+        _ => "`touch2touch --help` lists the verbs".to_owned(),
+    };
+    anyhow::bail!("{word:?} is neither a verb nor a folder or file that exists; {hint}")
+}
+
+fn run(cli: Option<Cli>) -> VerbResult {
+    let Some(cli) = cli else { return Ok(true) };
+    match cli.verb {
+        None => {
+            if let Some(path) = &cli.path {
+                check_studio_path(path)?;
+            }
+            studio(cli.path, cli.reset_ui)
+        }
         Some(Verb::Simulate(args)) => simulate::run(&args),
         Some(Verb::Generate(args)) => generate::run(&args),
         Some(Verb::Ledger(args)) => ledger::run(&args),
@@ -122,14 +215,6 @@ pub fn main() -> ExitCode {
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
         Some(Verb::Cache(args)) => cache::run(&args),
         Some(Verb::Runtime(args)) => models::runtime(&args),
-    };
-    match result {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
-        Err(err) => {
-            output::note(&format!("error: {err:#}"));
-            ExitCode::from(2)
-        }
     }
 }
 
@@ -142,11 +227,6 @@ fn studio(path: Option<PathBuf>, reset_ui: bool) -> VerbResult {
 #[cfg(not(feature = "gui"))]
 fn studio(_path: Option<PathBuf>, _reset_ui: bool) -> VerbResult {
     anyhow::bail!("this build has no window (cargo feature `gui`); see `touch2touch --help` for the verbs")
-}
-
-/// The dataset named on the command line: a folder, or the name of one that is built in (`demo`, `test-set`).
-fn open(path: &std::path::Path) -> anyhow::Result<crate::io::dataset::Dataset> {
-    Ok(crate::io::dataset::Dataset::open(path)?)
 }
 
 /// The pair called `name`, or the only one whose name has that in it.

@@ -12,6 +12,7 @@ pub mod files;
 pub mod follow;
 pub mod images;
 pub mod masks;
+pub mod names;
 pub mod npz;
 pub mod pt;
 pub mod simulated;

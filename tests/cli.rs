@@ -17,6 +17,11 @@ use touch2touch::io::masks::{MaskStore, StoredReview};
 use crate::support;
 
 #[cfg(feature = "onnx")]
+mod documented;
+mod hostile;
+#[cfg(feature = "onnx")]
+mod outputs;
+#[cfg(feature = "onnx")]
 mod watch;
 
 fn run(args: &[&str], data: &Path) -> Output {

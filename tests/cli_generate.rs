@@ -24,7 +24,7 @@ fn json(output: &Output) -> Value {
 }
 
 /// The tiny bundle, with imprints as large as the simulated ones: they are compared.
-fn full_size_bundle(dir: &Path) -> PathBuf {
+pub(crate) fn full_size_bundle(dir: &Path) -> PathBuf {
     let (from, to) = (Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator"), dir.join("bundle"));
     std::fs::create_dir(&to).unwrap();
     for entry in std::fs::read_dir(from).unwrap() {

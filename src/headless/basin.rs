@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
+use super::args::DatasetArgs;
 use super::contact_mask::{FingerMasks, MaskArgs};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
@@ -25,8 +26,8 @@ use crate::work::job::JobCx;
 /// Arguments of `basin`.
 #[derive(Debug, Args)]
 pub(super) struct BasinArgs {
-    /// The dataset: a folder in the lab's layout, or `demo`.
-    path: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// The pair, by its name or a part of it that no other has.
     #[arg(long)]
     pair: String,
@@ -99,7 +100,7 @@ struct Report {
 }
 
 pub(super) fn run(args: &BasinArgs) -> VerbResult {
-    let dataset = super::open(&args.path)?;
+    let dataset = args.dataset.open()?;
     let id = super::find_pair(&dataset, &args.pair)?;
     let entry = &dataset.index.pairs[id.0 as usize];
     let output = Output::new(Common { json: false }, "trying starts", 1);

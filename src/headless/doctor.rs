@@ -1,11 +1,11 @@
 //! `touch2touch doctor PATH`: opens a dataset, loads every pair and lists what is wrong.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 
+use super::args::DatasetArgs;
 use super::{Common, Output, VerbResult};
 use crate::domain::findings::Finding;
 use crate::io::doctor;
@@ -14,8 +14,8 @@ use crate::io::doctor;
 /// (`problems`: `file`, `what`, `hint` of the first, `count`, `examples`).
 #[derive(Debug, Args)]
 pub(super) struct DoctorArgs {
-    /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.
-    path: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     #[command(flatten)]
     common: Common,
 }
@@ -30,7 +30,7 @@ struct Report<'a> {
 
 /// Done means examined: problems found are the result, not a failure.
 pub(super) fn run(args: &DoctorArgs) -> VerbResult {
-    let dataset = super::open(&args.path)?;
+    let dataset = args.dataset.open()?;
     let output = Output::new(args.common, "examining", dataset.index.pairs.len());
     let report = doctor::examine(&dataset, &mut |done, total| {
         output.set(done, total);

@@ -7,6 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
 
+use super::args::{DatasetArgs, at_least_one};
 use super::contact_mask::MaskFrom;
 use super::predict::{RuntimeArg, ShiftArg, sampler};
 use super::{Common, Output, ToolArgs, VerbResult};
@@ -21,10 +22,8 @@ use crate::work::job::{Cancel, JobCx};
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
 pub(super) struct EvaluateArgs {
-    /// The dataset: a folder in the lab's layout or of image pairs, or a built-in one: `test-set` (46 unseen grasps of
-    /// each of 9 seen and 3 unseen tools, simulated), `test-set-ambiguous`, `-mixed`, `-misaligned`, `-noise`, or `demo`.
-    #[arg(long)]
-    input: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// A generator's bundle; repeat for several rows (default: every generator that is found).
     #[arg(long = "bundle")]
     bundles: Vec<PathBuf>,
@@ -47,7 +46,7 @@ pub(super) struct EvaluateArgs {
     #[arg(long, value_enum, default_value_t = Fingers::Both)]
     fingers: Fingers,
     /// Take only this many grasps of each tool, spread evenly.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = at_least_one::<usize>)]
     grasps: Option<usize>,
     /// Sampling steps (default: each bundle's; a bundle that draws in one step keeps it).
     #[arg(long)]
@@ -104,10 +103,7 @@ fn engine() -> impl TypedValueParser<Value = Engine> {
 }
 
 pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
-    let mut dataset = super::open(&args.input)?;
-    if let Some(scale) = args.tool.tool_scale {
-        dataset.tool_scale = Some(scale);
-    }
+    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let setup = setup(args)?;
     let output = Arc::new(Output::new(args.common, "evaluating", 0));
     let bar = output.clone();

@@ -5,8 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::args::{DatasetArgs, LimitArgs};
 use super::notes::Notes;
+use super::output::says;
 use super::predict::{ModelArgs, Predictor};
+use super::report::{RunReport, output_stems};
 use super::seeds::{self, SeedArgs, SeedFigures};
 use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
@@ -18,6 +21,7 @@ use crate::domain::sensor::Finger;
 use crate::domain::{metrics, resample};
 use crate::io::dataset::{Dataset, assumed_metres};
 use crate::io::images;
+use crate::io::names::with_ending;
 use crate::work::compare::{self, Comparison};
 use crate::work::imprint::imprint_of;
 use crate::work::job::JobCx;
@@ -25,18 +29,16 @@ use crate::work::job::JobCx;
 /// Arguments of `generate`.
 #[derive(Debug, Args)]
 pub(super) struct GenerateArgs {
-    /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.
-    #[arg(long)]
-    input: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// The folder for the predictions; created if missing.
     #[arg(long)]
     out: PathBuf,
     /// Which finger's GelSlim image.
     #[arg(long, value_enum, default_value_t = FingerArg::Right)]
     finger: FingerArg,
-    /// Take only this many pairs, spread evenly over the dataset.
-    #[arg(long)]
-    limit: Option<usize>,
+    #[command(flatten)]
+    limit: LimitArgs,
     #[command(flatten)]
     ensemble: SeedArgs,
     #[command(flatten)]
@@ -161,19 +163,19 @@ fn convention(scale: Scale) -> &'static str {
 }
 
 pub(super) fn run(args: &GenerateArgs) -> VerbResult {
-    let dataset = super::open(&args.input)?;
-    std::fs::create_dir_all(&args.out)
-        .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", args.out.display()))?;
-    let ids = super::spread(dataset.index.pairs.len(), args.limit);
+    let dataset = args.dataset.open()?;
+    let ids = args.limit.spread(dataset.index.pairs.len());
     let fingers = args.finger.fingers();
     let output = Output::new(args.common, "generating", ids.len());
     let mut predictor = Predictor::new(&args.model);
     let config = predictor.config()?;
+    let stems = output_stems(&args.out, &dataset, &ids)?;
+    let begun = RunReport::begin(&args.out, "generate.json", ids.len())?;
     let mut pairs = Vec::new();
     let mut notes = Notes::default();
     let mut complete = !ids.is_empty();
     let mut scale = Scale::Measured;
-    for id in ids {
+    for (id, stem) in ids.into_iter().zip(stems) {
         let id = PairId(id as u32);
         let name = dataset.index.pairs[id.0 as usize].name.clone();
         output.step(&name);
@@ -194,7 +196,8 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             let predictions = predictor.predict(&differences, &JobCx::unwatched())?;
             for ((finger, touch, _), predicted) in touches.into_iter().zip(predictions) {
                 let imprint = imprint_of(&predicted, predictor.shift(), &sample, finger)?;
-                write(&args.out, &name, finger, &imprint)?;
+                let stem = with_finger(&stem, finger);
+                write(&stem, &imprint)?;
                 let (seconds, kept) = (predicted.seconds, predicted.kept);
                 let ambiguity = touch.gelslim.as_ref().and_then(|g| ambiguity(&g.difference));
                 let mut pair =
@@ -205,8 +208,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                     let mut of_mean = Pair::default();
                     score(&dataset, id, (finger, &sample), &found.spread.mean, &mut of_mean)?;
                     let scores = (of_mean.psnr_db, of_mean.ssim);
-                    pair.ensemble =
-                        Some(seeds::write(&args.out.join(stem(&name, finger)), &found, config.seed, scores)?);
+                    pair.ensemble = Some(seeds::write(&stem, &found, config.seed, scores)?);
                 }
                 made.push(pair);
             }
@@ -215,7 +217,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
         match done {
             Ok(made) => pairs.extend(made),
             Err(err) => {
-                output.note(&format!("{name}: {err:#}"));
+                output.note(&format!("{name}: {}", says(&err)));
                 complete = false;
             }
         }
@@ -232,9 +234,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
         notes: notes.into_list(&output),
         pairs,
     };
-    let file = args.out.join("generate.json");
-    std::fs::write(&file, serde_json::to_vec_pretty(&report)?)
-        .map_err(|err| anyhow::anyhow!("cannot write the report: {err}: {}", file.display()))?;
+    begun.finish(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(complete)
 }
@@ -282,18 +282,16 @@ fn take(pair: &mut Pair, found: &Comparison) {
     pair.invented = found.split.map(|s| s.invented);
 }
 
-/// The name of a prediction's files.
-fn stem(name: &str, finger: Finger) -> String {
-    format!("{}_{}", name.replace(['/', '\\'], "__"), finger.name())
+fn with_finger(stem: &Path, finger: Finger) -> PathBuf {
+    with_ending(stem, &format!("_{}", finger.name()))
 }
 
-/// Writes `NAME_FINGER.npy` (metres, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
+/// Writes `STEM.npy` (metres, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
 /// -20 mm) for people.
-fn write(out: &Path, name: &str, finger: Finger, imprint: &DepthMap) -> anyhow::Result<()> {
-    let stem = stem(name, finger);
-    crate::io::npz::write_npy(&out.join(format!("{stem}.npy")), imprint)?;
+fn write(stem: &Path, imprint: &DepthMap) -> anyhow::Result<()> {
+    crate::io::npz::write_npy(&with_ending(stem, ".npy"), imprint)?;
     let picture = imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
-    images::write_grey16(&out.join(format!("{stem}.png")), &picture)?;
+    images::write_grey16(&with_ending(stem, ".png"), &picture)?;
     Ok(())
 }
 

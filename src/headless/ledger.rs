@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::args::DatasetArgs;
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
@@ -22,9 +23,8 @@ use crate::work::ledger::{LedgerResult, of_prediction};
 /// Arguments of `ledger`.
 #[derive(Debug, Args)]
 pub(super) struct LedgerArgs {
-    /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.
-    #[arg(long)]
-    input: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// The pair, by its name or a part of it that no other has.
     #[arg(long)]
     pair: String,
@@ -113,7 +113,7 @@ struct Report {
 }
 
 pub(super) fn run(args: &LedgerArgs) -> VerbResult {
-    let dataset = super::open(&args.input)?;
+    let dataset = args.dataset.open()?;
     let id = super::find_pair(&dataset, &args.pair)?;
     let name = dataset.index.pairs[id.0 as usize].name.clone();
     let sample = dataset.load(id)?;

@@ -2,18 +2,25 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 
+use super::args::{DatasetArgs, LimitArgs};
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
+use super::output::says;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::PairId;
 use crate::domain::pose::ToolModel;
+use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
-use crate::io::export_unet::{self, ExportConfig, ExportEntry, PARTS};
-use crate::io::masks::MaskStore;
+use crate::io::export_unet::{ExportConfig, PARTS};
+use crate::work::error::TaskError;
+use crate::work::export::{Automatic, ExportSetup, HandMasks, export_masks};
+use crate::work::job::{Cancel, JobCx};
+use crate::work::labels::Labels;
 
 /// What can be done with masks.
 #[derive(Debug, Subcommand)]
@@ -25,9 +32,8 @@ pub(super) enum MasksVerb {
 /// Arguments of `masks export`.
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
-    /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.
-    #[arg(long)]
-    input: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// The folder to write; empty, missing, or a previous export.
     #[arg(long)]
     out: PathBuf,
@@ -46,9 +52,8 @@ pub(super) struct ExportArgs {
     /// Decides which pair lands in which part.
     #[arg(long, default_value_t = 0)]
     split_seed: u64,
-    /// Take only this many pairs, spread evenly over the dataset.
-    #[arg(long)]
-    limit: Option<usize>,
+    #[command(flatten)]
+    limit: LimitArgs,
     #[command(flatten)]
     common: Common,
 }
@@ -74,6 +79,8 @@ struct Exported {
     val: usize,
     test: usize,
     corrected: usize,
+    /// Pairs left out because of their review state.
+    skipped: usize,
     out_of_range_px: usize,
     unmeasured_px: usize,
 }
@@ -81,68 +88,68 @@ struct Exported {
 pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let MasksVerb::Export(args) = verb;
     let Format::Unet = args.format;
-    let mut dataset = super::open(&args.input)?;
-    dataset.tool_scale = args.tool.tool_scale;
-    let store = MaskStore::for_dataset(&dataset)?;
-    let stored = store.masks();
-    let mut entries = Vec::new();
-    let mut ids = Vec::new();
-    for id in super::spread(dataset.index.pairs.len(), args.limit) {
-        let entry = &dataset.index.pairs[id];
-        for finger in Finger::BOTH {
-            let corrected = stored.iter().any(|(pair, f)| *pair == entry.name && *f == finger);
-            if corrected || args.pairs == Pairs::All {
-                entries.push(ExportEntry { pair: entry.name.clone(), tool: entry.tool.clone(), finger });
-                ids.push((PairId(id as u32), corrected));
-            }
-        }
-    }
-    if entries.is_empty() {
-        anyhow::bail!(
-            "no mask was corrected by hand yet (they would lie in {}); --pairs all exports automatic masks",
-            store.folder().display()
-        );
-    }
-    let output = Output::new(args.common, "exporting", entries.len());
+    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let ids = args.limit.spread(dataset.index.pairs.len());
+    let output = Arc::new(Output::new(args.common, "exporting", ids.len()));
+    let setup = ExportSetup {
+        pairs: Some(ids.into_iter().map(|id| PairId(id as u32)).collect()),
+        split: ExportConfig { seed: args.split_seed, ..ExportConfig::default() },
+    };
     let mut predictor = Predictor::new(&args.model);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
-    let config = ExportConfig { seed: args.split_seed, ..ExportConfig::default() };
-    let report = export_unet::export(&args.out, &entries, &config, |i| {
-        let (entry, (id, corrected)) = (&entries[i], ids[i]);
-        output.step(&entry.pair);
-        let sample = dataset.load(id)?;
-        let touch = sample.finger(entry.finger).ok_or("it has no such finger")?;
-        let bubble = touch.bubble.as_ref().ok_or("it has no such imprint")?;
-        if corrected && let Some(stored) = store.load(&entry.pair, entry.finger)? {
-            return Ok((bubble.imprint.clone(), stored.mask));
-        }
-        let tool = entry.tool.as_ref().and_then(|name| {
-            let model = tools.entry(name.clone()).or_insert_with(|| super::pose::tool_model(&dataset, name).ok());
+    let mut automatic = |sample: &Sample, finger: Finger, tool: Option<&str>| {
+        const WHAT: &str = "Contact mask";
+        let tool = tool.and_then(|name| {
+            let model = tools.entry(name.to_owned()).or_insert_with(|| super::pose::tool_model(&dataset, name).ok());
             model.as_ref()
         });
         let source = match args.mask.mask {
             MaskFrom::Auto if sample.grasp_from_object.is_some() && tool.is_some() => MaskFrom::Cad,
             other => other,
         };
+        let touch = sample.finger(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;
+        let bubble = touch.bubble.as_ref().ok_or_else(|| TaskError::new(WHAT, "it has no such imprint"))?;
         let truth = sample.grasp_from_object;
-        let found = contact_mask(source, &args.mask, &bubble.imprint, touch, tool, truth, &mut predictor)?;
+        let found = contact_mask(source, &args.mask, &bubble.imprint, touch, tool, truth, &mut predictor)
+            .map_err(|err| TaskError::new(WHAT, says(&err)))?;
         if let Some(note) = found.basis.note() {
-            output.note(&format!("note: {}, {} finger: {note}", entry.pair, entry.finger.name()));
+            output.note(&format!("note: {} finger: {note}", finger.name()));
         }
-        Ok((bubble.imprint.clone(), found.mask))
-    })?;
+        Ok(found.mask)
+    };
+    let bar = output.clone();
+    let cx = JobCx::new(
+        Cancel::default(),
+        Arc::new(move |p| {
+            bar.set(p.done as usize, p.total as usize);
+            bar.message(&p.text);
+        }),
+    );
+    let labels = Labels::of(&dataset);
+    let masks = HandMasks { labels: &labels, changed: &BTreeMap::new() };
+    let automatic: Option<Automatic<'_>> = (args.pairs == Pairs::All).then_some(&mut automatic);
+    let done = export_masks(&dataset, &masks, &setup, &args.out, automatic, &cx)?;
+    drop(cx);
+    let report = &done.report;
     let exported = Exported {
         out: args.out.clone(),
         train: report.counts[0],
         val: report.counts[1],
         test: report.counts[2],
-        corrected: ids.iter().filter(|(_, corrected)| *corrected).count(),
+        corrected: done.by_hand,
+        skipped: done.skipped,
         out_of_range_px: report.out_of_range_px,
         unmeasured_px: report.unmeasured_px,
     };
+    let Ok(output) = Arc::try_unwrap(output) else { anyhow::bail!("the export is still being watched") };
     output.finish(&exported, || {
+        let skipped = match exported.skipped {
+            0 => String::new(),
+            n => format!("; {n} pairs marked \"skip\" left out"),
+        };
         format!(
-            "{} masks in {} ({} {}, {} {}, {} {}); {} corrected by hand; read back and accepted by the loader's rules",
+            "{} masks in {} ({} {}, {} {}, {} {}); {} corrected by hand{skipped}; read back and accepted by the \
+             loader's rules",
             report.counts.iter().sum::<usize>(),
             args.out.display(),
             report.counts[0],

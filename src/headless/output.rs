@@ -1,5 +1,8 @@
 //! Progress bars, notes and the one JSON object.
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is the only module that prints")]
+//!
+//! A reader that has seen enough (`| head`) ends the program quietly; a disk that is full is an error. Neither is a panic.
+
+use std::io::{self, Write as _};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -52,28 +55,46 @@ impl Output {
 
     /// A line on standard output, now: a JSON object, or the text for people.
     pub fn line(&self, value: &impl Serialize, human: impl FnOnce() -> String) -> anyhow::Result<()> {
-        use std::io::Write as _;
         let text = if self.json { serde_json::to_string(value)? } else { human() };
-        let mut out = std::io::stdout().lock();
-        writeln!(out, "{text}")?;
-        Ok(out.flush()?)
+        Ok(print(&text)?)
     }
 
     /// Ends the bar and prints the result: the JSON object, or the lines for people.
     pub fn finish(self, value: &impl Serialize, human: impl FnOnce() -> String) -> anyhow::Result<()> {
         self.bar.finish_and_clear();
-        if self.json {
-            println!("{}", serde_json::to_string(value)?);
-        } else {
-            println!("{}", human().trim_end());
-        }
-        Ok(())
+        let text = if self.json { serde_json::to_string(value)? } else { human() };
+        Ok(print(text.trim_end())?)
     }
 }
 
-/// A line on standard error.
+/// Why standard output took no more.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum PrintError {
+    /// Whoever read it has gone.
+    #[error("standard output was closed")]
+    Closed,
+    /// Anything else, such as a full disk.
+    #[error("cannot write to standard output: {0}")]
+    Failed(io::Error),
+}
+
+/// A text and a line break on standard output, now.
+pub(super) fn print(text: &str) -> Result<(), PrintError> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "{text}").and_then(|()| out.flush()).map_err(|err| match err.kind() {
+        io::ErrorKind::BrokenPipe => PrintError::Closed,
+        _ => PrintError::Failed(err),
+    })
+}
+
+/// A line on standard error; there is nowhere to say that it took none.
 pub(super) fn note(text: &str) {
-    eprintln!("{text}");
+    writeln!(io::stderr().lock(), "{text}").ok();
+}
+
+/// An error with its causes, each said once.
+pub(super) fn says(err: &anyhow::Error) -> String {
+    crate::work::error::says(err.as_ref())
 }
 
 /// Sends warnings and errors of the libraries and of our own layers to standard error.
@@ -94,5 +115,20 @@ pub(super) fn start_log() {
     static LOG: Stderr = Stderr;
     if log::set_logger(&LOG).is_ok() {
         log::set_max_level(log::LevelFilter::Warn);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cause_is_said_once() {
+        let io = || io::Error::from(io::ErrorKind::NotFound);
+        let open = crate::io::dataset::OpenError::Io { path: "/x".into(), source: io() };
+        let text = says(&open.into());
+        assert_eq!(text.matches(&io().to_string()).count(), 1, "{text}");
+        let chained = anyhow::Error::from(io()).context("cannot begin");
+        assert_eq!(says(&chained), format!("cannot begin: {}", io()));
     }
 }

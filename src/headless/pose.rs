@@ -1,7 +1,7 @@
 //! `touch2touch pose`: in-hand poses of a whole dataset, with the error against the truth where it is known.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::Instant;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -9,9 +9,12 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
+use super::args::{DatasetArgs, LimitArgs};
 use super::contact_mask::{FingerMasks, MaskArgs, MaskFrom, contact_mask};
 use super::notes::Notes;
+use super::output::says;
 use super::predict::{ModelArgs, Predictor};
+use super::report::output_stems;
 use super::seeds::{self, FanArgs, PoseFan, SeedArgs};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::align::{AlignReport, Ask, LabIcpConfig, PaperTrap, Register, lab_starts};
@@ -33,12 +36,8 @@ use crate::work::job::JobCx;
 /// Arguments of `pose`.
 #[derive(Debug, Args)]
 pub(super) struct PoseArgs {
-    /// The dataset: a folder in the lab's layout, or `demo`.
-    #[arg(required_unless_present = "input")]
-    path: Option<PathBuf>,
-    /// The same as PATH.
-    #[arg(long, conflicts_with = "path")]
-    input: Option<PathBuf>,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// Which imprints to align.
     #[arg(long, value_enum, default_value_t = Imprints::Measured)]
     imprint: Imprints,
@@ -61,9 +60,8 @@ pub(super) struct PoseArgs {
     /// Repeat for several.
     #[arg(long = "paper-trap", value_name = "TRAP", value_parser = parse_trap)]
     paper_traps: Vec<PaperTrap>,
-    /// Take only this many pairs, spread evenly over the dataset.
-    #[arg(long)]
-    limit: Option<usize>,
+    #[command(flatten)]
+    limit: LimitArgs,
     /// Add the whole registration report to each case of the JSON: every start and iteration, and each point's
     /// residual, weight and fate.
     #[arg(long)]
@@ -217,20 +215,18 @@ struct Report {
 }
 
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
-    let path = args.path.as_ref().or(args.input.as_ref()).expect("clap asks for one of the two");
-    let mut dataset = super::open(path)?;
-    dataset.tool_scale = args.tool.tool_scale;
-    let ids = super::spread(dataset.index.pairs.len(), args.limit);
+    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let ids = args.limit.spread(dataset.index.pairs.len());
     let engines: &[Engine] = &args.engine.0;
     let imprints: &[&'static str] = match args.imprint {
         Imprints::Measured => &["measured"],
         Imprints::Predicted => &["predicted"],
         Imprints::Both => &["measured", "predicted"],
     };
-    if let Some(folder) = &args.fans.fan_out {
-        std::fs::create_dir_all(folder)
-            .map_err(|err| anyhow::anyhow!("cannot create the folder: {err}: {}", folder.display()))?;
-    }
+    let stems = match &args.fans.fan_out {
+        Some(folder) => output_stems(folder, &dataset, &ids)?.into_iter().map(Some).collect(),
+        None => vec![None; ids.len()],
+    };
     let output = Output::new(args.common, "aligning", ids.len());
     let mut predictor = Predictor::new(&args.model);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
@@ -238,7 +234,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let mut cases = Vec::new();
     let store = MaskStore::for_dataset(&dataset).ok();
     let mut complete = true;
-    for id in ids {
+    for (id, stem) in ids.into_iter().zip(stems) {
         let entry = &dataset.index.pairs[id];
         output.step(&entry.name);
         let sample = match dataset.load(PairId(id as u32)) {
@@ -261,7 +257,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
                 Some(tool)
             }
             Err(err) => {
-                output.note(&format!("{tool_name}: {err:#}"));
+                output.note(&format!("{tool_name}: {}", says(&err)));
                 None
             }
         });
@@ -278,7 +274,15 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         });
         for &imprint in imprints {
             let accepted = reviewed.as_ref().and_then(|r| r.accepted[usize::from(imprint == "predicted")]);
-            match pose_cases(args, &entry.name, &sample, tool, (imprint, accepted), engines, &mut predictor) {
+            match pose_cases(
+                args,
+                (&entry.name, stem.as_deref()),
+                &sample,
+                tool,
+                (imprint, accepted),
+                engines,
+                &mut predictor,
+            ) {
                 Ok(found) => {
                     for note in found.first().iter().flat_map(|case| &case.mask_notes) {
                         output.note(&format!("note: {} ({imprint} imprint), {note}", entry.name));
@@ -287,7 +291,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
                     cases.extend(found);
                 }
                 Err(err) => {
-                    output.note(&format!("{} ({imprint} imprint): {err:#}", entry.name));
+                    output.note(&format!("{} ({imprint} imprint): {}", entry.name, says(&err)));
                     complete = false;
                 }
             }
@@ -316,7 +320,7 @@ fn tool_with_notes(dataset: &Dataset, name: &str) -> anyhow::Result<(ToolModel, 
 /// One case per engine for one pair and one kind of imprint.
 fn pose_cases(
     args: &PoseArgs,
-    name: &str,
+    (name, stem): (&str, Option<&Path>),
     sample: &Sample,
     tool: &ToolModel,
     (imprint, accepted): (&'static str, Option<AcceptedPose>),
@@ -344,8 +348,8 @@ fn pose_cases(
             let fan = several
                 .then(|| seeds::fan(predictor, sample, tool, engine, &args.mask, args.ensemble.seeds))
                 .transpose()?;
-            if let (Some(fan), Some(folder)) = (&fan, &args.fans.fan_out) {
-                fan.write(folder, name, engine)?;
+            if let (Some(fan), Some(stem)) = (&fan, stem) {
+                fan.write(stem, name, engine)?;
             }
             let start = Instant::now();
             let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());

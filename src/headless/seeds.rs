@@ -16,7 +16,7 @@ use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
-use crate::io::{images, npz};
+use crate::io::{images, names, npz};
 use crate::work::ensemble::{Ensemble, ensemble};
 use crate::work::imprint::imprint_of;
 use crate::work::models::Prediction;
@@ -88,11 +88,7 @@ pub(super) fn write(
     first: u64,
     (mean_psnr_db, mean_ssim): (Option<f64>, Option<f64>),
 ) -> anyhow::Result<SeedFigures> {
-    let file = |what: &str, ending: &str| {
-        let mut name = stem.file_name().map(std::ffi::OsStr::to_os_string).unwrap_or_default();
-        name.push(format!("_{what}.{ending}"));
-        stem.with_file_name(name)
-    };
+    let file = |what: &str, ending: &str| names::with_ending(stem, &format!("_{what}.{ending}"));
     let maps = [
         ("mean", Some(&found.spread.mean)),
         ("spread", Some(&found.spread.std)),
@@ -145,9 +141,9 @@ pub(super) struct PoseFan {
 }
 
 impl PoseFan {
-    /// Writes `NAME_ENGINE_fan.png`; nothing where the angles have no mean.
-    pub(super) fn write(&self, folder: &Path, name: &str, engine: Engine) -> anyhow::Result<()> {
-        let file = folder.join(format!("{}_{}_fan.png", name.replace(['/', '\\'], "__"), engine.key()));
+    /// Writes `STEM_ENGINE_fan.png`; nothing where the angles have no mean. `name` is the pair's.
+    pub(super) fn write(&self, stem: &Path, name: &str, engine: Engine) -> anyhow::Result<()> {
+        let file = names::with_ending(stem, &format!("_{}_fan.png", engine.key()));
         if let Some(picture) = self.fan.as_ref().and_then(|fan| super::bench::fan::picture(name, fan, self.truth_rad)) {
             images::write_rgb8(&file, &picture)?;
         }

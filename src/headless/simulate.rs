@@ -6,11 +6,13 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
+use serde_json::json;
 use strum::IntoEnumIterator;
 
+use super::args::at_least_one;
 use super::{Common, Output, VerbResult};
 use crate::domain::sim::{self, Condition, Fault, SimConfig, ToolSpec};
-use crate::io::simulated::{self, Layout};
+use crate::io::simulated::{Layout, Writing};
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
@@ -22,7 +24,7 @@ pub(super) struct SimulateArgs {
     #[arg(long, default_value = "all")]
     tools: String,
     /// Grasps per tool.
-    #[arg(long, default_value_t = 46)]
+    #[arg(long, default_value_t = 46, value_parser = at_least_one::<u32>)]
     grasps: u32,
     /// Seed of grasps and noise: the same seed writes the same files.
     #[arg(long, default_value_t = 0)]
@@ -97,7 +99,14 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
         .map(|tool| (tool.name.clone(), tool))
         .collect();
     let tools: Vec<_> = models.values().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
-    simulated::write_tools(&args.out, &tools)?;
+    let pairs = chosen.len() * grasps as usize;
+    // In the order of the list: it decides the seeds.
+    let order: Vec<&str> = chosen.iter().map(|tool| tool.name.as_str()).collect();
+    let recipe = json!({
+        "tools": order, "condition": args.condition, "grasps": grasps, "seed": (!args.test_set).then_some(args.seed),
+        "test_set": args.test_set,
+    });
+    let writing = Writing::begin(&args.out, layout, &tools, pairs, recipe)?;
     for (t, tool) in chosen.iter().enumerate() {
         for g in 0..grasps {
             let touched = args.condition.tool(tool, g);
@@ -110,13 +119,14 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
                 (sim::random_grasp(seed), seed)
             };
             let sample = args.condition.simulate(&touched, grasp, seed, &config);
-            simulated::write_pair(&args.out, layout, &touched.name, g, &sample)?;
+            writing.pair(&touched.name, g, &sample)?;
             output.step(&touched.name);
         }
     }
+    writing.finish()?;
     let written = Written {
         out: args.out.clone(),
-        pairs: chosen.len() * grasps as usize,
+        pairs,
         tools: models.keys().cloned().collect(),
         condition: args.condition,
         seed: (!args.test_set).then_some(args.seed),
@@ -140,11 +150,13 @@ fn write_faults(args: &SimulateArgs) -> VerbResult {
     let names: Vec<(Fault, String)> = Fault::iter().map(|f| (f, f.to_string())).collect();
     let output = Output::new(args.common, "simulating", names.len());
     let models: Vec<_> = names.iter().map(|(f, name)| (name.as_str(), false, f.mesh())).collect();
-    simulated::write_tools(&args.out, &models)?;
+    let recipe = json!({"faults": true});
+    let writing = Writing::begin(&args.out, args.part.layout(), &models, names.len(), recipe)?;
     for (fault, name) in &names {
-        simulated::write_pair(&args.out, args.part.layout(), name, 0, &fault.sample())?;
+        writing.pair(name, 0, &fault.sample())?;
         output.step(name);
     }
+    writing.finish()?;
     let faults = names.iter().map(|(f, name)| (name.clone(), f.what())).collect();
     let written = WrittenFaults { out: args.out.clone(), faults };
     output.finish(&written, || {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 use serde::Serialize;
 
+use super::args::{DatasetArgs, LimitArgs};
 use super::generate::FingerArg;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
@@ -21,18 +22,16 @@ use crate::work::statistics::{StatisticsSetup, statistics};
 /// Arguments of `stats`.
 #[derive(Debug, Args)]
 pub(super) struct StatsArgs {
-    /// The dataset: a folder in the lab's layout or of image pairs, or `demo`.
-    #[arg(long)]
-    input: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// The file to write; use it with `--shift refit --stats FILE`.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Which finger's touches.
     #[arg(long, value_enum, default_value_t = FingerArg::Both)]
     finger: FingerArg,
-    /// Take only this many pairs, spread evenly over the dataset.
-    #[arg(long)]
-    limit: Option<usize>,
+    #[command(flatten)]
+    limit: LimitArgs,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -51,9 +50,8 @@ struct Report {
 }
 
 pub(super) fn run(args: &StatsArgs) -> VerbResult {
-    let dataset = super::open(&args.input)?;
-    let ids: Vec<PairId> =
-        super::spread(dataset.index.pairs.len(), args.limit).into_iter().map(|i| PairId(i as u32)).collect();
+    let dataset = args.dataset.open()?;
+    let ids: Vec<PairId> = args.limit.spread(dataset.index.pairs.len()).into_iter().map(|i| PairId(i as u32)).collect();
     let output = Arc::new(Output::new(args.common, "predicting", ids.len()));
     let mut predictor = Predictor::new(&args.model);
     let setup = StatisticsSetup {

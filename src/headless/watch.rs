@@ -13,14 +13,17 @@ use clap::Args;
 use serde::Serialize;
 use serde_json::json;
 
+use super::args::DatasetArgs;
 use super::contact_mask::{MaskArgs, MaskFrom};
+use super::output::says;
 use super::pose::{Engines, parse_engines};
 use super::predict::{ModelArgs, Predictor};
-use super::{Common, Output, ToolArgs, VerbResult};
+use super::{Common, Output, ToolArgs, VerbResult, report};
 use crate::domain::dataset::{PairId, Problem};
 use crate::domain::sample::BubbleCamera;
 use crate::io::dataset::{Dataset, cameras_of};
 use crate::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
+use crate::io::names::Outputs;
 use crate::work::job::Cancel;
 use one::{Done, Worker};
 use summary::Summary;
@@ -29,10 +32,8 @@ use write::Save;
 /// Arguments of `watch`.
 #[derive(Debug, Args)]
 pub(super) struct WatchArgs {
-    /// The folder to follow, which may still be empty: a dataset in the lab's layout (the bubbles may be missing), a
-    /// folder of GelSlim .pt files, of NAME_gelslim.png, or of NAME_touch.png with NAME_reference.png or one
-    /// reference.png (or .jpg).
-    path: PathBuf,
+    #[command(flatten)]
+    dataset: DatasetArgs,
     /// Write the results into this folder instead of beside the touches.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -70,14 +71,6 @@ pub(super) struct WatchArgs {
     common: Common,
 }
 
-/// Where the results of a touch go: `stem` and an ending.
-fn stem(out: Option<&Path>, file: &Path, name: &str) -> PathBuf {
-    match out {
-        Some(out) => out.join(name.replace(['/', '\\'], "__")),
-        None => file.with_extension(""),
-    }
-}
-
 /// What a touch was when it was done: with the same numbers and the same recipe it need not be done again.
 #[derive(Debug, Clone, Serialize)]
 struct Source {
@@ -100,10 +93,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
     if matches!(args.mask.mask, MaskFrom::Cad | MaskFrom::Truth) {
         anyhow::bail!("--mask {} needs the true pose, which a new touch does not have", args.mask.mask.key());
     }
-    if let Some(out) = &args.out {
-        std::fs::create_dir_all(out)
-            .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;
-    }
+    let mut outputs = args.out.as_deref().map(report::outputs).transpose()?;
     let patience = Duration::try_from_secs_f64(args.patience)
         .map_err(|_| anyhow::anyhow!("--patience {} is no time in seconds", args.patience))?;
     let config = FollowConfig {
@@ -112,43 +102,53 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
         tool_scale: args.unit.tool_scale,
         rig: rig(args.camera.as_deref())?,
     };
-    let mut follower = Follower::new(&args.path, config)?;
+    let mut follower = Follower::new(args.dataset.path(), config)?;
     let mut worker = Worker::new(args, Predictor::new(&args.model), stop.clone())?;
     let ready = json!({
-        "event": "ready", "folder": args.path, "recipe": worker.recipe(None)?, "period_ms": PERIOD.as_secs_f64() * 1e3,
+        "event": "ready", "folder": args.dataset.path(), "recipe": worker.recipe(None)?, "period_ms": PERIOD.as_secs_f64() * 1e3,
         "load_and_warm_up_s": worker.warm_s,
     });
     output.line(&ready, || {
-        format!("following {} (models warm after {:.1} s); Ctrl-C ends", args.path.display(), worker.warm_s)
+        format!("following {} (models warm after {:.1} s); Ctrl-C ends", args.dataset.path().display(), worker.warm_s)
     })?;
 
     let mut summary = Summary::default();
-    let mut unreadable = None;
+    let mut said = Vec::new();
     while !stop.is_cancelled() {
         let Some(ready) = follower.poll(Instant::now()) else {
-            let why = follower.unreadable().map(str::to_owned);
-            if why != unreadable {
-                if let Some(why) = &why {
-                    output.note(why);
-                }
-                unreadable = why;
-            }
+            say_troubles(follower.troubles(), &mut said, &output)?;
             if args.once && follower.waiting() == 0 {
                 break;
             }
             std::thread::sleep(PERIOD);
             continue;
         };
-        touch(args, &mut follower, &mut worker, &ready, &output, &mut summary)?;
+        touch(&mut outputs, &mut follower, &mut worker, &ready, &output, &mut summary)?;
     }
     if args.once && follower.dataset().is_none() {
         anyhow::bail!(
             "no touch was found ({}); see `touch2touch watch --help` for what counts as one",
-            args.path.display()
+            args.dataset.path().display()
         );
     }
     output.line(&summary.json(), || summary.text())?;
-    Ok(summary.failed() == 0)
+    Ok(summary.failed() == 0 && said.is_empty())
+}
+
+/// Says what is wrong with the folder as a whole, each thing once for as long as it lasts, and that nothing is any more.
+fn say_troubles(now: &[Problem], said: &mut Vec<Problem>, output: &Output) -> anyhow::Result<()> {
+    if now == said.as_slice() {
+        return Ok(());
+    }
+    for trouble in now.iter().filter(|trouble| !said.contains(trouble)) {
+        let event = json!({"event": "trouble", "file": trouble.file, "error": trouble.what, "hint": trouble.hint});
+        output.line(&event, || format!("{}: {} ({})", trouble.file.display(), trouble.what, trouble.hint))?;
+    }
+    if now.is_empty() {
+        output.line(&json!({"event": "recovered"}), || "the folder is in order again".to_owned())?;
+    }
+    *said = now.to_vec();
+    Ok(())
 }
 
 /// From now on Ctrl-C sets `stop` instead of ending the program in the middle of a touch; a second one ends it.
@@ -186,7 +186,7 @@ fn rig(named: Option<&Path>) -> anyhow::Result<Option<[Option<BubbleCamera>; 2]>
 
 /// Takes one touch as far as it goes now.
 fn touch(
-    args: &WatchArgs,
+    outputs: &mut Option<Outputs>,
     follower: &mut Follower,
     worker: &mut Worker<'_>,
     ready: &Ready,
@@ -196,7 +196,15 @@ fn touch(
     if ready.completed {
         return Ok(());
     }
-    let stem = stem(args.out.as_deref(), &ready.file, &ready.name);
+    let stem = match outputs.as_mut().map(|outputs| outputs.stem(&ready.name)) {
+        None => ready.file.with_extension(""),
+        Some(Ok(stem)) => stem,
+        Some(Err(clash)) => {
+            summary.fail();
+            let event = json!({"event": "error", "name": ready.name, "error": clash.to_string()});
+            return output.line(&event, || format!("{}: {clash}", ready.name));
+        }
+    };
     let source = Source::new(&ready.file, ready.stamp);
     let tool = worker.tool_name(follower.dataset().and_then(|d| d.index.get(ready.id)?.tool.clone()));
     let recipe = worker.recipe(tool.as_deref())?;
@@ -223,7 +231,7 @@ fn touch(
                 Ok(None) => return Ok(()),
                 Err(err) => Problem {
                     file: ready.file.clone(),
-                    what: format!("{err:#}"),
+                    what: says(&err),
                     hint: "touch the file to have it tried again".into(),
                 },
             }
@@ -231,7 +239,7 @@ fn touch(
     };
     summary.fail();
     if let Err(err) = write::failure(&stem, &source, &recipe, &problem) {
-        output.note(&format!("{}: {err:#}", ready.name));
+        output.note(&format!("{}: {}", ready.name, says(&err)));
     }
     let event = json!({"event": "error", "name": ready.name, "error": problem.what, "hint": problem.hint});
     output.line(&event, || format!("{}: {} ({})", ready.name, problem.what, problem.hint))

@@ -1,12 +1,26 @@
 //! Files that are either the old or the new one, never half of either.
 
-use std::fs::File;
+use std::collections::BTreeSet;
+use std::fs::{File, TryLockError};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Duration;
 
-/// Writes to a temporary file in the same folder, flushes it to the disk, and renames it over `path`.
+use tempfile::NamedTempFile;
+
+/// How the names of temporary files begin.
+const PREFIX: &str = ".tmp-";
+/// How they end.
+const SUFFIX: &str = ".part";
+/// Younger than this, what is not locked may be what another run is just about to lock.
+const NEWBORN: Duration = Duration::from_secs(10);
+
+/// Writes to a temporary file in the same folder, flushes it to the disk, and renames it over `path`; a link there is
+/// replaced, not followed.
 ///
-/// A crash at any moment leaves the previous file (or none) and at most a stray temporary file.
+/// A crash at any moment leaves the previous file (or none) and at most a stray temporary file, which the next run that
+/// writes into the folder removes.
 ///
 /// # Errors
 /// Whatever the disk says; `path` is then unchanged.
@@ -15,15 +29,8 @@ pub fn write(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> 
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".tmp-").suffix(".part");
-    // Temporary files are private by default; the finished file is an ordinary one.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        builder.permissions(std::fs::Permissions::from_mode(0o644));
-    }
-    let mut temporary = builder.tempfile_in(folder)?;
+    sweep_once(folder);
+    let mut temporary = temporary(folder)?;
     content(temporary.as_file_mut())?;
     temporary.as_file().sync_all()?;
     temporary.persist(path).map_err(|err| err.error)?;
@@ -41,4 +48,108 @@ pub fn write(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> 
 /// As [`write()`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write(path, |file| io::Write::write_all(file, bytes))
+}
+
+/// An empty file in `folder` that is gone when it is dropped: whether the folder can be written, and how it takes names.
+///
+/// # Errors
+/// Whatever the disk says.
+pub fn probe(folder: &Path) -> io::Result<NamedTempFile> {
+    temporary(folder)
+}
+
+fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PREFIX).suffix(SUFFIX);
+    // Temporary files are private by default; the finished file is an ordinary one.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        builder.permissions(std::fs::Permissions::from_mode(0o644));
+    }
+    let temporary = builder.tempfile_in(folder)?;
+    // The system lets go of it when this program ends, however it ends. Where there are no locks nothing is swept.
+    temporary.as_file().try_lock().ok();
+    Ok(temporary)
+}
+
+/// Whether `file` is held by no running program: one that was killed left it.
+pub(super) fn is_abandoned(file: &Path) -> bool {
+    let Ok(open) = File::open(file) else { return false };
+    match open.try_lock_shared() {
+        Ok(()) => true,
+        Err(TryLockError::WouldBlock | TryLockError::Error(_)) => false,
+    }
+}
+
+/// Whether `path` is so new that a run may be about to lock it.
+pub(super) fn is_newborn(path: &Path) -> bool {
+    let changed = std::fs::symlink_metadata(path).and_then(|meta| meta.modified());
+    changed.is_ok_and(|time| time.elapsed().is_ok_and(|age| age < NEWBORN))
+}
+
+/// Removes what killed runs left in `folder`, at the first write of this run into it.
+fn sweep_once(folder: &Path) {
+    static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    let Ok(absolute) = folder.canonicalize() else { return };
+    let first = SWEPT.lock().unwrap_or_else(std::sync::PoisonError::into_inner).insert(absolute);
+    if first {
+        sweep(folder);
+    }
+}
+
+fn sweep(folder: &Path) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX)) {
+            continue;
+        }
+        // Of the entry itself: a link is not one of ours.
+        let Ok(meta) = entry.metadata() else { continue };
+        let path = entry.path();
+        // What has content was locked before it had any.
+        if meta.is_file() && (meta.len() > 0 || !is_newborn(&path)) && is_abandoned(&path) {
+            std::fs::remove_file(path).ok();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_link_is_replaced_and_not_followed() {
+        let dir = tempfile::tempdir().unwrap();
+        let (target, link) = (dir.path().join("target"), dir.path().join("link"));
+        std::fs::write(&target, "mine").unwrap();
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(&target, &link).unwrap();
+        write_bytes(&link, b"new").unwrap();
+        assert_eq!(std::fs::read(&target).unwrap(), b"mine");
+        assert_eq!(std::fs::read(&link).unwrap(), b"new");
+        assert!(!std::fs::symlink_metadata(&link).unwrap().is_symlink());
+    }
+
+    #[test]
+    fn what_a_killed_run_left_goes_and_what_a_running_one_writes_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        std::fs::write(at(".tmp-left.part"), "half").unwrap();
+        std::fs::write(at(".tmp-newborn.part"), "").unwrap();
+        std::fs::write(at("notes.part"), "mine").unwrap();
+        let running = temporary(dir.path()).unwrap();
+        std::fs::write(running.path(), "half").unwrap();
+        write_bytes(&at("new"), b"new").unwrap();
+        assert!(!at(".tmp-left.part").exists());
+        for stays in [&at(".tmp-newborn.part"), &at("notes.part"), &at("new"), &running.path().to_owned()] {
+            assert!(stays.exists(), "{}", stays.display());
+        }
+        // Once per run: a folder of many files is not read again for each.
+        std::fs::write(at(".tmp-later.part"), "half").unwrap();
+        write_bytes(&at("new"), b"newer").unwrap();
+        assert!(at(".tmp-later.part").exists());
+    }
 }

@@ -140,17 +140,23 @@ impl Dataset {
             .or_else(|| pictures::scan(&folder))
             .or_else(|| lab::scan_flat(&folder))
             .ok_or_else(|| OpenError::NothingFound { path: path.to_owned() })?;
+        Ok(Self::of(scan))
+    }
+
+    fn of(scan: Scan) -> Self {
+        let mut problems = scan.problems;
+        problems.extend(super::simulated::unfinished(&scan.root));
         let title = scan.root.file_name().map_or_else(|| "dataset".into(), |n| n.to_string_lossy().into_owned());
-        Ok(Self {
+        Self {
             title,
             root: Some(scan.root),
             kind: scan.kind,
             index: Index { pairs: scan.pairs },
-            problems: scan.problems,
+            problems,
             tool_scale: None,
             source: scan.source,
             rig: OnceLock::new(),
-        })
+        }
     }
 
     /// The built-in demo: simulated grasps of the simulator's tools, rendered one by one when they are asked for.
@@ -310,6 +316,18 @@ fn most_invalid(file: &Path, bad: usize, all: usize, what: impl FnOnce() -> Stri
         return Err(LoadError::MostlyInvalid { file: file.to_owned(), what: what(), share });
     }
     Ok(())
+}
+
+/// How a problem begins that leaves a file out.
+const SAME_NAME: &str = "same name";
+
+/// Of two files that would be one pair: `file` is left out.
+fn same_name(file: PathBuf, name: &str, first: &Path) -> Problem {
+    problem(
+        file,
+        format!("{SAME_NAME} ({name}) as {}", first.display()),
+        "rename or remove one of the two; the first is used",
+    )
 }
 
 fn problem(file: impl Into<PathBuf>, what: impl Into<String>, hint: impl Into<String>) -> Problem {

@@ -9,6 +9,7 @@
 
 mod check;
 mod split;
+mod staging;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,11 +19,13 @@ use sha2::Digest as _;
 
 use super::files;
 use super::images::{self, PictureError};
+use super::masks::MaskStore;
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::sensor::Finger;
 
 pub use check::{CheckReport, check_folder};
+use staging::Staging;
 
 /// The imprint that becomes 0, metres.
 pub const IMAGE_LO_M: f64 = -0.0116;
@@ -57,6 +60,9 @@ pub enum ExportError {
         /// The first foreign entry.
         found: String,
     },
+    /// Somebody stopped it.
+    #[error("the export was stopped")]
+    Stopped,
     /// Nothing to export.
     #[error("there is no mask to export")]
     Nothing,
@@ -70,13 +76,11 @@ pub enum ExportError {
         /// The imprint's size.
         imprint: [usize; 2],
     },
-    /// An imprint or mask that could not be fetched.
-    #[error("{name} cannot be exported: {reason}")]
-    Source {
-        /// The pair and finger.
-        name: String,
-        /// Why.
-        reason: String,
+    /// Imprints or masks that could not be fetched.
+    #[error("nothing was exported: {}", listed(failures))]
+    Sources {
+        /// Pair and finger, and why; all of them.
+        failures: Vec<(String, String)>,
     },
     /// Shares that are not shares.
     #[error("shares of validation {val} and test {test} must be at least 0 and below 1 together")]
@@ -92,6 +96,20 @@ pub enum ExportError {
         /// All mismatches.
         problems: Vec<Problem>,
     },
+}
+
+/// One failure as it is, several one below the other.
+fn listed(failures: &[(String, String)]) -> String {
+    /// A dataset of nothing but damaged files still gives a page.
+    const MOST: usize = 40;
+    let mut lines: Vec<String> = failures.iter().take(MOST).map(|(name, why)| format!("{name}: {why}")).collect();
+    if let [only] = lines.as_slice() {
+        return only.clone();
+    }
+    if failures.len() > MOST {
+        lines.push(format!("and {} more", failures.len() - MOST));
+    }
+    format!("{} masks or imprints cannot be read\n- {}", failures.len(), lines.join("\n- "))
 }
 
 /// One mask to export.
@@ -144,9 +162,47 @@ struct Manifest {
     seed: u64,
     /// Relative path to the SHA-256 of the file.
     files: BTreeMap<String, String>,
+    /// Stem to pair and finger: the loader allows few characters in a stem, so that a name cannot be read from it.
+    #[serde(default)]
+    stems: BTreeMap<String, (String, String)>,
 }
 
 const FORMAT: &str = "touch2touch-unet-export";
+
+/// Reads every stored mask of `entries`, before anything is computed for the others.
+///
+/// # Errors
+/// [`ExportError::Sources`] with all that cannot be read.
+pub fn check_stored<'a>(
+    store: &MaskStore,
+    entries: impl IntoIterator<Item = &'a ExportEntry>,
+) -> Result<(), ExportError> {
+    let failure = |entry: &ExportEntry| {
+        let err = store.load(&entry.pair, entry.finger).err()?;
+        Some((place(entry), format!("{err}; {}", err.hint())))
+    };
+    let failures: Vec<_> = entries.into_iter().filter_map(failure).collect();
+    if failures.is_empty() { Ok(()) } else { Err(ExportError::Sources { failures }) }
+}
+
+fn place(entry: &ExportEntry) -> String {
+    format!("{}, {} finger", entry.pair, entry.finger.name())
+}
+
+/// Why an imprint or a mask was not fetched.
+#[derive(Debug)]
+pub enum LoadFailure {
+    /// It cannot be read or made, in words; the others are still looked at.
+    Bad(String),
+    /// Somebody stopped the export.
+    Stop,
+}
+
+impl<E: std::fmt::Display> From<E> for LoadFailure {
+    fn from(err: E) -> Self {
+        Self::Bad(err.to_string())
+    }
+}
 
 /// Writes `entries` to `folder`; `load(i)` gives the imprint (metres, raw orientation) and mask of `entries[i]`.
 ///
@@ -159,7 +215,7 @@ pub fn export(
     folder: &Path,
     entries: &[ExportEntry],
     config: &ExportConfig,
-    mut load: impl FnMut(usize) -> Result<(DepthMap, Mask), Box<dyn std::error::Error>>,
+    mut load: impl FnMut(usize) -> Result<(DepthMap, Mask), LoadFailure>,
 ) -> Result<ExportReport, ExportError> {
     if entries.is_empty() {
         return Err(ExportError::Nothing);
@@ -170,11 +226,9 @@ pub fn export(
     let stems = split::stems(entries);
     let parent = folder.parent().unwrap_or(&folder).to_owned();
     std::fs::create_dir_all(&parent).map_err(|s| io(&parent, "make the folder", s))?;
-    let staging = tempfile::Builder::new()
-        .prefix(".touch2touch-export-")
-        .tempdir_in(&parent)
-        .map_err(|s| io(&parent, "make a folder in", s))?;
-    let root = staging.path().join("new");
+    staging::sweep(&parent);
+    let staging = Staging::new(&folder).map_err(|s| io(&parent, "make a folder in", s))?;
+    let root = staging.new_content();
     for part in PARTS {
         for kind in ["imgs", "masks"] {
             let path = root.join(part).join(kind);
@@ -182,13 +236,29 @@ pub fn export(
         }
     }
     let mut report = ExportReport::default();
-    let mut manifest = Manifest { format: FORMAT.into(), version: 1, seed: config.seed, files: BTreeMap::new() };
+    let source = |entry: &ExportEntry| (entry.pair.clone(), entry.finger.name().to_owned());
+    let mut manifest = Manifest {
+        format: FORMAT.into(),
+        version: 1,
+        seed: config.seed,
+        files: BTreeMap::new(),
+        stems: stems.iter().cloned().zip(entries.iter().map(source)).collect(),
+    };
     let mut mismatches = Vec::new();
+    let mut failures = Vec::new();
     for (i, (stem, &part)) in stems.iter().zip(&parts).enumerate() {
-        let (imprint, mask) = load(i).map_err(|err| ExportError::Source {
-            name: format!("{}, {} finger", entries[i].pair, entries[i].finger.name()),
-            reason: err.to_string(),
-        })?;
+        let (imprint, mask) = match load(i) {
+            Ok(content) => content,
+            Err(LoadFailure::Bad(reason)) => {
+                failures.push((place(&entries[i]), reason));
+                continue;
+            }
+            Err(LoadFailure::Stop) => return Err(ExportError::Stopped),
+        };
+        // What follows only looks for what else is wrong.
+        if !failures.is_empty() {
+            continue;
+        }
         if imprint.size() != mask.size() {
             return Err(ExportError::Size { stem: stem.clone(), mask: mask.size(), imprint: imprint.size() });
         }
@@ -210,6 +280,9 @@ pub fn export(
             manifest.files.insert(relative, sha256(&bytes));
         }
     }
+    if !failures.is_empty() {
+        return Err(ExportError::Sources { failures });
+    }
     mismatches.extend(check_folder(&root).problems);
     if !mismatches.is_empty() {
         return Err(ExportError::Check { problems: mismatches });
@@ -220,7 +293,7 @@ pub fn export(
     // Once more, in case something appeared while the masks were computed.
     refuse_foreign(&folder)?;
     if folder.exists() {
-        let old = staging.path().join("old");
+        let old = staging.old_content();
         std::fs::rename(&folder, &old).map_err(|s| io(&folder, "move the previous export away from", s))?;
         if let Err(source) = std::fs::rename(&root, &folder) {
             std::fs::rename(&old, &folder).map_err(|s| io(&folder, "put the previous export back to", s))?;

@@ -147,7 +147,7 @@ pub struct Follower {
     folders: Vec<(PathBuf, Option<SystemTime>)>,
     next_scan: Instant,
     started: SystemTime,
-    unreadable: Option<String>,
+    troubles: Vec<Problem>,
 }
 
 impl Follower {
@@ -183,7 +183,7 @@ impl Follower {
             folders: Vec::new(),
             next_scan: Instant::now(),
             started: SystemTime::now(),
-            unreadable: None,
+            troubles: Vec::new(),
         }
     }
 
@@ -192,9 +192,10 @@ impl Follower {
         self.dataset.as_ref()
     }
 
-    /// Why the folder could not be read at the last look, if so.
-    pub fn unreadable(&self) -> Option<&str> {
-        self.unreadable.as_deref()
+    /// What kept the last look at the folder from finding all touches: it cannot be read, it holds none any more, or
+    /// some are left out.
+    pub fn troubles(&self) -> &[Problem] {
+        &self.troubles
     }
 
     /// Touches that wait.
@@ -265,9 +266,10 @@ impl Follower {
             Some(dataset) => dataset.grown().map(|growth| growth.dataset),
             None => Dataset::open(&self.path),
         };
-        self.unreadable = None;
+        self.troubles.clear();
         match grown {
             Ok(mut dataset) => {
+                self.troubles = dataset.left_out();
                 if self.dataset.is_none() {
                     dataset.tool_scale = self.config.tool_scale;
                     if let Some(rig) = self.config.rig.clone() {
@@ -277,8 +279,19 @@ impl Follower {
                 self.dataset = Some(Arc::new(dataset));
                 self.enter(now, first);
             }
-            Err(OpenError::NothingFound { .. }) => self.folders = vec![(self.path.clone(), modified(&self.path))],
-            Err(err) => self.unreadable = Some(err.to_string()),
+            Err(OpenError::NothingFound { .. }) => {
+                self.folders = vec![(self.path.clone(), modified(&self.path))];
+                let known = self.dataset.as_ref().map_or(0, |dataset| dataset.index.pairs.len());
+                // An empty folder is one that fills; an emptied one has lost something.
+                if known > 0 {
+                    self.troubles.push(Problem {
+                        file: self.path.clone(),
+                        what: format!("no touch is found in the folder any more; {known} were known"),
+                        hint: "put them back, or go on: touches that appear here are still taken".into(),
+                    });
+                }
+            }
+            Err(err) => self.troubles.push(err.to_problem()),
         }
         for (folder, time) in before {
             if let Some(known) = self.folders.iter_mut().find(|(f, _)| *f == folder) {

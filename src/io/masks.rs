@@ -7,22 +7,18 @@
 //!
 //! A file that cannot be understood blocks its pair: it is reported, and nothing overwrites it.
 
-mod name;
-
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use super::dataset::Dataset;
-use super::{atomic, files};
+use super::{atomic, files, names};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{decode_runs, encode_runs};
 use crate::domain::sensor::Finger;
-
-use name::{escape, unescape};
 
 /// Name of the folder beside a dataset.
 pub const FOLDER: &str = "touch2touch_masks";
@@ -182,9 +178,9 @@ impl MaskStore {
             Some(root) => {
                 // The path is part of the name: datasets often share their last folder's name.
                 let name = root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-                format!("{}-{}", escape(&name), short_hash(root))
+                format!("{}-{}", names::label(&name), short_hash(root))
             }
-            None => escape(&dataset.title),
+            None => names::label(&dataset.title),
         };
         let user = user_data_folder().map(|folder| folder.join("masks").join(key));
         Self::choose(dataset.root.as_deref(), user)
@@ -326,7 +322,7 @@ impl MaskStore {
             for finger in Finger::BOTH {
                 if let Some(pair) = stem.strip_suffix(finger.name()).and_then(|s| s.strip_suffix('.')) {
                     // A name too long to be its own file name is in the file.
-                    let pair = unescape(pair).or_else(|| {
+                    let pair = names::pair_of_label(pair).or_else(|| {
                         let content: MaskFile = serde_json::from_slice(&read(&file).ok()?).ok()?;
                         Some(content.pair)
                     });
@@ -410,11 +406,11 @@ impl MaskStore {
 }
 
 fn mask_name(pair: &str, finger: Finger) -> String {
-    format!("{}.{}{MASK_SUFFIX}", escape(pair), finger.name())
+    format!("{}.{}{MASK_SUFFIX}", names::label(pair), finger.name())
 }
 
 fn review_name(pair: &str) -> String {
-    format!("{}{REVIEW_SUFFIX}", escape(pair))
+    format!("{}{REVIEW_SUFFIX}", names::label(pair))
 }
 
 fn read(file: &Path) -> Result<Vec<u8>, StoreError> {
@@ -460,7 +456,7 @@ fn check_format(file: &Path, format: &str, expected: &str, version: u32, newest:
 }
 
 fn is_writable(folder: &Path) -> bool {
-    tempfile::Builder::new().prefix(".tmp-").tempfile_in(folder).is_ok()
+    atomic::probe(folder).is_ok()
 }
 
 fn short_hash(path: &Path) -> String {

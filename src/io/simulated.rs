@@ -3,6 +3,8 @@
 //! Keys, shapes and element types are those of the released data set; `contact_mask` and `imprint_clean`, the
 //! simulator's truth, come on top.
 
+mod manifest;
+
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DQuat, DVec3};
@@ -14,6 +16,8 @@ use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
 use crate::domain::sensor::{Finger, bubble, gelslim};
+
+pub use manifest::{MANIFEST, Writing, unfinished};
 
 /// Which of the lab's two layouts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +52,22 @@ pub enum WriteError {
     Incomplete {
         /// What is missing.
         missing: &'static str,
+    },
+    /// The manifest cannot be written.
+    #[error("cannot write the manifest ({}): {source}", file.display())]
+    Manifest {
+        /// The file.
+        file: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// The folder holds something else.
+    #[error("the folder holds {found}, which was not written by the same command; choose a new folder ({})", folder.display())]
+    NotOurs {
+        /// The folder.
+        folder: PathBuf,
+        /// What is there.
+        found: String,
     },
     /// A tool whose name cannot be a file name.
     #[error("{name:?} cannot name a tool's files; use letters, digits, - and _")]
@@ -102,15 +122,22 @@ pub fn write_pair(
 /// # Errors
 /// [`WriteError`].
 pub fn write_tools(root: &Path, tools: &[(&str, bool, TriMesh)]) -> Result<(), WriteError> {
+    write_models(root, tools)?;
+    write_split(root, tools.iter().map(|(name, seen, _)| (*name, *seen)))
+}
+
+fn write_models(root: &Path, tools: &[(&str, bool, TriMesh)]) -> Result<(), WriteError> {
     for (name, _, mesh) in tools {
         check_name(name)?;
         let path = root.join("tools_stls").join(format!("{name}.stl"));
         make_parent(&path)?;
         stl::write(&path, mesh)?;
     }
-    let names = |seen: bool| {
-        PtItem::Texts(tools.iter().filter(|t| t.1 == seen).map(|t| t.0.to_owned()).collect::<Vec<String>>())
-    };
+    Ok(())
+}
+
+fn write_split<'a>(root: &Path, tools: impl Iterator<Item = (&'a str, bool)> + Clone) -> Result<(), WriteError> {
+    let names = |seen: bool| PtItem::Texts(tools.clone().filter(|t| t.1 == seen).map(|t| t.0.to_owned()).collect());
     let path = root.join("tools.pt");
     make_parent(&path)?;
     write_dict(&path, &[("train_tools", names(true)), ("test_tools", names(false))])?;

@@ -34,17 +34,7 @@ impl TaskError {
 
     /// A failure with the whole chain of causes, each after a colon.
     pub fn from_error(what: impl Into<String>, err: &dyn std::error::Error) -> Self {
-        let mut why = err.to_string();
-        let mut source = err.source();
-        while let Some(err) = source {
-            // Wrappers often print their cause themselves: do not say it twice.
-            let text = err.to_string();
-            if !why.contains(&text) {
-                why = format!("{why}: {text}");
-            }
-            source = err.source();
-        }
-        Self::new(what, why)
+        Self::new(what, says(err))
     }
 
     /// The end of a task that was told to stop.
@@ -74,6 +64,20 @@ impl TaskError {
     pub fn is_cancelled(&self) -> bool {
         self.kind == TaskErrorKind::Cancelled
     }
+}
+
+/// An error with its causes, each after a colon and said once: many errors print their cause themselves.
+pub fn says(err: &dyn std::error::Error) -> String {
+    let mut text = err.to_string();
+    let mut source = err.source();
+    while let Some(err) = source {
+        let cause = err.to_string();
+        if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+        source = err.source();
+    }
+    text
 }
 
 impl fmt::Display for TaskError {

@@ -11,7 +11,7 @@ use crate::domain::grid::Mask;
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::io::dataset::Dataset;
-use crate::io::export_unet::{self, ExportConfig, ExportEntry, ExportReport};
+use crate::io::export_unet::{self, ExportConfig, ExportEntry, ExportReport, LoadFailure};
 
 /// What it is called in errors.
 const WHAT: &str = "Export masks";
@@ -119,11 +119,19 @@ pub fn export_masks(
         return Err(TaskError::new(WHAT, format!("no mask was corrected by hand yet{place}{left_out}"))
             .with_hint("Correct masks in the studio, or export automatic ones as well (--pairs all)."));
     }
+    if !by_hand.is_empty() {
+        // A mask that was changed since is taken from memory, and the file may be anything.
+        let stored = entries
+            .iter()
+            .filter(|e| by_hand.contains(&(e.pair.clone(), e.finger)) && !masks.changed.contains_key(&e.pair));
+        let store = masks.labels.store(WHAT)?;
+        export_unet::check_stored(store, stored).map_err(|err| TaskError::from_error(WHAT, &err))?;
+    }
     let total = entries.len() as u64;
     let mut done = Exported { report: ExportReport::default(), by_hand: 0, skipped };
     done.report = export_unet::export(folder, &entries, &setup.split, |at| {
         let entry = &entries[at];
-        cx.check(WHAT)?;
+        cx.check(WHAT).map_err(|_| LoadFailure::Stop)?;
         cx.progress(at as u64, total, format!("{}, {}", entry.pair, entry.finger.name()));
         let sample = dataset.load(ids[at])?;
         let bubble = sample.finger(entry.finger).and_then(|touch| touch.bubble.as_ref());

@@ -159,7 +159,7 @@ impl Labels {
         Ok(self.store("Labels")?.folder())
     }
 
-    fn store(&self, what: &str) -> Result<&MaskStore, TaskError> {
+    pub(super) fn store(&self, what: &str) -> Result<&MaskStore, TaskError> {
         (*self.store).as_ref().map_err(|err| store_error(what, err))
     }
 

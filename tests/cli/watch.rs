@@ -218,3 +218,67 @@ fn without_tool_or_camera_it_says_so_and_existing_files_are_taken_once() {
     let leak = run(&["watch", folder.to_str().unwrap(), "--once", "--mask", "cad"], dir.path());
     assert!(error_text(&leak).contains("true pose"), "{}", error_text(&leak));
 }
+
+/// A file of something else that sorts first is said, and hides nothing: neither what is there nor what comes later.
+#[cfg(unix)]
+#[test]
+fn a_foreign_file_neither_hides_touches_nor_goes_unsaid() {
+    let dir = tempfile::tempdir().unwrap();
+    let (_, files) = set(dir.path());
+    let folder = dir.path().join("robot");
+    std::fs::create_dir(&folder).unwrap();
+    let watch = Watch::start(&folder, dir.path(), &["--save", "npz"]);
+    std::fs::copy(&files[0], folder.join("grasp_1.pt")).unwrap();
+    assert_eq!(watch.next()["name"], "grasp_1");
+    std::fs::copy(bubble(&files[0]), folder.join("calibration.pt")).unwrap();
+    let foreign = watch.next();
+    assert_eq!(
+        (&foreign["event"], &foreign["name"]),
+        (&Value::from("error"), &Value::from("calibration")),
+        "{foreign}"
+    );
+    assert!(foreign["error"].as_str().unwrap().contains("gelslim"), "{foreign}");
+    std::fs::copy(&files[1], folder.join("grasp_2.pt")).unwrap();
+    let later = watch.next();
+    assert_eq!((&later["event"], &later["name"]), (&Value::from("done"), &Value::from("grasp_2")), "{later}");
+
+    // Touches of another kind in the same folder are left out, and that is said.
+    std::fs::write(folder.join("x_gelslim.png"), "a picture").unwrap();
+    let other = watch.next();
+    assert_eq!(other["event"], "trouble", "{other}");
+    assert!(other["error"].as_str().unwrap().contains("pictures of touches"), "{other}");
+    std::fs::remove_file(folder.join("x_gelslim.png")).unwrap();
+    assert_eq!(watch.next()["event"], "recovered");
+    // So is a folder that was emptied.
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "pt") {
+            std::fs::remove_file(path).unwrap();
+        }
+    }
+    let emptied = watch.next();
+    assert_eq!(emptied["event"], "trouble", "{emptied}");
+    assert!(emptied["error"].as_str().unwrap().contains("no touch is found"), "{emptied}");
+    std::fs::copy(&files[2], folder.join("grasp_3.pt")).unwrap();
+    let events = [watch.next(), watch.next()];
+    assert!(
+        events.iter().any(|e| e["event"] == "recovered") && events.iter().any(|e| e["name"] == "grasp_3"),
+        "{events:?}"
+    );
+    watch.stop();
+}
+
+/// A folder that holds the foreign file from the start, before any touch.
+#[test]
+fn a_foreign_file_that_was_there_first_hides_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let (_, files) = set(dir.path());
+    let folder = dir.path().join("robot");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::copy(bubble(&files[0]), folder.join("calibration.pt")).unwrap();
+    std::fs::copy(&files[0], folder.join("grasp_1.pt")).unwrap();
+    let done = run(&["watch", folder.to_str().unwrap(), "--once", "--steps", "1", "--save", "npz"], dir.path());
+    let text = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert_eq!(done.status.code(), Some(1), "{text}");
+    assert!(text.contains("1 done, 0 skipped, 1 failed") && text.contains("calibration"), "{text}");
+}

@@ -17,6 +17,8 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
 use crate::domain::pose::{Engine, FingerInput, ToolModel, contact_cloud, estimate, register};
 use crate::domain::units::angle_error;
+use crate::headless::args::{LimitArgs, at_least_one};
+use crate::headless::output::says;
 use crate::headless::{Common, Output, VerbResult, spread};
 use crate::io::atomic;
 use crate::io::cases::{Case, CaseSet, Stratum};
@@ -40,14 +42,13 @@ pub(in crate::headless) struct RegistrationArgs {
     /// Which contact masks.
     #[arg(long, value_enum, default_value_t = Masks::Spoilt)]
     masks: Masks,
-    /// Take only this many cases, spread evenly.
-    #[arg(long)]
-    limit: Option<usize>,
+    #[command(flatten)]
+    limit: LimitArgs,
     /// Python that may have Open3D and small_gicp; they then run on the same points.
     #[arg(long, default_value = "python3")]
     python: PathBuf,
     /// Cases for the Python peers, spread evenly: each takes about a second per pose.
-    #[arg(long, default_value_t = 40)]
+    #[arg(long, default_value_t = 40, value_parser = at_least_one::<usize>)]
     peer_limit: usize,
     /// Leave the Python peers out.
     #[arg(long)]
@@ -176,7 +177,7 @@ fn timed<T>(mut f: impl FnMut() -> T) -> Timed<T> {
 
 pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
     let mut set = CaseSet::open(&args.cases)?;
-    let chosen = spread(set.cases.len(), args.limit);
+    let chosen = args.limit.spread(set.cases.len());
     set.cases = chosen.into_iter().map(|i| set.cases[i].clone()).collect();
     let engines: Vec<Engine> = if args.engines.is_empty() { Engine::iter().collect() } else { args.engines.clone() };
     let output = Output::new(Common { json: false }, "measuring", set.cases.len() * engines.len());
@@ -192,7 +193,7 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
                 report.engines.extend(found.rows);
                 report.notes.extend(found.notes);
             }
-            Err(err) => report.notes.push(format!("Open3D and small_gicp were not run: {err:#}")),
+            Err(err) => report.notes.push(format!("Open3D and small_gicp were not run: {}", says(&err))),
         }
     }
     report.front = front::front(&report.engines);

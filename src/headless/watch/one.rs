@@ -9,6 +9,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::super::contact_mask::MaskFrom;
+use super::super::output::says;
 use super::super::predict::Predictor;
 use super::summary::Latency;
 use super::write::{self, FingerResult};
@@ -150,7 +151,7 @@ impl<'a> Worker<'a> {
     /// The CAD model of a tool, from memory; one that was not there is looked for again.
     fn tool(&mut self, dataset: &Dataset, name: &str) -> Result<&ToolModel, String> {
         if !self.tools.contains_key(name) {
-            let model = load_tool(dataset, name, self.args).map_err(|err| format!("{err:#}"))?;
+            let model = load_tool(dataset, name, self.args).map_err(|err| says(&err))?;
             self.tools.insert(name.to_owned(), model);
         }
         self.tools.get(name).ok_or_else(|| format!("no CAD model of {name}"))

@@ -13,7 +13,7 @@ use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::sensor::Finger;
 use crate::io::dataset::OUTPUT_MARK;
 use crate::io::pt::{PtItem, Tensor};
-use crate::io::{atomic, files, images, npz, pt};
+use crate::io::{atomic, files, images, names, npz, pt};
 
 /// A form of the prediction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -28,10 +28,7 @@ pub(super) enum Save {
 
 /// `stem` with the mark of an output and an ending.
 fn output(stem: &Path, ending: &str) -> PathBuf {
-    let mut name = stem.file_name().map(std::ffi::OsStr::to_os_string).unwrap_or_default();
-    name.push(OUTPUT_MARK);
-    name.push(ending);
-    stem.with_file_name(name)
+    names::with_ending(stem, &format!("{OUTPUT_MARK}{ending}"))
 }
 
 /// Whether the touch was done before: same file, same recipe, no error.

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-use super::lab::{FileRef, Lab};
-use super::{Dataset, LoadError, OpenError, Source};
-use crate::domain::dataset::PairId;
+use super::lab::{self, FileRef, Lab};
+use super::{Dataset, LoadError, OpenError, SAME_NAME, Scan, Source, SourceKind, pictures, problem};
+use crate::domain::dataset::{PairId, Problem};
 use crate::domain::sample::{BubbleCamera, Sample};
 use crate::domain::sensor::Finger;
 use crate::io::caught::caught;
@@ -33,16 +33,33 @@ pub struct Growth {
     pub changed: Vec<PairId>,
 }
 
+/// Touches of another kind beside those of the dataset.
+fn other_kind(root: &Path, what: &str, mine: &str) -> Problem {
+    problem(
+        root,
+        format!("{what} lie here beside {mine}: they are left out"),
+        "put touches of different kinds into folders of their own",
+    )
+}
+
 impl Dataset {
     /// Reads the folder again, for pairs that appeared.
     ///
     /// # Errors
-    /// [`OpenError`]; [`OpenError::NothingFound`] also where the folder now holds another kind of dataset.
+    /// [`OpenError`]; [`OpenError::NothingFound`] also where the folder now holds another kind of dataset only.
     pub fn grown(&self) -> Result<Growth, OpenError> {
         let Some(root) = &self.root else {
             return Ok(Growth { dataset: self.clone(), new: Vec::new(), changed: Vec::new() });
         };
-        let fresh = Self::open(root)?;
+        drop(std::fs::read_dir(root).map_err(|source| OpenError::Io { path: root.clone(), source })?);
+        // Of the same kind: something else that comes into the folder must not hide what is known.
+        let scan = match &self.source {
+            Source::Lab(lab) if lab.flat => lab::scan_flat_again(root),
+            Source::Lab(_) => lab::scan(root),
+            Source::Pictures(_) => pictures::scan(root),
+            Source::BuiltIn(_) => None,
+        };
+        let fresh = Self::of(scan.ok_or_else(|| OpenError::NothingFound { path: root.clone() })?);
         let known: BTreeMap<&str, usize> =
             self.index.pairs.iter().enumerate().map(|(at, entry)| (entry.name.as_str(), at)).collect();
         let mut dataset = Self { problems: fresh.problems.clone(), rig: OnceLock::new(), ..self.clone() };
@@ -71,6 +88,31 @@ impl Dataset {
             mine.meshes.clone_from(&other.meshes);
         }
         Ok(Growth { dataset, new, changed })
+    }
+
+    /// Files in the folder that look like touches and are none of the pairs: of another kind, or of the same name as
+    /// another.
+    pub fn left_out(&self) -> Vec<Problem> {
+        let Some(root) = &self.root else { return Vec::new() };
+        let mut out: Vec<Problem> = self.problems.iter().filter(|p| p.what.starts_with(SAME_NAME)).cloned().collect();
+        let (flat, mine) = match &self.source {
+            Source::Lab(lab) if lab.flat => (true, "GelSlim .pt files"),
+            Source::Lab(_) => (false, "the lab's folders"),
+            Source::Pictures(_) => (false, "pictures"),
+            Source::BuiltIn(_) => return out,
+        };
+        let (folders, pictures) =
+            (matches!(&self.source, Source::Lab(lab) if !lab.flat), self.kind == SourceKind::Pictures);
+        for (is_mine, what, there) in [
+            (folders, "the lab's folders of touches", lab::scan as fn(&Path) -> Option<Scan>),
+            (pictures, "pictures of touches", pictures::scan),
+            (flat, "GelSlim .pt files", lab::scan_flat),
+        ] {
+            if !is_mine && there(root).is_some_and(|scan| scan.root == *root) {
+                out.push(other_kind(root, what, mine));
+            }
+        }
+        out
     }
 
     /// Takes over the files of a pair of `fresh`, for the pair `into` or a further one; not from another kind of source.

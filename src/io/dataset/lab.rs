@@ -20,7 +20,7 @@ use crate::domain::sample::BubbleCamera;
 use crate::io::caught::caught;
 use crate::io::pt::read_dict;
 
-use super::{LoadError, Loaded, Scan, Source, SourceKind, is_output, last_integer, problem};
+use super::{LoadError, Loaded, Scan, Source, SourceKind, is_output, last_integer, problem, same_name};
 
 const BUBBLES: &str = "bubbles";
 const GELSLIMS: [&str; 2] = ["gelslims", "gelslims_no_distortion"];
@@ -42,6 +42,8 @@ pub(super) struct Lab {
     pub(super) folders: Vec<PathBuf>,
     pub(super) pairs: Vec<PairFiles>,
     pub(super) meshes: BTreeMap<String, PathBuf>,
+    /// Whether the touches lie directly in one folder, as a robot may write them.
+    pub(super) flat: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -146,22 +148,30 @@ pub(super) fn scan(path: &Path) -> Option<Scan> {
 }
 
 /// Looks for GelSlim `.pt` files directly in `folder`, as a robot may write them; `None` if there are none.
+///
+/// It is one as soon as one of its files holds a GelSlim image or is still being written: other files may lie there too.
 pub(super) fn scan_flat(folder: &Path) -> Option<Scan> {
+    /// A folder of this many files of something else is one of something else.
+    const MOST_TRIED: usize = 256;
+    let scan = scan_flat_again(folder)?;
+    let Source::Lab(lab) = &scan.source else { return None };
+    let files = lab.pairs.iter().filter_map(|pair| pair.gelslim.as_ref());
+    let is_touch =
+        |file: &FileRef| super::super::pt::read_dict(&lab.path(file)).map_or(true, |dict| dict.has("gelslim"));
+    files.take(MOST_TRIED).any(is_touch).then_some(scan)
+}
+
+/// [`scan_flat`] of a folder that is known to be one: whatever `.pt` file appears there is a touch, or is said to be none
+/// when it is loaded.
+pub(super) fn scan_flat_again(folder: &Path) -> Option<Scan> {
     let mut scan = Scanner::default();
     let mut found = Vec::new();
     scan.folder(folder, None, MAX_DEPTH, &mut found);
     found.retain(|f| !NO_TOUCH.contains(&f.name.as_str()));
-    found.sort_by(|a, b| a.name.cmp(&b.name));
-    found.dedup_by(|a, b| a.name == b.name);
-    // A folder of something else says so with its first readable file.
-    // What cannot be read, or makes the reader fail, may be a touch that is still being written.
-    let other = |f: &Found| {
-        caught(|| read_dict(&scan.path(&f.file))).is_ok_and(|read| read.is_ok_and(|dict| !dict.has("gelslim")))
-    };
-    if found.is_empty() || found.iter().take(1).any(other) {
+    if found.is_empty() {
         return None;
     }
-    let pairs = found.into_iter().map(|f| {
+    let pairs = scan.each_once(found).into_iter().map(|f| {
         let entry = PairEntry { name: f.name, tool: f.tool, split: Split::None, number: f.number };
         (entry, PairFiles { gelslim: Some(f.file), bubble: None })
     });
@@ -181,7 +191,7 @@ impl Scanner {
             root,
             pairs,
             problems: self.problems,
-            source: Source::Lab(Lab { folders: self.folders, pairs: files, meshes }),
+            source: Source::Lab(Lab { folders: self.folders, pairs: files, meshes, flat: groups.is_empty() }),
             kind: SourceKind::Lab,
         }
     }
@@ -282,19 +292,22 @@ impl Scanner {
         if found.is_empty() {
             self.problems.push(problem(folder, "the folder has no .pt files", "check that the download is complete"));
         }
+        Some(self.each_once(found))
+    }
+
+    /// Sorted by name; of files with the same name the first.
+    fn each_once(&mut self, mut found: Vec<Found>) -> Vec<Found> {
         found.sort_by(|a, b| a.name.cmp(&b.name).then_with(|| self.path(&a.file).cmp(&self.path(&b.file))));
         let mut once: Vec<Found> = Vec::with_capacity(found.len());
         for file in found {
             match once.last() {
-                Some(first) if first.name == file.name => self.problems.push(problem(
-                    self.path(&file.file),
-                    format!("same name ({}) as {}", file.name, self.path(&first.file).display()),
-                    "rename or remove one of the two; the first is used",
-                )),
+                Some(first) if first.name == file.name => {
+                    self.problems.push(same_name(self.path(&file.file), &file.name, &self.path(&first.file)));
+                }
                 _ => once.push(file),
             }
         }
-        Some(once)
+        once
     }
 
     fn folder(&mut self, folder: &Path, tool: Option<&str>, depth: usize, out: &mut Vec<Found>) {

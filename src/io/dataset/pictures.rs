@@ -23,7 +23,7 @@ use crate::domain::sensor::bubble;
 use crate::domain::upright::{self, Turn};
 use crate::io::images;
 
-use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem};
+use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};
 
 /// What the darkest and brightest value of a bubble picture are taken for, metres.
 pub const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
@@ -94,11 +94,7 @@ pub(super) fn scan(folder: &Path) -> Option<Scan> {
         let pair = name[..stem.len() - SUFFIXES[kind].len()].to_owned();
         let slot = &mut found.entry(pair).or_default()[kind];
         match slot {
-            Some(first) => problems.push(problem(
-                path.clone(),
-                format!("same name as {}", first.display()),
-                "rename or remove one of the two; the first is used",
-            )),
+            Some(first) => problems.push(same_name(path, stem, first)),
             None => *slot = Some(path),
         }
     }

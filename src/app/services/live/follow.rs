@@ -7,6 +7,7 @@ use std::time::Instant;
 use super::super::super::document::Review;
 use super::super::{DataSource, Followed, Following};
 use super::LiveSource;
+use crate::domain::dataset::Problem;
 use crate::io::follow::{Arrival, Follower};
 use crate::work::error::TaskError;
 use crate::work::labels::Labels;
@@ -15,18 +16,28 @@ struct LiveFollowing {
     follower: Follower,
     reviews: BTreeMap<String, Review>,
     labels: Labels,
+    /// Troubles of the folder that were said.
+    said: Vec<Problem>,
 }
 
 /// `None` for the demo.
 pub(super) fn start(source: &LiveSource) -> Option<Box<dyn Following>> {
     let follower = Follower::continuing(source.dataset.clone())?;
-    Some(Box::new(LiveFollowing { follower, reviews: source.reviews.clone(), labels: source.labels.clone() }))
+    let (reviews, labels) = (source.reviews.clone(), source.labels.clone());
+    Some(Box::new(LiveFollowing { follower, reviews, labels, said: Vec::new() }))
 }
 
 impl Following for LiveFollowing {
     fn poll(&mut self) -> Option<Followed> {
         let now = Instant::now();
-        let ready = self.follower.poll(now)?;
+        let ready = self.follower.poll(now);
+        if self.follower.troubles() != self.said {
+            for trouble in self.follower.troubles().iter().filter(|trouble| !self.said.contains(trouble)) {
+                log::warn!("{}: {} ({})", trouble.file.display(), trouble.what, trouble.hint);
+            }
+            self.said = self.follower.troubles().to_vec();
+        }
+        let ready = ready?;
         let sample = match self.follower.load(&ready, now) {
             Arrival::Unfinished | Arrival::Gone => return None,
             Arrival::Broken(problem) => {

@@ -1,0 +1,226 @@
+//! Every command that README.md and docs show, run as it stands there: a text that no longer fits the program fails.
+
+use std::path::{Path, PathBuf};
+
+use touch2touch::domain::sensor::Finger;
+use touch2touch::headless::check_command;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::masks::{MaskStore, StoredMask};
+
+use super::{error_text, run};
+
+fn repository() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The texts whose commands are run.
+fn texts() -> Vec<(String, String)> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(repository().join("docs"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "md"))
+        .collect();
+    files.push(repository().join("README.md"));
+    files.sort();
+    let read = |path: PathBuf| {
+        let name = path.strip_prefix(repository()).unwrap().display().to_string();
+        (name, std::fs::read_to_string(&path).unwrap())
+    };
+    files.into_iter().map(read).collect()
+}
+
+/// The lines of the code fences, without what follows ` # `, and the rest of the text.
+fn fenced(text: &str) -> (Vec<String>, String) {
+    let (mut lines, mut rest, mut inside) = (Vec::new(), String::new(), false);
+    for line in text.lines() {
+        if line.trim_start().starts_with("```") {
+            inside = !inside;
+        } else if inside {
+            let command = line.split(" #").next().unwrap().trim();
+            lines.extend((!command.is_empty()).then(|| command.to_owned()));
+        } else {
+            rest += line;
+            rest.push('\n');
+        }
+    }
+    (lines, rest)
+}
+
+/// What is done with a command.
+enum How {
+    /// It is run, with words of it replaced and others added so that it ends soon; these exit codes are right.
+    Run(&'static [(&'static str, &'static str)], &'static str, &'static [i32]),
+    /// It opens a window or fetches from the net: only its words are checked.
+    Parse,
+}
+
+/// What is done with the command that begins like this; the longest beginning counts.
+static TABLE: &[(&str, How)] = &[
+    // The studio itself.
+    ("touch2touch", How::Parse),
+    ("touch2touch simulate", How::Run(&[("all", "pattern_36,pattern_31_rod"), ("46", "1")], "", &[0])),
+    ("touch2touch generate", How::Run(&[], "--limit 1 --steps 1", &[0])),
+    ("touch2touch watch", How::Run(&[], "--once --steps 1", &[0])),
+    ("touch2touch ledger", How::Run(&[], "--steps 1", &[0])),
+    ("touch2touch stats", How::Run(&[], "--limit 1 --steps 1", &[0])),
+    ("touch2touch evaluate", How::Run(&[("test-set", "PATH")], "--grasps 1 --steps 1 --resamples 0", &[0])),
+    ("touch2touch pose", How::Run(&[], "--limit 1", &[0])),
+    // The first of the faults may well have no pose.
+    ("touch2touch pose faults", How::Run(&[], "--limit 1", &[0, 1])),
+    ("touch2touch masks export", How::Run(&[], "", &[0])),
+    ("touch2touch basin", How::Run(&[], "", &[0])),
+    ("touch2touch bench registration", How::Run(&[], "--limit 2 --no-peers", &[0])),
+    ("touch2touch bench generator", How::Run(&[], "--grasps 1 --steps 1 --engine rten", &[0])),
+    ("touch2touch bench generator --grasps", How::Run(&[("24", "1")], "--steps 1 --engine rten", &[0])),
+    ("touch2touch bench cases", How::Run(&[("200", "4")], "", &[0])),
+    ("touch2touch bench dataset", How::Run(&[], "--pairs 20 --grasps 1", &[0])),
+    ("touch2touch cache", How::Run(&[], "", &[0])),
+    ("touch2touch doctor", How::Run(&[], "", &[0])),
+    ("touch2touch bundle check", How::Run(&[], "", &[0])),
+    // Without an engine on the machine it says so by its exit code.
+    ("touch2touch runtime", How::Run(&[], "", &[0, 1])),
+];
+
+fn how(command: &str) -> &'static How {
+    let fits = |row: &str| command == row || command.starts_with(&format!("{row} "));
+    let row = TABLE.iter().filter(|(row, _)| fits(row)).max_by_key(|(row, _)| row.len());
+    &row.unwrap_or_else(|| panic!("`{command}`: say in the table of this test how it is run")).1
+}
+
+/// Small things that the placeholders of the texts stand for.
+struct Stage {
+    dir: tempfile::TempDir,
+    name: String,
+}
+
+impl Stage {
+    fn new() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let set = dir.path().join("set");
+        let done = run(
+            &["simulate", "--out", set.to_str().unwrap(), "--tools", "pattern_36", "--grasps", "1", "--seed", "3"],
+            dir.path(),
+        );
+        assert!(done.status.success(), "{}", error_text(&done));
+        let cases = dir.path().join("known");
+        let done = run(&["bench", "cases", "--out", cases.to_str().unwrap(), "--count", "4"], dir.path());
+        assert!(done.status.success(), "{}", error_text(&done));
+        let dataset = Dataset::open(&set).unwrap();
+        let name = dataset.index.pairs[0].name.clone();
+        // One mask corrected by hand, for the export.
+        let id = touch2touch::domain::dataset::PairId(0);
+        let sample = dataset.load(id).unwrap();
+        let imprint = &sample.finger(Finger::Right).unwrap().bubble.as_ref().unwrap().imprint;
+        let mask = imprint.map(|&depth| depth > 0.005);
+        let stored = StoredMask { mask, base: "Threshold 5.00 mm".into(), person: "test".into(), saved_unix_s: 1 };
+        MaskStore::for_dataset(&dataset).unwrap().save(&name, Finger::Right, Some(&stored)).unwrap();
+        let robot = dir.path().join("robot");
+        std::fs::create_dir(&robot).unwrap();
+        let touch = dataset.gelslim_file(id).unwrap();
+        std::fs::copy(&touch, robot.join(touch.file_name().unwrap())).unwrap();
+        Self { dir, name }
+    }
+
+    /// The words of a command with things in the place of placeholders.
+    fn words(&self, command: &str, number: usize) -> Vec<String> {
+        let at = |name: &str| self.dir.path().join(name).to_str().unwrap().to_owned();
+        let mut before = String::new();
+        let mut out = Vec::new();
+        for word in command.split_whitespace().skip(1) {
+            let to = match (word, before.as_str()) {
+                ("PATH", _) => at("set"),
+                ("NAME", _) => self.name.clone(),
+                ("TOOL.stl", _) => at("set/tools_stls/pattern_36.stl"),
+                ("DIR", "--out") => at(&format!("out {number}")),
+                ("DIR", "--cases") => at("known"),
+                ("DIR", "watch") => at("robot"),
+                ("DIR", "check") => repository().join("assets/models/generator_ldm").to_str().unwrap().to_owned(),
+                ("CASES", _) => at("cases"),
+                ("FILE" | "OUT" | "OUT.json" | "TABLE.md", _) => at(&format!("{number} {word}")),
+                ("PY", _) => "/no/such/python".to_owned(),
+                (path, _) if path.starts_with("assets/") => repository().join(path).to_str().unwrap().to_owned(),
+                ("faults", _) => at("faults"),
+                (other, _) => {
+                    let placeholder = other.len() > 1 && other.chars().all(|c| c.is_ascii_uppercase());
+                    assert!(!placeholder, "`{command}`: say in this test what {other} stands for");
+                    other.to_owned()
+                }
+            };
+            before = word.to_owned();
+            out.push(to);
+        }
+        out
+    }
+}
+
+#[test]
+fn every_command_of_the_texts_does_what_they_say() {
+    let stage = Stage::new();
+    let (mut number, mut ran) = (0, 0);
+    for (file, text) in texts() {
+        for line in fenced(&text).0 {
+            number += 1;
+            let place = format!("{file}: `{line}`");
+            if let Some(script) = line.strip_prefix("./") {
+                let script = repository().join(script.split(' ').next().unwrap());
+                let script = std::fs::read_to_string(script).unwrap_or_else(|err| panic!("{place}: {err}"));
+                assert!(!line.contains("PATH") || script.contains("\"$@\""), "{place}: it passes no path on");
+                continue;
+            }
+            assert!(line.starts_with("touch2touch"), "{place}: what is it?");
+            // What is optional is left out and only looked at.
+            let whole = line.replace(['[', ']'], "");
+            check_command(["touch2touch".to_owned()].into_iter().chain(stage.words(&whole, number)))
+                .unwrap_or_else(|err| panic!("{place}: {err}"));
+            let shortest: String = line.split(" [").next().unwrap().to_owned();
+            let How::Run(replaced, more, right) = how(&shortest) else {
+                // A verb of which the table knows nothing must not pass for a path.
+                let path = stage.words(&shortest, number).first().cloned();
+                assert!(path.is_none_or(|path| Path::new(&path).exists()), "{place}: say in the table how it is run");
+                continue;
+            };
+            let mut command = shortest;
+            for (word, by) in *replaced {
+                command = command.split(' ').map(|w| if w == *word { *by } else { w }).collect::<Vec<_>>().join(" ");
+            }
+            let mut words = stage.words(&command, number);
+            words.extend(more.split_whitespace().map(str::to_owned));
+            let start = std::time::Instant::now();
+            let done = run(&words.iter().map(String::as_str).collect::<Vec<_>>(), stage.dir.path());
+            eprintln!("{:6.1} s {place}", start.elapsed().as_secs_f64());
+            let code = done.status.code();
+            assert!(code.is_some_and(|code| right.contains(&code)), "{place}: {code:?}\n{}", error_text(&done));
+            assert!(!done.stdout.is_empty(), "{place}: it says nothing");
+            for out in words
+                .iter()
+                .filter(|word| word.contains(&format!("{number} ")) || word.ends_with(&format!(" {number}")))
+            {
+                let path = Path::new(out);
+                let there = path.is_file() || std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
+                assert!(there, "{place}: nothing was written to {out}");
+            }
+            ran += 1;
+        }
+    }
+    assert!(ran >= 20, "{ran} commands: were the fences read?");
+}
+
+/// Commands within sentences may leave things out, but every word of them is one.
+#[test]
+fn commands_within_sentences_are_spelled_right() {
+    let mut seen = 0;
+    let training = std::fs::read_to_string(repository().join("training/README.md")).unwrap();
+    for (file, text) in texts().into_iter().chain([("training/README.md".to_owned(), training)]) {
+        let rest = fenced(&text).1;
+        for span in rest.split('`').skip(1).step_by(2) {
+            let words: Vec<&str> = span.split_whitespace().collect();
+            if words.first() != Some(&"touch2touch") || words.len() < 2 || words.contains(&"VERB") {
+                continue;
+            }
+            check_command(words.iter().copied().chain(["--help"]))
+                .unwrap_or_else(|err| panic!("{file}: `{span}`: {err}"));
+            seen += 1;
+        }
+    }
+    assert!(seen >= 5, "{seen} commands: were the sentences read?");
+}
