@@ -137,7 +137,8 @@ impl PoseFan {
     /// Writes `NAME_ENGINE_fan.png`; nothing where the angles have no mean.
     pub(super) fn write(&self, folder: &Path, name: &str, engine: Engine) -> anyhow::Result<()> {
         let file = folder.join(format!("{}_{}_fan.png", name.replace(['/', '\\'], "__"), engine.key()));
-        if let Some(picture) = self.fan.as_ref().and_then(|fan| super::bench::fan::picture(name, fan, self.truth_rad)) {
+        let Some(fan) = &self.fan else { return Ok(()) };
+        if let Some(picture) = super::bench::fan::picture(name, fan, self.truth_rad)? {
             images::write_rgb8(&file, &picture)?;
         }
         Ok(())
