@@ -7,6 +7,7 @@ pub mod cases;
 pub mod dataset;
 pub mod doctor;
 pub mod export_unet;
+pub mod folders;
 pub mod follow;
 pub mod images;
 pub mod masks;

@@ -17,6 +17,7 @@ use super::bundle::sha256;
 use super::recipe::Recipe;
 use crate::domain::grid::Grid;
 use crate::domain::postprocess::RawPrediction;
+use crate::io::folders;
 
 /// The format and its version, in every file.
 const FORMAT: &str = "touch2touch-prediction-1";
@@ -77,20 +78,8 @@ struct Header {
 
 /// The folder of this user's predictions by the rules of the platform; `TOUCH2TOUCH_CACHE` overrides it.
 pub fn user_folder() -> Option<PathBuf> {
-    let from = |variable: &str| std::env::var_os(variable).map(PathBuf::from).filter(|p| p.is_absolute());
-    if let Some(folder) = from("TOUCH2TOUCH_CACHE") {
-        return Some(folder.join("predictions"));
-    }
-    let base = from("XDG_CACHE_HOME").or_else(|| {
-        if cfg!(windows) {
-            from("LOCALAPPDATA")
-        } else if cfg!(target_os = "macos") {
-            Some(from("HOME")?.join("Library/Caches"))
-        } else {
-            Some(from("HOME")?.join(".cache"))
-        }
-    })?;
-    Some(base.join("touch2touch").join("predictions"))
+    let named = std::env::var_os("TOUCH2TOUCH_CACHE").map(PathBuf::from).filter(|p| p.is_absolute());
+    Some(named.or_else(folders::cache)?.join("predictions"))
 }
 
 impl Store {

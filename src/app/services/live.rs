@@ -29,6 +29,7 @@ use crate::infer::store::{self, Store};
 use crate::io::atomic;
 use crate::io::dataset::Dataset;
 use crate::io::export_unet::{self, ExportConfig, ExportEntry};
+use crate::io::folders;
 use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
 use crate::io::statistics::ShiftStatistics;
 
@@ -58,7 +59,7 @@ impl LiveServices {
     /// With settings in the user's configuration folder.
     pub fn new() -> Self {
         let store = store::user_folder().map(|folder| Mutex::new(Store::new(folder, store::DEFAULT_BUDGET)));
-        Self { config_folder: user_config_folder(), store, ..Self::default() }
+        Self { config_folder: folders::config(), store, ..Self::default() }
     }
 
     /// With settings and kept predictions in a given folder; `None` keeps none.
@@ -67,21 +68,6 @@ impl LiveServices {
         let store = kept.map(|folder| Mutex::new(Store::new(folder, store::DEFAULT_BUDGET)));
         Self { config_folder: folder, store, ..Self::default() }
     }
-}
-
-/// The user's folder for this program's configuration, by the rules of the platform.
-fn user_config_folder() -> Option<PathBuf> {
-    let from = |variable: &str| std::env::var_os(variable).map(PathBuf::from).filter(|p| p.is_absolute());
-    let base = from("XDG_CONFIG_HOME").or_else(|| {
-        if cfg!(windows) {
-            from("APPDATA")
-        } else if cfg!(target_os = "macos") {
-            Some(from("HOME")?.join("Library/Application Support"))
-        } else {
-            Some(from("HOME")?.join(".config"))
-        }
-    })?;
-    Some(base.join("touch2touch"))
 }
 
 /// Opens a place as the studio does: data set, stored labels, and what is wrong with either.
