@@ -9,6 +9,7 @@ pub mod dataset;
 pub mod doctor;
 pub mod export_unet;
 pub mod files;
+pub mod folders;
 pub mod follow;
 pub mod images;
 pub mod masks;

@@ -38,11 +38,6 @@ pub struct Tasks {
 }
 
 impl Tasks {
-    /// Whether `request` is being computed or waits for its turn.
-    pub fn is_waiting(&self, request: &Request) -> bool {
-        self.demanded.contains(request)
-    }
-
     /// The task that generates `recipe`.
     pub fn generating(&self, recipe: &PredictionKey) -> Option<(Ticket, &Task)> {
         self.running.iter().find(|(_, task)| task.recipes.contains(recipe)).map(|(t, task)| (*t, task))

@@ -392,17 +392,6 @@ impl AlignReport {
         self.grasp_from_object.inverse().theta_rad
     }
 
-    /// The best run that ended somewhere else (more than a degree or a millimetre away), if any.
-    pub fn runner_up(&self) -> Option<&Run> {
-        self.runs
-            .iter()
-            .filter(|r| {
-                super::units::angle_error(r.end.theta_rad, self.grasp_from_object.theta_rad) > 1f64.to_radians()
-                    || (r.end.y_m - self.grasp_from_object.y_m).hypot(r.end.z_m - self.grasp_from_object.z_m) > 1e-3
-            })
-            .min_by(|a, b| a.cost_m2.total_cmp(&b.cost_m2))
-    }
-
     /// Whether the points leave a direction of the pose open (a straight rod slides, a disc turns).
     pub fn is_degenerate(&self) -> bool {
         self.observability.is_some_and(|o| o.degenerate)

@@ -8,10 +8,6 @@ use super::mesh::MeshDistance;
 use super::sample::BubbleCamera;
 use super::units::text_mm;
 
-/// Depth of the lab's older contact rule: pushed in by at least this, metres (`ICP_dataset_cal.py` line 214).
-pub const LAB_THRESHOLD_M: f32 = 0.007;
-/// Share of the pixels above the threshold that the lab's older rule keeps, percent.
-pub const LAB_TOP_PERCENT: f64 = 40.0;
 /// Distance to the CAD model that the lab still calls contact, metres (`ICP_dataset_cal.py` lines 337-391).
 pub const LAB_CAD_DISTANCE_M: f64 = 0.001;
 /// Imprint that the lab's networks map to 0, metres.

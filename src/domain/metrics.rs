@@ -6,7 +6,6 @@ mod angle;
 mod frechet;
 mod image;
 mod joint;
-mod mask;
 mod split;
 mod ssim;
 
@@ -14,6 +13,5 @@ pub use angle::AngleSummary;
 pub use frechet::frechet_distance;
 pub use image::{MetricError, Psnr, PsnrMean, mse, psnr, psnr_of_mse, unit_range};
 pub use joint::{Joint, Line, line};
-pub use mask::MaskScore;
 pub use split::{Figures, Split, footprint_mask, split};
 pub use ssim::{Ssim, SsimRange, ssim, ssim_ranges};

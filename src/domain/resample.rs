@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::grid::{Grid, RgbGrid};
 
-/// The kernel's sharpness in [`bicubic`]; PyTorch and OpenCV use -0.75.
+/// The sharpness of [`Resampling::Bicubic`]; PyTorch and OpenCV use -0.75.
 const BICUBIC_A: f64 = -0.75;
 
 /// How an image is resized.
@@ -20,7 +20,8 @@ const BICUBIC_A: f64 = -0.75;
 pub enum Resampling {
     /// Two taps per axis, see [`bilinear`].
     Bilinear,
-    /// Four taps per axis, see [`bicubic`].
+    /// Four taps per axis (cubic convolution, a = -0.75); the border pixel is repeated outside the image. May overshoot
+    /// the range of the input. NaN and empty images as in [`bilinear`].
     Bicubic,
     /// The mean of the pixels under the target pixel, see [`area`].
     Area,
@@ -45,12 +46,6 @@ pub fn bilinear(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
     resize(image, width, height, Resampling::Bilinear)
 }
 
-/// Resizes with four taps per axis (cubic convolution, a = -0.75); the border pixel is repeated outside the image.
-/// May overshoot the range of the input. NaN and empty images as in [`bilinear`].
-pub fn bicubic(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
-    resize(image, width, height, Resampling::Bicubic)
-}
-
 /// The plain mean of the source pixels `floor(i·in/out) .. ceil((i+1)·in/out)`, as torch's `mode="area"`.
 pub fn area(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
     resize(image, width, height, Resampling::Area)
@@ -59,11 +54,6 @@ pub fn area(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
 /// [`bilinear`] for colour images.
 pub fn bilinear_rgb(image: &RgbGrid, width: usize, height: usize) -> RgbGrid {
     resize(image, width, height, Resampling::Bilinear)
-}
-
-/// [`bicubic`] for colour images.
-pub fn bicubic_rgb(image: &RgbGrid, width: usize, height: usize) -> RgbGrid {
-    resize(image, width, height, Resampling::Bicubic)
 }
 
 /// A mask at another size: the pixel whose area holds the target pixel's centre. An empty source gives `false`.
@@ -229,7 +219,13 @@ mod tests {
         image[(0, 0)] = f32::NAN;
         let small = bilinear(&image, 4, 4);
         assert!(small[(0, 0)].is_nan() && small.as_slice().iter().filter(|v| v.is_nan()).count() == 1);
-        assert!(bicubic(&Grid::from_vec(0, 0, vec![]).unwrap(), 2, 2).as_slice().iter().all(|v| v.is_nan()));
+        assert!(
+            Resampling::Bicubic
+                .resize(&Grid::from_vec(0, 0, vec![]).unwrap(), 2, 2)
+                .as_slice()
+                .iter()
+                .all(|v| v.is_nan())
+        );
         assert!(bilinear(&image, 0, 3).is_empty());
         assert_eq!(bilinear(&Grid::filled(1, 1, 7.0), 3, 3), Grid::filled(3, 3, 7.0));
     }

@@ -9,7 +9,6 @@ mod front;
 mod generator;
 mod peers;
 mod registration;
-mod strokes;
 
 use clap::Subcommand;
 use serde::Serialize;

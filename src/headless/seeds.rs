@@ -144,7 +144,8 @@ impl PoseFan {
     /// Writes `STEM_ENGINE_fan.png`; nothing where the angles have no mean. `name` is the pair's.
     pub(super) fn write(&self, stem: &Path, name: &str, engine: Engine) -> anyhow::Result<()> {
         let file = names::with_ending(stem, &format!("_{}_fan.png", engine.key()));
-        if let Some(picture) = self.fan.as_ref().and_then(|fan| super::bench::fan::picture(name, fan, self.truth_rad)) {
+        let Some(fan) = &self.fan else { return Ok(()) };
+        if let Some(picture) = super::bench::fan::picture(name, fan, self.truth_rad)? {
             images::write_rgb8(&file, &picture)?;
         }
         Ok(())

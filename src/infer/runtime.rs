@@ -9,6 +9,7 @@ use std::process::Command;
 use serde::Serialize;
 
 use super::engine::{self, EngineChoice, EngineKind};
+use crate::io::folders;
 
 pub use fetch::{FetchError, VERSION, fetch_runtime};
 
@@ -91,18 +92,8 @@ pub fn runtime_report() -> RuntimeReport {
 
 /// The application's data folder: `TOUCH2TOUCH_DATA`, else the platform's place for it; `None` without a home folder.
 pub fn data_dir() -> Option<PathBuf> {
-    let variable = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
-    if let Some(dir) = variable(DATA_VARIABLE) {
-        return Some(dir);
-    }
-    let base = if cfg!(windows) {
-        variable("LOCALAPPDATA")
-    } else if cfg!(target_os = "macos") {
-        variable("HOME").map(|home| home.join("Library/Application Support"))
-    } else {
-        variable("XDG_DATA_HOME").or_else(|| variable("HOME").map(|home| home.join(".local/share")))
-    };
-    base.map(|base| base.join("touch2touch"))
+    let named = std::env::var_os(DATA_VARIABLE).filter(|v| !v.is_empty()).map(PathBuf::from);
+    named.or_else(folders::local_data)
 }
 
 /// Where fetched libraries lie by default.
@@ -163,9 +154,7 @@ fn library_in(dir: &Path) -> Option<PathBuf> {
 fn python_packages() -> Vec<PathBuf> {
     let mut prefixes: Vec<PathBuf> =
         ["VIRTUAL_ENV", "CONDA_PREFIX"].iter().filter_map(std::env::var_os).map(PathBuf::from).collect();
-    if let Some(home) = std::env::var_os("HOME") {
-        prefixes.push(Path::new(&home).join(".local"));
-    }
+    prefixes.extend(dirs::home_dir().map(|home| home.join(".local")));
     prefixes.extend(["/usr/local", "/opt/homebrew", "/usr"].map(PathBuf::from));
     let mut found = Vec::new();
     for prefix in prefixes {

@@ -17,7 +17,7 @@ use super::bundle::sha256;
 use super::recipe::Recipe;
 use crate::domain::grid::Grid;
 use crate::domain::postprocess::RawPrediction;
-use crate::io::files;
+use crate::io::{files, folders};
 
 /// The format and its version, in every file.
 const FORMAT: &str = "touch2touch-prediction-1";
@@ -83,20 +83,8 @@ pub fn user_folder() -> Option<PathBuf> {
 
 /// The folder of what can be made again, by the rules of the platform; `TOUCH2TOUCH_CACHE` overrides it.
 pub(super) fn user_cache() -> Option<PathBuf> {
-    let from = |variable: &str| std::env::var_os(variable).map(PathBuf::from).filter(|p| p.is_absolute());
-    if let Some(folder) = from("TOUCH2TOUCH_CACHE") {
-        return Some(folder);
-    }
-    let base = from("XDG_CACHE_HOME").or_else(|| {
-        if cfg!(windows) {
-            from("LOCALAPPDATA")
-        } else if cfg!(target_os = "macos") {
-            Some(from("HOME")?.join("Library/Caches"))
-        } else {
-            Some(from("HOME")?.join(".cache"))
-        }
-    })?;
-    Some(base.join("touch2touch"))
+    let named = std::env::var_os("TOUCH2TOUCH_CACHE").map(PathBuf::from).filter(|p| p.is_absolute());
+    named.or_else(folders::cache)
 }
 
 impl Store {

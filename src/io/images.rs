@@ -146,17 +146,6 @@ pub fn read_grey8(path: &Path) -> Result<Grid<u8>, PictureError> {
     }
 }
 
-/// Reads a PNG that must be 16-bit grey without alpha, value by value.
-///
-/// # Errors
-/// [`PictureError::Kind`] for any other kind.
-pub fn read_grey16(path: &Path) -> Result<Grid<u16>, PictureError> {
-    match decode(path)? {
-        DynamicImage::ImageLuma16(image) => Ok(grid(image.width(), image.height(), image.into_raw())),
-        other => Err(wrong_kind(path, &other, "16-bit grey")),
-    }
-}
-
 fn wrong_kind(file: &Path, image: &DynamicImage, expected: &'static str) -> PictureError {
     PictureError::Kind { file: file.to_owned(), found: format!("{:?}", image.color()), expected }
 }
@@ -207,10 +196,8 @@ mod tests {
         write_grey8(&path, &grey).unwrap();
         assert_eq!(read_grey8(&path).unwrap(), grey);
         assert_eq!(read_grey(&path).unwrap(), grey.map(|&v| f32::from(v)));
-        assert!(matches!(read_grey16(&path), Err(PictureError::Kind { .. })));
         let deep = Grid::from_fn(4, 3, |x, y| (x * 20000 + y) as u16);
         write_grey16(&path, &deep).unwrap();
-        assert_eq!(read_grey16(&path).unwrap(), deep);
         assert!((read_grey(&path).unwrap()[(3, 0)] - 60000.0 / 257.0).abs() < 1e-3);
         let colour = Grid::from_fn(3, 2, |x, y| [x as f32 * 100.0, y as f32, 7.4]);
         write_rgb8(&path, &colour).unwrap();

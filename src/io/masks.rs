@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::dataset::Dataset;
-use super::{atomic, files, names};
+use super::{atomic, files, folders, names};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
@@ -182,7 +182,7 @@ impl MaskStore {
             }
             None => names::label(&dataset.title),
         };
-        let user = user_data_folder().map(|folder| folder.join("masks").join(key));
+        let user = folders::data().map(|folder| folder.join("masks").join(key));
         Self::choose(dataset.root.as_deref(), user)
     }
 
@@ -463,19 +463,4 @@ fn short_hash(path: &Path) -> String {
     use sha2::Digest as _;
     let digest = sha2::Sha256::digest(path.as_os_str().as_encoded_bytes());
     digest[..6].iter().map(|b| format!("{b:02x}")).collect()
-}
-
-/// The user's folder for this program's data, by the rules of the platform.
-fn user_data_folder() -> Option<PathBuf> {
-    let from = |variable: &str| std::env::var_os(variable).map(PathBuf::from).filter(|p| p.is_absolute());
-    let base = from("XDG_DATA_HOME").or_else(|| {
-        if cfg!(windows) {
-            from("APPDATA")
-        } else if cfg!(target_os = "macos") {
-            Some(from("HOME")?.join("Library/Application Support"))
-        } else {
-            Some(from("HOME")?.join(".local/share"))
-        }
-    })?;
-    Some(base.join("touch2touch"))
 }

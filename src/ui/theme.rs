@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use eframe::egui::{
     self, Color32, CornerRadius, FontData, FontDefinitions, FontFamily, FontId, Margin, RichText, Shadow, Stroke,
-    TextStyle, Theme, Vec2, vec2,
+    TextStyle, Theme, vec2,
 };
 
 /// The grid that every distance is a multiple of, points.
@@ -235,9 +235,6 @@ pub fn pane_frame(palette: &Palette) -> egui::Frame {
 pub fn mix(a: Color32, b: Color32, t: f32) -> Color32 {
     a.lerp_to_gamma(b, t)
 }
-
-/// The size of a button that holds one symbol.
-pub const SYMBOL_BUTTON: Vec2 = Vec2::splat(6.0 * UNIT);
 
 #[cfg(test)]
 mod tests {

@@ -23,7 +23,7 @@ use crate::infer::engine::EngineChoice;
 use crate::infer::store::{self, Store};
 use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
-use crate::io::{atomic, files};
+use crate::io::{atomic, files, folders};
 use crate::work::bundles::{self, BundleInfo};
 use crate::work::error::TaskError;
 use crate::work::export::{ExportSetup, HandMasks, export_masks};
@@ -47,7 +47,7 @@ impl LiveServices {
     /// With settings in the user's configuration folder.
     pub fn new() -> Self {
         let store = store::user_folder().map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
-        Self { config_folder: user_config_folder(), models: Models::new(store) }
+        Self { config_folder: folders::config(), models: Models::new(store) }
     }
 
     /// With settings and kept predictions in a given folder; `None` keeps none.
@@ -56,21 +56,6 @@ impl LiveServices {
         let store = kept.map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
         Self { config_folder: folder, models: Models::new(store) }
     }
-}
-
-/// The user's folder for this program's configuration, by the rules of the platform.
-fn user_config_folder() -> Option<PathBuf> {
-    let from = |variable: &str| std::env::var_os(variable).map(PathBuf::from).filter(|p| p.is_absolute());
-    let base = from("XDG_CONFIG_HOME").or_else(|| {
-        if cfg!(windows) {
-            from("APPDATA")
-        } else if cfg!(target_os = "macos") {
-            Some(from("HOME")?.join("Library/Application Support"))
-        } else {
-            Some(from("HOME")?.join(".config"))
-        }
-    })?;
-    Some(base.join("touch2touch"))
 }
 
 /// Opens a place as the studio does: data set, stored labels, and what is wrong with either.
@@ -301,6 +286,9 @@ mod tests {
     use crate::domain::frames::PlanarPose;
     use crate::domain::grid::Mask;
     use crate::domain::hand::{AcceptedPose, HandPose};
+    use crate::domain::sensor::Finger;
+    use crate::io::masks::MaskStore;
+    use crate::work::labels::{HandMask, Revision};
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
@@ -351,7 +339,8 @@ mod tests {
         let source = open_source(&place).unwrap();
         let name = source.index().pairs[0].name.clone();
         source.save_labels(&name, &labels()).unwrap();
-        let file = source.store("test").unwrap().mask_file(&name, Finger::Right);
+        let folder = source.labels.folder().unwrap().to_owned();
+        let file = MaskStore::in_folder(folder).mask_file(&name, Finger::Right);
         std::fs::write(&file, b"{ half a fi").unwrap();
         let again = open_source(&place).unwrap();
         assert!(again.load_labels(&name).unwrap_err().hint.is_some());

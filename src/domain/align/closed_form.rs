@@ -3,7 +3,8 @@
 //! Neither form can return a reflection, so nothing has to be repaired afterwards, and neither has a unit. Sums are
 //! taken about the centroids in f64: an offset of a thousand kilometres costs a millimetre-sized cloud no angle.
 
-use glam::{DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
+use nalgebra::{Matrix4, Vector4};
 
 use crate::domain::frames::PlanarPose;
 use crate::domain::linear::eigen_symmetric;
@@ -75,25 +76,22 @@ pub(super) fn closest_rotation(correlation: DMat3) -> Option<DQuat> {
     /// Eigenvalues closer than this, relative to the largest entry, count as equal.
     const EQUAL: f64 = 1e-9;
     let s = |a: usize, m: usize| correlation.col(m)[a];
-    let n = DMat4::from_cols_array_2d(&[
+    let n = Matrix4::from([
         [s(0, 0) + s(1, 1) + s(2, 2), s(1, 2) - s(2, 1), s(2, 0) - s(0, 2), s(0, 1) - s(1, 0)],
         [s(1, 2) - s(2, 1), s(0, 0) - s(1, 1) - s(2, 2), s(0, 1) + s(1, 0), s(2, 0) + s(0, 2)],
         [s(2, 0) - s(0, 2), s(0, 1) + s(1, 0), s(1, 1) - s(0, 0) - s(2, 2), s(1, 2) + s(2, 1)],
         [s(0, 1) - s(1, 0), s(2, 0) + s(0, 2), s(1, 2) + s(2, 1), s(2, 2) - s(0, 0) - s(1, 1)],
     ]);
-    let rows = n.to_cols_array_2d();
-    let (values, vectors) = eigen_symmetric(rows)?;
+    let (values, vectors) = eigen_symmetric(n)?;
     let largest = values[3].abs().max(values[0].abs());
     // Of all best rotations the one nearest to none: the identity quaternion, projected.
-    let mut q = [0.0; 4];
-    for (value, vector) in values.iter().zip(&vectors) {
+    let mut q = Vector4::zeros();
+    for (value, vector) in values.iter().zip(vectors.column_iter()) {
         if values[3] - value <= EQUAL * largest {
-            for (sum, x) in q.iter_mut().zip(vector) {
-                *sum += x * vector[0];
-            }
+            q += vector * vector[0];
         }
     }
-    let best = if q.iter().map(|x| x * x).sum::<f64>() > 1e-12 { q } else { vectors[3] };
+    let best = if q.norm_squared() > 1e-12 { q } else { vectors.column(3).into() };
     let q = DQuat::from_xyzw(best[1], best[2], best[3], best[0]);
     q.is_finite().then(|| q.normalize())
 }

@@ -60,7 +60,6 @@ pub struct DistanceField {
     origin: DVec2,
     /// Row by row: y runs along a row, z over the rows.
     values: Vec<f32>,
-    silhouette: [DVec2; 2],
 }
 
 impl DistanceField {
@@ -98,12 +97,7 @@ impl DistanceField {
         let cells = ((silhouette[1] + MARGIN_M - origin) / CELL_M).ceil();
         let raster = Raster { columns: cells.x as usize + 1, rows: cells.y as usize + 1, origin };
         let values = raster.signed_distance(&triangles);
-        Ok(Self { columns: raster.columns, rows: raster.rows, origin, values, silhouette })
-    }
-
-    /// Corners of the silhouette's bounding box, `(y, z)`, metres, object frame.
-    pub fn silhouette_bounds(&self) -> [DVec2; 2] {
-        self.silhouette
+        Ok(Self { columns: raster.columns, rows: raster.rows, origin, values })
     }
 
     /// Columns (along y) and rows (along z).

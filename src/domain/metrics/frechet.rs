@@ -1,9 +1,8 @@
 //! Distance of two sets of feature vectors, each taken for a sample of a normal distribution.
 
-use crate::domain::linear::{diagonalise, rotation};
+use nalgebra::{DMatrix, DVector};
 
-/// A square matrix by rows.
-type Matrix = Vec<Vec<f64>>;
+use crate::domain::linear::eigen_symmetric;
 
 /// The Fréchet distance of two sets of vectors: `|m1 - m2|² + tr(C1 + C2 - 2 (C1 C2)^½)`, with means `m` and unbiased
 /// covariances `C`. Behind published "FID" figures stand the features of an Inception network; with other features the
@@ -21,98 +20,26 @@ pub fn frechet_distance(first: &[&[f32]], second: &[&[f32]]) -> Option<f64> {
         return None;
     }
     let ((m1, c1), (m2, c2)) = (moments(first, d), moments(second, d));
-    let apart: f64 = m1.iter().zip(&m2).map(|(a, b)| (a - b).powi(2)).sum();
-    let trace = |c: &Matrix| (0..d).map(|i| c[i][i]).sum::<f64>();
-    let shared: f64 = singular_values(product(&root(c1.clone())?, &root(c2.clone())?)).iter().sum();
-    Some((apart + trace(&c1) + trace(&c2) - 2.0 * shared).max(0.0))
+    let shared = (root(c1.clone())? * root(c2.clone())?).singular_values().sum();
+    Some(((m1 - m2).norm_squared() + c1.trace() + c2.trace() - 2.0 * shared).max(0.0))
 }
 
 /// Mean and unbiased covariance.
-fn moments(set: &[&[f32]], d: usize) -> (Vec<f64>, Matrix) {
-    let n = set.len() as f64;
-    let mean: Vec<f64> = (0..d).map(|i| set.iter().map(|v| f64::from(v[i])).sum::<f64>() / n).collect();
-    let mut c = vec![vec![0.0; d]; d];
-    for v in set {
-        let centred: Vec<f64> = v.iter().zip(&mean).map(|(x, m)| f64::from(*x) - m).collect();
-        for (row, x) in c.iter_mut().zip(&centred) {
-            for (cell, y) in row.iter_mut().zip(&centred) {
-                *cell += x * y;
-            }
-        }
-    }
-    c.iter_mut().flatten().for_each(|cell| *cell /= n - 1.0);
-    (mean, c)
-}
-
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    let row = |a: &Vec<f64>| {
-        let mut out = vec![0.0; b[0].len()];
-        for (x, row) in a.iter().zip(b) {
-            for (cell, y) in out.iter_mut().zip(row) {
-                *cell += x * y;
-            }
-        }
-        out
-    };
-    a.iter().map(row).collect()
+fn moments(set: &[&[f32]], d: usize) -> (DVector<f64>, DMatrix<f64>) {
+    let mut vectors = DMatrix::from_fn(d, set.len(), |i, k| f64::from(set[k][i]));
+    let mean = vectors.column_mean();
+    vectors.column_iter_mut().for_each(|mut v| v -= &mean);
+    let covariance = &vectors * vectors.transpose() / (set.len() - 1) as f64;
+    (mean, covariance)
 }
 
 /// The positive semi-definite root of such a matrix; eigenvalues below rounding become 0. `None` for what is not finite.
-fn root(c: Matrix) -> Option<Matrix> {
-    let d = c.len();
-    let (values, vectors) = eigen_symmetric(c)?;
-    let largest = values.iter().copied().fold(0.0, f64::max);
-    let floor = largest * d as f64 * f64::EPSILON;
-    let mut out = vec![vec![0.0; d]; d];
-    for (k, &value) in values.iter().enumerate().filter(|(_, v)| **v > floor) {
-        let scale = value.sqrt();
-        for i in 0..d {
-            let x = scale * vectors[i][k];
-            for (j, cell) in out[i].iter_mut().enumerate() {
-                *cell += x * vectors[j][k];
-            }
-        }
-    }
-    Some(out)
-}
-
-/// Eigenvalues (in no order) and unit eigenvectors (as columns), small ones beside large ones too.
-fn eigen_symmetric(mut a: Matrix) -> Option<(Vec<f64>, Matrix)> {
-    let d = a.len();
-    if a.iter().flatten().any(|x| !x.is_finite()) {
-        return None;
-    }
-    let mut v: Matrix = (0..d).map(|i| (0..d).map(|j| f64::from(u8::from(i == j))).collect()).collect();
-    diagonalise(&mut a, &mut v);
-    Some(((0..d).map(|i| a[i][i]).collect(), v))
-}
-
-/// Singular values by one-sided Jacobi rotations of the rows.
-fn singular_values(mut a: Matrix) -> Vec<f64> {
-    let d = a.len();
-    let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(a, b)| a * b).sum::<f64>();
-    for _ in 0..60 {
-        let mut turned = false;
-        for p in 0..d {
-            for q in p + 1..d {
-                let (above, below) = a.split_at_mut(q);
-                let (x, y) = (&mut above[p], &mut below[0]);
-                let (xx, yy, xy) = (dot(x, x), dot(y, y), dot(x, y));
-                if xy.abs() <= 1e-15 * (xx * yy).sqrt() || xy == 0.0 {
-                    continue;
-                }
-                turned = true;
-                let (c, s) = rotation(xx, yy, xy);
-                for (x, y) in x.iter_mut().zip(y.iter_mut()) {
-                    (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
-                }
-            }
-        }
-        if !turned {
-            break;
-        }
-    }
-    a.iter().map(|row| dot(row, row).sqrt()).collect()
+fn root(c: DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let floor = c.nrows() as f64 * f64::EPSILON;
+    let (values, v) = eigen_symmetric(c)?;
+    let floor = floor * values.max();
+    let scales = values.map(|x| if x > floor { x.sqrt() } else { 0.0 });
+    Some(&v * DMatrix::from_diagonal(&scales) * v.transpose())
 }
 
 #[cfg(test)]
@@ -152,7 +79,7 @@ mod tests {
         assert!((distance(&a, &moved).unwrap() - 7.0 * 0.25).abs() < 1e-4);
         let wider: Vec<Vec<f32>> = a.iter().map(|v| v.iter().map(|x| x * 3.0).collect()).collect();
         let (mean, c) = moments(&a.iter().map(Vec::as_slice).collect::<Vec<_>>(), 7);
-        let variance: f64 = (0..7).map(|i| c[i][i]).sum();
+        let variance = c.trace();
         let shift: f64 = mean.iter().map(|m| 4.0 * m * m).sum();
         assert!((distance(&a, &wider).unwrap() / (4.0 * variance + shift) - 1.0).abs() < 1e-5);
     }
@@ -178,10 +105,8 @@ mod tests {
         let a = set(60, 30, 9, 1.0, 0.0);
         let (_, c) = moments(&a.iter().map(Vec::as_slice).collect::<Vec<_>>(), 30);
         let r = root(c.clone()).unwrap();
-        let square = product(&r, &r);
-        let size = c[29][29];
-        assert!(c.iter().flatten().zip(square.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-12 * size));
-        let singular: f64 = singular_values(r).iter().sum();
+        assert!((&r * &r - &c).amax() < 1e-12 * c[(29, 29)]);
+        let singular = r.singular_values().sum();
         let eigen: f64 = eigen_symmetric(c).unwrap().0.iter().map(|v| v.max(0.0).sqrt()).sum();
         assert!((singular / eigen - 1.0).abs() < 1e-12);
     }

@@ -95,7 +95,7 @@ impl RefitShift {
     }
 }
 
-/// Statistics in the making: one pass over predictions and measurements, in any order and any number of parts.
+/// Statistics in the making: one pass over predictions and measurements.
 #[derive(Clone, Debug, Default)]
 pub struct ShiftFit {
     /// Raw predictions in metres (doubled mapping), at the decoder's size.
@@ -122,13 +122,6 @@ impl ShiftFit {
         self.measured.extend(measured.as_slice().iter().map(|&v| f64::from(v)));
         self.touches += 1;
         Ok(())
-    }
-
-    /// Adds another part: the same figures, bit for bit, in whatever order parts are merged.
-    pub fn merge(&mut self, other: &Self) {
-        self.predicted.merge(&other.predicted);
-        self.measured.merge(&other.measured);
-        self.touches += other.touches;
     }
 
     /// The statistics; `None` without a pixel on one of the sides.

@@ -1,8 +1,10 @@
 //! The error-against-time front: which engines are neither slower nor worse than another, and its picture.
 
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
 
-use super::canvas::{Anchor, Canvas, Colour, text_width};
+use super::canvas::{Drawing, Drawn, Paper};
 use super::registration::EngineRow;
 
 /// An engine as a point of the picture.
@@ -51,47 +53,14 @@ pub(super) fn pareto(mut points: Vec<FrontPoint>) -> Vec<FrontPoint> {
     points
 }
 
-const INK: Colour = [30, 34, 40];
-const FAINT: Colour = [222, 226, 230];
-const MUTED: Colour = [105, 112, 122];
-const OURS: Colour = [28, 100, 200];
-const PEER: Colour = [205, 95, 20];
-const FRONT: Colour = [60, 150, 90];
-const WIDTH: u32 = 1000;
-const HEIGHT: u32 = 620;
-const LEFT: f32 = 80.0;
-const RIGHT: f32 = 970.0;
-const TOP: f32 = 70.0;
-const BOTTOM: f32 = 540.0;
-/// Height of a capital letter.
-const LETTER: f32 = 9.5;
-
-/// Maps an engine's numbers to the picture.
-struct Axes {
-    low: f64,
-    high: f64,
-    most: f64,
-}
-
-impl Axes {
-    fn new(points: &[FrontPoint]) -> Self {
-        let fold = |f: fn(f64, f64) -> f64, start: f64| points.iter().map(|p| p.ms.max(1e-6)).fold(start, f);
-        let (low, high) = (fold(f64::min, f64::INFINITY).log10().floor(), fold(f64::max, 1e-6).log10().ceil());
-        let most = points.iter().map(|p| p.mean_deg.max(p.median_deg)).fold(0.0, f64::max);
-        let low = if low.is_finite() { low } else { -2.0 };
-        // Room on the right for the names of the slowest.
-        Self { low, high: high.max(low + 1.0) + 0.5, most: (most * 1.15).max(0.5) }
-    }
-
-    fn x(&self, ms: f64) -> f32 {
-        let share = (ms.max(1e-6).log10() - self.low) / (self.high - self.low);
-        LEFT + (RIGHT - LEFT) * share as f32
-    }
-
-    fn y(&self, deg: f64) -> f32 {
-        BOTTOM - (BOTTOM - TOP) * (deg / self.most) as f32
-    }
-}
+const INK: RGBColor = RGBColor(30, 34, 40);
+const FAINT: RGBColor = RGBColor(222, 226, 230);
+const MUTED: RGBColor = RGBColor(105, 112, 122);
+const OURS: RGBColor = RGBColor(28, 100, 200);
+const PEER: RGBColor = RGBColor(205, 95, 20);
+const FRONT: RGBColor = RGBColor(60, 150, 90);
+/// Height of the letters.
+const LETTERS: f64 = 13.5;
 
 /// What stands around the picture.
 pub(super) struct Axis<'a> {
@@ -100,134 +69,164 @@ pub(super) struct Axis<'a> {
     pub(super) time: &'a str,
     /// Behind the numbers of the axis of the error.
     pub(super) unit: &'a str,
-    /// The colours in words.
-    pub(super) legend: &'a [(Colour, &'a str)],
+    /// The colors in words.
+    pub(super) legend: &'a [(RGBColor, &'a str)],
 }
 
-/// The legend of [`draw`] where other projects' libraries are among the points.
-pub(super) const PEERS: [(Colour, &str); 2] = [(OURS, "this program"), (PEER, "peers (Python)")];
+/// The legend where other projects' libraries are among the points.
+pub(super) const PEERS: [(RGBColor, &str); 2] = [(OURS, "this program"), (PEER, "peers (Python)")];
 
 /// The picture: mean error (disc) and median error (ring) over the time on a logarithmic axis.
-pub(super) fn draw(axis: &Axis<'_>, points: &[FrontPoint], default: &str) -> Canvas {
-    let mut c = Canvas::new(WIDTH, HEIGHT);
-    let axes = Axes::new(points);
-    grid(&mut c, axis, &axes);
-
-    // The front is a staircase: what is reached when one may spend this much time.
-    let steps: Vec<[f32; 2]> =
-        points.iter().filter(|p| p.on_front).map(|p| [axes.x(p.ms), axes.y(p.mean_deg)]).collect();
-    for pair in steps.windows(2) {
-        c.line(pair[0], [pair[1][0], pair[0][1]], 2.0, FRONT);
-        c.line([pair[1][0], pair[0][1]], pair[1], 2.0, FRONT);
-    }
-    if let (Some(first), Some(last)) = (steps.first(), steps.last()) {
-        c.line([first[0], TOP], *first, 2.0, FRONT);
-        c.line(*last, [RIGHT, last[1]], 2.0, FRONT);
-    }
-
-    let mut taken: Vec<[f32; 4]> = Vec::new();
-    for p in points {
-        let (x, mean, median) = (axes.x(p.ms), axes.y(p.mean_deg), axes.y(p.median_deg));
-        taken.push([x - 7.0, mean - 7.0, x + 7.0, mean + 7.0]);
-        taken.push([x - 5.0, median - 5.0, x + 5.0, median + 5.0]);
-    }
-    // The staircase is in the way of labels, too.
-    for pair in steps.windows(2) {
-        taken.push([pair[0][0], pair[0][1] - 2.0, pair[1][0], pair[0][1] + 2.0]);
-        taken.push([pair[1][0] - 2.0, pair[0][1].min(pair[1][1]), pair[1][0] + 2.0, pair[0][1].max(pair[1][1])]);
-    }
-    if let (Some(first), Some(last)) = (steps.first(), steps.last()) {
-        taken.push([first[0] - 2.0, TOP, first[0] + 2.0, first[1]]);
-        taken.push([last[0], last[1] - 2.0, RIGHT, last[1] + 2.0]);
-    }
-    for p in points {
-        let colour = if p.peer { PEER } else { OURS };
-        let (x, mean, median) = (axes.x(p.ms), axes.y(p.mean_deg), axes.y(p.median_deg));
-        c.line([x, mean], [x, median], 1.0, colour);
-        c.disc([x, median], 4.5, colour);
-        c.disc([x, median], 3.0, [255; 3]);
-        if p.name == default {
-            c.disc([x, mean], 10.0, colour);
-            c.disc([x, mean], 8.0, [255; 3]);
-        }
-        c.disc([x, mean], 6.0, colour);
-    }
-    for p in points {
-        let colour = if p.peer { PEER } else { OURS };
-        let (x, mean) = (axes.x(p.ms), axes.y(p.mean_deg));
-        let label = if p.name == default { format!("{} (default)", p.name) } else { p.name.clone() };
-        let at = place(&label, [x, mean], &mut taken);
-        // A label that had to give way is joined to its point.
-        let (right, middle) = (at[0] > x, at[1] - 0.5 * LETTER);
-        if (middle - mean).abs() > 10.0 {
-            let end = if right { at[0] - 2.0 } else { at[0] + text_width(&label, LETTER) };
-            c.line([x, mean], [end, middle], 0.7, MUTED);
-        }
-        // White behind the letters, where lines of other engines pass.
-        let width = text_width(&label, LETTER);
-        c.line([at[0], middle], [at[0] + width - 3.0, middle], LETTER + 5.0, [255; 3]);
-        c.text(at, LETTER, Anchor::Start, colour, label);
-    }
-    c
+pub(super) struct Picture<'a> {
+    pub(super) axis: Axis<'a>,
+    pub(super) points: &'a [FrontPoint],
+    /// Name of the point that is marked.
+    pub(super) default: &'a str,
 }
 
-/// Where a label fits beside its point without covering what is there already; `taken` gains its box.
-fn place(label: &str, point: [f32; 2], taken: &mut Vec<[f32; 4]>) -> [f32; 2] {
-    let width = text_width(label, LETTER);
-    let candidates = (0..14).flat_map(|i| {
-        let shift = [0.0, -16.0, 16.0, -32.0, 32.0, -48.0, 48.0, -64.0, 64.0, -80.0, 80.0, -96.0, 96.0, -112.0][i];
-        let y = point[1] + 0.5 * LETTER + shift;
-        [[point[0] + 13.0, y], [point[0] - 13.0 - width, y]]
-    });
-    let frame = |at: [f32; 2]| [at[0] - 2.0, at[1] - LETTER - 3.0, at[0] + width + 2.0, at[1] + 4.0];
-    let fits = |at: &[f32; 2]| {
-        let [left, top, right, bottom] = frame(*at);
-        left > LEFT
-            && right < WIDTH as f32 - 4.0
-            && top > TOP - 20.0
-            && bottom < BOTTOM
-            && taken.iter().all(|t| right < t[0] || left > t[2] || bottom < t[1] || top > t[3])
-    };
-    let at = candidates.clone().find(fits).unwrap_or([point[0] + 13.0, point[1] + 0.5 * LETTER]);
-    taken.push(frame(at));
-    at
+impl Picture<'_> {
+    /// Ends of the axis of time, in decades, and of the axis of the error.
+    fn ends(&self) -> ([f64; 2], f64) {
+        let fold = |f: fn(f64, f64) -> f64, start: f64| self.points.iter().map(|p| p.ms.max(1e-6)).fold(start, f);
+        let (low, high) = (fold(f64::min, f64::INFINITY).log10().floor(), fold(f64::max, 1e-6).log10().ceil());
+        let most = self.points.iter().map(|p| p.mean_deg.max(p.median_deg)).fold(0.0, f64::max);
+        let low = if low.is_finite() { low } else { -2.0 };
+        // Room on the right for the names of the slowest.
+        ([low, high.max(low + 1.0) + 0.5], (most * 1.15).max(0.5))
+    }
+
+    /// The title and what the colors and marks mean, above the plot.
+    fn heading<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
+        paper.text([80.0, 16.0], &paper.letters(16.0, INK), self.axis.title)?;
+        let style = paper.letters(LETTERS, MUTED).pos(Pos::new(HPos::Left, VPos::Center));
+        let mut x = paper.px(80.0);
+        let marks = self.axis.legend.iter().map(|(color, text)| (Some(color), *text));
+        for (color, text) in marks.chain([(None, "disc: mean, ring: median, line: front of the means")]) {
+            if let Some(color) = color {
+                paper.area.draw(&Circle::new((x + paper.px(5.0), paper.px(50.0)), paper.wide(5.0), color.filled()))?;
+                x += paper.px(16.0);
+            }
+            paper.area.draw_text(text, &style, (x, paper.px(50.0)))?;
+            x += paper.area.estimate_text_size(text, &style)?.0 as i32 + paper.px(24.0);
+        }
+        Ok(())
+    }
 }
 
-fn grid(c: &mut Canvas, axis: &Axis<'_>, axes: &Axes) {
-    c.text([LEFT, 30.0], 11.0, Anchor::Start, INK, axis.title);
-    let mut x = LEFT;
-    for &(colour, text) in axis.legend {
-        c.disc([x + 5.0, 50.0], 5.0, colour);
-        c.text([x + 16.0, 54.0], LETTER, Anchor::Start, MUTED, text);
-        x += 40.0 + text_width(text, LETTER);
-    }
-    c.text([x, 54.0], LETTER, Anchor::Start, MUTED, "disc: mean, ring: median, line: front of the means");
-    let mut decade = axes.low;
-    while decade <= axes.high {
-        let ms = 10f64.powf(decade);
-        for step in 1..10 {
-            let x = axes.x(ms * f64::from(step));
-            if x <= RIGHT {
-                c.line([x, TOP], [x, BOTTOM], if step == 1 { 1.0 } else { 0.4 }, FAINT);
+impl Drawing for Picture<'_> {
+    const SIZE: [u32; 2] = [1000, 620];
+
+    fn draw<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
+        self.heading(paper)?;
+        let ([low, high], most) = self.ends();
+        let [left, right] = [low, high].map(|decade| 10f64.powf(decade));
+        let mut chart = ChartBuilder::on(paper.area)
+            .margin_top(paper.px(70.0))
+            .margin_right(paper.px(30.0))
+            .margin_bottom(paper.px(10.0))
+            .x_label_area_size(paper.px(60.0))
+            .y_label_area_size(paper.px(80.0))
+            .build_cartesian_2d((left..right).log_scale(), 0.0..most)?;
+        chart
+            .configure_mesh()
+            .bold_line_style(paper.stroke(FAINT, 1.0))
+            .light_line_style(paper.stroke(FAINT, 0.4))
+            .max_light_lines(10)
+            .axis_style(paper.stroke(INK, 1.5))
+            .label_style(paper.letters(LETTERS, INK))
+            .axis_desc_style(paper.letters(15.0, INK))
+            .x_desc(self.axis.time)
+            .y_desc("error")
+            .x_label_formatter(&|ms| format!("{ms}"))
+            .y_label_formatter(&|error| format!("{error:.1}{}", self.axis.unit))
+            .draw()?;
+
+        // The front is a staircase: what is reached when one may spend this much time.
+        let mut stairs: Vec<(f64, f64)> = Vec::new();
+        for p in self.points.iter().filter(|p| p.on_front) {
+            stairs.extend([(p.ms, stairs.last().map_or(most, |last| last.1)), (p.ms, p.mean_deg)]);
+        }
+        stairs.extend(stairs.last().map(|last| (right, last.1)));
+        chart.draw_series(LineSeries::new(stairs.iter().copied(), paper.stroke(FRONT, 2.0)))?;
+
+        let colored = || self.points.iter().map(|p| (p, if p.peer { PEER } else { OURS }));
+        for (p, color) in colored() {
+            let (mean, median) = ((p.ms, p.mean_deg), (p.ms, p.median_deg));
+            chart.draw_series([PathElement::new([mean, median], paper.stroke(color, 1.0))])?;
+            let mut discs = vec![(median, 4.5, color), (median, 3.0, WHITE), (mean, 6.0, color)];
+            if p.name == self.default {
+                discs.splice(2..2, [(mean, 10.0, color), (mean, 8.0, WHITE)]);
+            }
+            let disc = |(at, radius, color): (_, _, RGBColor)| Circle::new(at, paper.wide(radius), color.filled());
+            chart.draw_series(discs.into_iter().map(disc))?;
+        }
+
+        // What labels must not cover: the marks and the staircase.
+        let (x, y) = chart.plotting_area().get_pixel_range();
+        let mut labels =
+            Labels { plot: [x.start, y.start, x.end, y.end], unit: paper.px(1.0).max(1), taken: Vec::new() };
+        for p in self.points {
+            for (error, radius) in [(p.mean_deg, 7), (p.median_deg, 5)] {
+                let (x, y) = chart.backend_coord(&(p.ms, error));
+                labels.take((x, y), (x, y), radius);
             }
         }
-        c.text([axes.x(ms), BOTTOM + 20.0], LETTER, Anchor::Middle, INK, format!("{ms}"));
-        decade += 1.0;
+        for pair in stairs.windows(2) {
+            labels.take(chart.backend_coord(&pair[0]), chart.backend_coord(&pair[1]), 2);
+        }
+        for (p, color) in colored() {
+            let at = chart.backend_coord(&(p.ms, p.mean_deg));
+            let label = if p.name == self.default { format!("{} (default)", p.name) } else { p.name.clone() };
+            let style = paper.letters(LETTERS, color);
+            let (w, h) = paper.area.estimate_text_size(&label, &style)?;
+            let [left, top, right, bottom] = labels.place([w as i32, h as i32], at);
+            // A label that had to give way is joined to its point.
+            let middle = (top + bottom) / 2;
+            if (middle - at.1).abs() > paper.px(10.0) {
+                let end = if left > at.0 { left } else { right };
+                paper.area.draw(&PathElement::new([at, (end, middle)], paper.stroke(MUTED, 0.7)))?;
+            }
+            // White behind the letters, where lines of other engines pass.
+            paper.area.draw(&Rectangle::new([(left, top), (right, bottom)], WHITE.filled()))?;
+            paper.area.draw_text(&label, &style, (left, top))?;
+        }
+        Ok(())
     }
-    let step =
-        [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0].into_iter().find(|s| axes.most / s < 9.0).unwrap_or(100.0);
-    let mut deg = 0.0;
-    while deg <= axes.most {
-        let y = axes.y(deg);
-        c.line([LEFT, y], [RIGHT, y], 1.0, FAINT);
-        c.text([LEFT - 8.0, y + 0.5 * LETTER], LETTER, Anchor::End, INK, format!("{deg:.1}{}", axis.unit));
-        deg += step;
+}
+
+/// Finds places for labels beside their points; lengths in pixels, boxes as left, top, right, bottom.
+struct Labels {
+    plot: [i32; 4],
+    /// Pixels to a unit.
+    unit: i32,
+    taken: Vec<[i32; 4]>,
+}
+
+impl Labels {
+    /// Keeps the box of two corners clear, `margin` units around it.
+    fn take(&mut self, a: (i32, i32), b: (i32, i32), margin: i32) {
+        let m = margin * self.unit;
+        self.taken.push([a.0.min(b.0) - m, a.1.min(b.1) - m, a.0.max(b.0) + m, a.1.max(b.1) + m]);
     }
-    c.line([LEFT, TOP], [LEFT, BOTTOM], 1.5, INK);
-    c.line([LEFT, BOTTOM], [RIGHT, BOTTOM], 1.5, INK);
-    let middle = 0.5 * (LEFT + RIGHT);
-    c.text([middle, BOTTOM + 50.0], 10.5, Anchor::Middle, INK, axis.time);
-    c.text([12.0, TOP - 8.0], LETTER, Anchor::Start, INK, "error");
+
+    /// Where a label fits beside its point without covering what is there already.
+    fn place(&mut self, [w, h]: [i32; 2], point: (i32, i32)) -> [i32; 4] {
+        let (gap, step) = (13 * self.unit, 16 * self.unit);
+        let mut places = (0..14).flat_map(|i: i32| {
+            let top = point.1 - h / 2 + step * (i + 1) / 2 * if i % 2 == 1 { -1 } else { 1 };
+            [point.0 + gap, point.0 - gap - w].map(|left| [left, top, left + w, top + h])
+        });
+        let first = [point.0 + gap, point.1 - h / 2, point.0 + gap + w, point.1 - h / 2 + h];
+        let [left, top, right, bottom] = self.plot;
+        let at = places
+            .find(|b| {
+                let inside = b[0] > left && b[2] < right && b[1] > top && b[3] < bottom;
+                inside && self.taken.iter().all(|t| b[2] < t[0] || b[0] > t[2] || b[3] < t[1] || b[1] > t[3])
+            })
+            .unwrap_or(first);
+        self.taken.push(at);
+        at
+    }
 }
 
 #[cfg(test)]
@@ -253,15 +252,19 @@ mod tests {
 
     #[test]
     fn labels_do_not_cover_each_other() {
-        let mut taken = Vec::new();
-        let spots: Vec<[f32; 2]> = (0..5).map(|_| place("engine", [400.0, 300.0], &mut taken)).collect();
+        let mut labels = Labels { plot: [0, 0, 1000, 600], unit: 1, taken: Vec::new() };
+        let spots: Vec<[i32; 4]> = (0..5).map(|_| labels.place([50, 12], (400, 300))).collect();
         for (i, a) in spots.iter().enumerate() {
-            assert!(spots[..i].iter().all(|b| a != b), "{spots:?}");
+            let apart = |b: &[i32; 4]| a[2] < b[0] || a[0] > b[2] || a[3] < b[1] || a[1] > b[3];
+            assert!(spots[..i].iter().all(apart), "{spots:?}");
         }
-        let axis = Axis { title: "t", time: "ms", unit: " mm", legend: &PEERS };
-        let svg = draw(&axis, &pareto(vec![point("one", 0.1, 0.7), point("two", 200.0, 5.0)]), "one").svg();
-        assert!(svg.contains("one (default)") && svg.contains(">two<") && svg.contains("1.0 mm"));
+        let text = |points: &[FrontPoint]| {
+            let axis = Axis { title: "t", time: "ms", unit: " mm", legend: &PEERS };
+            super::super::canvas::svg(&Picture { axis, points, default: "one" }).unwrap()
+        };
+        let svg = text(&pareto(vec![point("one", 0.1, 0.7), point("two", 200.0, 5.0)]));
+        assert!(svg.contains("one (default)") && svg.contains("\ntwo\n") && svg.contains("1.0 mm"), "{svg}");
         // No engine at all is a picture, too.
-        assert!(draw(&axis, &[], "one").svg().contains("</svg>"));
+        assert!(text(&[]).contains("</svg>"));
     }
 }

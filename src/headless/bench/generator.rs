@@ -5,6 +5,7 @@ mod timing;
 
 use std::path::PathBuf;
 
+use anyhow::Context as _;
 use clap::Args;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
@@ -12,8 +13,9 @@ use strum::IntoEnumIterator as _;
 use self::cases::{Case, Judge, Score};
 use self::timing::{First, Overhead, timed_run};
 use super::Machine;
+use super::canvas;
 use super::figures::quantile;
-use super::front::{self, Axis, FrontPoint};
+use super::front::{self, Axis, FrontPoint, Picture};
 use crate::domain::diffusion::{GenerateConfig, Sampler, Spacing};
 use crate::domain::metrics::AngleSummary;
 use crate::headless::{Common, Output, VerbResult};
@@ -336,11 +338,8 @@ fn points(rows: &[Row], error: impl Fn(&Row) -> Option<(f64, f64)>) -> Vec<Front
 }
 
 fn write(file: &std::path::Path, report: &Report) -> anyhow::Result<()> {
-    let failed = |path: &std::path::Path| {
-        let path = path.display().to_string();
-        move |err: std::io::Error| anyhow::anyhow!("cannot write {path}: {err}")
-    };
-    atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes()).map_err(failed(file))?;
+    atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
+        .with_context(|| format!("cannot write {}", file.display()))?;
     let engine = report.first.first().map_or("", |first| first.engine.label());
     let default = name(&report.defaults, EngineKind::Rten, false);
     for (what, unit, points, suffix) in [
@@ -354,11 +353,9 @@ fn write(file: &std::path::Path, report: &Report) -> anyhow::Result<()> {
             unit,
             legend: &[],
         };
-        let picture = front::draw(&axis, points, &default);
+        let picture = Picture { axis, points, default: &default };
         let stem = file.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-        let svg = file.with_file_name(format!("{stem}{suffix}.svg"));
-        atomic::write_bytes(&svg, picture.svg().as_bytes()).map_err(failed(&svg))?;
-        crate::io::images::write_rgb8(&svg.with_extension("png"), &picture.pixels(1.5))?;
+        canvas::write(&picture, &file.with_file_name(format!("{stem}{suffix}.svg")))?;
     }
     Ok(())
 }

@@ -4,13 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use anyhow::Context as _;
 use clap::{Args, ValueEnum};
 use glam::DVec3;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
+use super::canvas;
 use super::figures::{Outcome, Summary, quantile};
-use super::front::{self, Axis, FrontPoint};
+use super::front::{self, Axis, FrontPoint, Picture};
 use super::{Machine, peers};
 use crate::domain::align::{AlignError, AlignReport, DistanceField};
 use crate::domain::frames::PlanarPose;
@@ -361,11 +363,8 @@ pub(super) fn position_error_mm(estimated: PlanarPose, truth: PlanarPose) -> f64
 }
 
 fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
-    let failed = |path: &Path| {
-        let path = path.display().to_string();
-        move |err: std::io::Error| anyhow::anyhow!("cannot write {path}: {err}")
-    };
-    atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes()).map_err(failed(file))?;
+    atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
+        .with_context(|| format!("cannot write {}", file.display()))?;
     let title = format!(
         "Registration: error against time, {} cases, one thread ({})",
         report.cases.len(),
@@ -377,11 +376,8 @@ fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
         "points to pose: time, median over the cases, ms"
     };
     let axis = Axis { title: &title, time: axis, unit: "°", legend: &front::PEERS };
-    let picture = front::draw(&axis, &report.front, &report.default);
-    let svg = file.with_extension("svg");
-    atomic::write_bytes(&svg, picture.svg().as_bytes()).map_err(failed(&svg))?;
-    crate::io::images::write_rgb8(&file.with_extension("png"), &picture.pixels(1.5))?;
-    Ok(())
+    let picture = Picture { axis, points: &report.front, default: &report.default };
+    canvas::write(&picture, &file.with_extension("svg"))
 }
 
 fn text(report: &Report) -> String {

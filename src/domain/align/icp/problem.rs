@@ -3,6 +3,7 @@
 use std::num::NonZero;
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
+use nalgebra::{Matrix3, Matrix6, Vector6};
 
 use super::IcpConfig;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -12,7 +13,7 @@ use super::samples::{Matcher, Samples};
 use crate::domain::align::closed_form::closest_rotation;
 use crate::domain::align::{ANGLE_SCALE_M, Fate};
 use crate::domain::frames::PlanarPose;
-use crate::domain::linear::{Matrix, eigen_symmetric, solve_symmetric};
+use crate::domain::linear::{eigen_symmetric, solve_symmetric};
 use crate::domain::mesh::MeshDistance;
 use crate::domain::tool::ToolModel;
 
@@ -270,8 +271,8 @@ impl<'a> Problem<'a> {
     }
 
     fn damped_step(&self, state: State, damping: f64, anchor: State) -> Option<[f64; 6]> {
-        let mut h: Matrix<6> = [[0.0; 6]; 6];
-        let mut g = [0.0; 6];
+        let mut h = Matrix6::<f64>::zeros();
+        let mut g = Vector6::<f64>::zeros();
         let mut weight = 0.0;
         for pair in self.pairs.iter().filter(|p| p.weight > 0.0) {
             weight += pair.weight;
@@ -288,8 +289,8 @@ impl<'a> Problem<'a> {
             for (i, slope) in slopes.iter().enumerate() {
                 let weighed = pair.weight * (pair.precision * *slope);
                 g[i] += pair.weight * slope.dot(pull);
-                for (cell, other) in h[i].iter_mut().zip(&slopes[..=i]) {
-                    *cell += weighed.dot(*other);
+                for (j, other) in slopes[..=i].iter().enumerate() {
+                    h[(i, j)] += weighed.dot(*other);
                 }
             }
         }
@@ -297,10 +298,10 @@ impl<'a> Problem<'a> {
         let stiffness = self.config.anchor * self.pairs.len() as f64;
         for i in 0..6 {
             // The same in all directions: one without slope gets no step instead of an arbitrary one.
-            h[i][i] += damping * weight.max(1e-12) + stiffness;
+            h[(i, i)] += damping * weight.max(1e-12) + stiffness;
             g[i] = -(g[i] + stiffness * away[i]);
         }
-        solve_symmetric(&h, &g, self.config.dof.free())
+        solve_symmetric(h, g, self.config.dof.free()).map(Into::into)
     }
 
     /// Weighted means of the contacts (from their centroid) and of their model points.
@@ -381,16 +382,9 @@ fn normals(points: &[DVec3], cloud: &[DVec3]) -> Vec<DVec3> {
         .map(|p| {
             let near = tree.query(&p.to_array()).nearest_n::<SquaredEuclidean<f64>>(NEIGHBOURS).execute();
             let mean = near.iter().map(|n| cloud[n.item as usize]).sum::<DVec3>() / near.len().max(1) as f64;
-            let mut spread = [[0.0; 3]; 3];
-            for n in &near {
-                let d = (cloud[n.item as usize] - mean).to_array();
-                for (row, a) in spread.iter_mut().zip(d) {
-                    for (cell, b) in row.iter_mut().zip(d) {
-                        *cell += a * b;
-                    }
-                }
-            }
-            eigen_symmetric(spread).map_or(DVec3::ZERO, |(_, vectors)| DVec3::from_array(vectors[0]))
+            let spread: DMat3 = near.iter().map(|n| outer(cloud[n.item as usize] - mean)).sum();
+            let found = eigen_symmetric(Matrix3::from(spread.to_cols_array_2d()));
+            found.map_or(DVec3::ZERO, |(_, vectors)| DVec3::from_array(vectors.column(0).into()))
         })
         .collect()
 }

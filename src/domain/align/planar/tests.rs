@@ -208,9 +208,6 @@ fn recording_changes_nothing_and_tells_the_whole_way() {
     assert_eq!(recorded.start, config.starts[recorded.winner]);
     let winner = &recorded.runs[recorded.winner];
     assert!(recorded.runs.iter().all(|r| r.cost_m2 >= winner.cost_m2));
-    if let Some(other) = recorded.runner_up() {
-        assert!(errors(other.end, recorded.grasp_from_object) > (0.1, 0.0));
-    }
 }
 
 /// A cross with a share of the points in a blob beside it, which no pose explains.
