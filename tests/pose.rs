@@ -8,8 +8,8 @@ use touch2touch::domain::align::{AlignConfig, AlignReport, DistanceField, align}
 use touch2touch::domain::contact::{LAB_CAD_DISTANCE_M, cad_signed_distance};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
-use touch2touch::domain::pose::{Engine, FingerInput, ToolModel, contact_cloud, estimate, fingers_of};
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::pose::{Engine, FingerInput, Fingers, ToolModel, contact_cloud, estimate, fingers_of};
+use touch2touch::domain::rig::{PerPad, Rig};
 use touch2touch::domain::units::angle_error;
 use touch2touch::io::cases::CaseSet;
 use touch2touch::io::dataset::Dataset;
@@ -56,7 +56,8 @@ fn forty_known_grasps_with_spoilt_masks() {
         let every = if matches!(engine, Engine::DistanceField | Engine::LabIcp) { 1 } else { 4 };
         for (name, case) in set.cases.iter().step_by(every) {
             let tool = &tools[&case.tool];
-            let fingers = [0, 1].map(|f| {
+            let fingers = Fingers::new(&Rig::lab(), |pad| {
+                let f = pad.index();
                 Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&case.masks[f]) })
             });
             let begin = Instant::now();
@@ -121,7 +122,8 @@ fn the_fast_answer_costs_what_the_proved_one_does() {
         set.tools.iter().map(|(number, mesh)| (*number, DistanceField::from_mesh(mesh).unwrap())).collect();
     let mut lookups = Vec::new();
     for (name, case) in &set.cases {
-        let fingers = [0, 1].map(|f| {
+        let fingers = Fingers::new(&Rig::lab(), |pad| {
+            let f = pad.index();
             Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&case.masks[f]) })
         });
         let points = contact_cloud(&fingers).unwrap().yz();
@@ -146,14 +148,15 @@ fn the_labs_files_with_the_mask_from_the_cad_give_the_stored_angle() {
         let sample = dataset.load(PairId(i as u32)).unwrap();
         let truth = sample.grasp_from_object.unwrap();
         let tool = ToolModel::new(dataset.tool_mesh(entry.tool.as_ref().unwrap()).unwrap().unwrap()).unwrap();
-        let masks: [Option<Mask>; 2] = Finger::BOTH.map(|finger| {
-            let bubble = sample.finger(finger)?.bubble.as_ref()?;
+        let masks = sample.rig.pads().map(|finger| {
+            let bubble = sample.pad(finger)?.depth()?;
             let camera = bubble.camera.as_ref()?;
             let mask =
                 cad_signed_distance(&bubble.imprint, camera, &tool.distance, truth.inverse(), LAB_CAD_DISTANCE_M);
             Some(mask.unwrap())
         });
-        let fingers = fingers_of(&sample, [masks[0].as_ref(), masks[1].as_ref()]);
+        let masks: PerPad<Mask> = masks.collect();
+        let fingers = fingers_of(&sample, &masks.as_ref());
         let pose = estimate(&fingers, &tool, Engine::DistanceField, false).unwrap();
         let error = angle_error(pose.object_from_grasp.theta_rad, truth.inverse().theta_rad).to_degrees();
         eprintln!(

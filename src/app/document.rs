@@ -10,7 +10,7 @@ use super::error::TaskError;
 use super::keys::{ImprintSource, Revision};
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, PerPad};
 
 /// How far the review of a pair is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
@@ -75,8 +75,8 @@ pub struct HandMask {
 /// What a person said about one pair.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairLabels {
-    /// Corrected masks by [`Finger::index`].
-    pub masks: [Option<HandMask>; 2],
+    /// Corrected masks.
+    pub masks: PerPad<HandMask>,
     /// The review state.
     pub review: Review,
     /// Accepted `grasp_from_object` poses: from the measured, from the predicted imprint.
@@ -127,7 +127,7 @@ pub struct Stroke {
     /// The pair's name.
     pub pair: String,
     /// The finger.
-    pub finger: Finger,
+    pub finger: PadId,
     /// Whether it adds or removes.
     pub value: bool,
     /// Radius, image pixels.
@@ -147,8 +147,8 @@ impl Document {
     }
 
     /// The corrected mask of one finger.
-    pub fn hand_mask(&self, name: &str, finger: Finger) -> Option<&HandMask> {
-        self.labels.get(name)?.masks[finger.index()].as_ref()
+    pub fn hand_mask(&self, name: &str, finger: PadId) -> Option<&HandMask> {
+        self.labels.get(name)?.masks[finger].as_ref()
     }
 
     /// The review state of a pair.

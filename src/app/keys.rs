@@ -13,7 +13,7 @@ use crate::domain::align::basin::Plane;
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::frames::PlanarPose;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, PerPad};
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -30,7 +30,7 @@ pub struct PairKey {
 
 impl PairKey {
     /// One finger of this pair.
-    pub fn finger(self, finger: Finger) -> TouchKey {
+    pub fn finger(self, finger: PadId) -> TouchKey {
         TouchKey { pair: self, finger }
     }
 }
@@ -41,7 +41,7 @@ pub struct TouchKey {
     /// The pair.
     pub pair: PairKey,
     /// The finger.
-    pub finger: Finger,
+    pub finger: PadId,
 }
 
 /// A float that compares and hashes by its bits.
@@ -199,11 +199,11 @@ pub enum MaskVersion {
     Hand(Revision),
 }
 
-/// A cloud of both fingers: imprint and (where one can be had) mask of each finger, by [`Finger::index`].
+/// A cloud of both fingers: imprint and (where one can be had) mask of each finger.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CloudKey {
     /// Per finger.
-    pub parts: [Option<(ImprintKey, Option<MaskVersion>)>; 2],
+    pub parts: PerPad<(ImprintKey, Option<MaskVersion>)>,
 }
 
 pub use crate::domain::pose::Engine as PoseEngine;

@@ -20,8 +20,8 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::metrics::Split;
 use crate::domain::postprocess::{ChainReading, Ledger};
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{Sample, Scale};
-use crate::domain::sensor::Finger;
 
 /// Values by recipe; the least recently used go first when the budget is exceeded.
 ///
@@ -182,8 +182,8 @@ pub struct LedgerResult {
 /// The surface points of both fingers in the grasp frame.
 #[derive(Clone, Debug, Default)]
 pub struct Clouds {
-    /// By [`Finger::index`].
-    pub fingers: [Option<FingerCloud>; 2],
+    /// Per finger.
+    pub fingers: PerPad<FingerCloud>,
 }
 
 /// The surface points of one finger, one per pixel with a measurement, row by row.
@@ -199,8 +199,8 @@ pub struct FingerCloud {
 
 impl Clouds {
     /// The cloud of one finger.
-    pub fn finger(&self, finger: Finger) -> Option<&FingerCloud> {
-        self.fingers[finger.index()].as_ref()
+    pub fn finger(&self, finger: PadId) -> Option<&FingerCloud> {
+        self.fingers[finger].as_ref()
     }
 
     /// The contact points of both fingers, right first: what is registered.
@@ -263,12 +263,12 @@ impl PoseResult {
 pub struct LayerResult {
     /// The registered pose that they are of, `grasp_from_object`.
     pub grasp_from_object: PlanarPose,
-    /// The reason of every pixel, by [`Finger::index`].
-    pub reasons: [Option<Grid<Reason>>; 2],
-    /// Residual (metres) and weight of every contact point, by [`Finger::index`], in the order of the cloud.
-    pub fits: [Vec<PointFit>; 2],
-    /// Pixels per reason, by [`Finger::index`].
-    pub counts: [ReasonCounts; 2],
+    /// The reason of every pixel.
+    pub reasons: PerPad<Grid<Reason>>,
+    /// Residual (metres) and weight of every contact point, in the order of the cloud.
+    pub fits: PerPad<Vec<PointFit>>,
+    /// Pixels per reason.
+    pub counts: PerPad<ReasonCounts>,
     /// Residuals of the contact points of both fingers by size: shares of [`LayerResult::range_m`].
     pub histogram: Vec<u32>,
     /// Contact points with a larger residual than the range.
@@ -283,12 +283,12 @@ pub struct LayerResult {
 
 impl LayerResult {
     /// Residual, weight and reason at a raw bubble pixel; the fit only where the pixel is a contact point.
-    pub fn at(&self, finger: Finger, cloud: &FingerCloud, pixel: [u16; 2]) -> Option<(Reason, Option<PointFit>)> {
+    pub fn at(&self, finger: PadId, cloud: &FingerCloud, pixel: [u16; 2]) -> Option<(Reason, Option<PointFit>)> {
         let (x, y) = (usize::from(pixel[0]), usize::from(pixel[1]));
-        let reason = *self.reasons[finger.index()].as_ref()?.get(x, y)?;
+        let reason = *self.reasons[finger].as_ref()?.get(x, y)?;
         let fit = cloud.at_pixel(x, y).filter(|at| cloud.contact.get(*at) == Some(&true)).and_then(|at| {
             let before = cloud.contact[..at].iter().filter(|c| **c).count();
-            self.fits[finger.index()].get(before).copied()
+            self.fits[finger].as_ref()?.get(before).copied()
         });
         Some((reason, fit))
     }
@@ -296,7 +296,7 @@ impl LayerResult {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let pixels: usize = self.reasons.iter().flatten().map(Grid::len).sum();
-        pixels + self.fits.iter().map(|f| f.len() * size_of::<PointFit>()).sum::<usize>() + size_of::<Self>()
+        pixels + self.fits.iter().flatten().map(|f| f.len() * size_of::<PointFit>()).sum::<usize>() + size_of::<Self>()
     }
 }
 
@@ -444,7 +444,7 @@ mod tests {
         };
         assert_eq!(cloud.at_pixel(3, 2), Some(2));
         assert_eq!(cloud.at_pixel(2, 2), None);
-        let clouds = Clouds { fingers: [None, Some(cloud)] };
+        let clouds = Clouds { fingers: [None, Some(cloud)].into() };
         assert_eq!(clouds.contact_points().len(), 2);
     }
 }

@@ -22,6 +22,7 @@ use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::pose::ToolModel;
 use crate::domain::postprocess::{DepthChain, RawPrediction};
+use crate::domain::rig::Rig;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
@@ -35,6 +36,10 @@ pub trait DataSource: Send + Sync {
     /// The same as the command line sees it, for work on all of its pairs; `None` where there is no such thing.
     fn as_dataset(&self) -> Option<&Dataset> {
         None
+    }
+    /// The sensors that its touches were felt with.
+    fn rig(&self) -> Arc<Rig> {
+        Rig::lab()
     }
     /// All pairs.
     fn index(&self) -> &Index;

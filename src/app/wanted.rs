@@ -16,10 +16,9 @@ use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use super::workbench::PoseOf;
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, PerPad};
+use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use crate::domain::units;
-use strum::IntoEnumIterator as _;
 
 /// Neighbours loaded ahead on each side of the selection.
 pub const PREFETCH: usize = 4;
@@ -51,22 +50,22 @@ impl State {
     }
 
     /// What one finger felt.
-    pub fn touch(&self, finger: Finger) -> Lookup<'_, FingerTouch> {
-        self.sample().and_then(Absent::NoFinger, |sample| sample.finger(finger))
+    pub fn touch(&self, finger: PadId) -> Lookup<'_, PadTouch> {
+        self.sample().and_then(Absent::NoFinger, |sample| sample.pad(finger))
     }
 
     /// What one GelSlim felt.
-    pub fn gelslim(&self, finger: Finger) -> Lookup<'_, GelSlimTouch> {
-        self.touch(finger).and_then(Absent::NoGelSlim, |touch| touch.gelslim.as_ref())
+    pub fn gelslim(&self, finger: PadId) -> Lookup<'_, ColorTouch> {
+        self.touch(finger).and_then(Absent::NoGelSlim, |touch| touch.color())
     }
 
     /// What one Soft Bubble felt.
-    pub fn bubble(&self, finger: Finger) -> Lookup<'_, BubbleTouch> {
-        self.touch(finger).and_then(Absent::NoBubble, |touch| touch.bubble.as_ref())
+    pub fn bubble(&self, finger: PadId) -> Lookup<'_, DepthTouch> {
+        self.touch(finger).and_then(Absent::NoBubble, |touch| touch.depth())
     }
 
     /// The prediction shown for one finger, if one was made.
-    pub fn chosen(&self, finger: Finger) -> Option<&Recipe> {
+    pub fn chosen(&self, finger: PadId) -> Option<&Recipe> {
         self.results.chosen.get(&self.touch_key(finger)?)
     }
 
@@ -74,7 +73,7 @@ impl State {
     ///
     /// # Errors
     /// Why there is none.
-    pub fn imprint_key(&self, source: ImprintSource, finger: Finger) -> Result<ImprintKey, Absent> {
+    pub fn imprint_key(&self, source: ImprintSource, finger: PadId) -> Result<ImprintKey, Absent> {
         let touch = self.touch_key(finger).ok_or(Absent::NothingSelected)?;
         match source {
             ImprintSource::Measured => Ok(ImprintKey::Measured(touch)),
@@ -86,7 +85,7 @@ impl State {
     }
 
     /// The imprint shown for one finger, metres, raw bubble orientation.
-    pub fn imprint(&self, source: ImprintSource, finger: Finger) -> Lookup<'_, DepthMap> {
+    pub fn imprint(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
         match self.imprint_key(source, finger) {
             Err(absent) => Lookup::Absent(absent),
             Ok(ImprintKey::Measured(_)) => self.bubble(finger).and_then(Absent::NoBubble, |b| Some(&b.imprint)),
@@ -98,7 +97,7 @@ impl State {
     }
 
     /// Prediction against measurement of one finger.
-    pub fn comparison(&self, finger: Finger) -> Lookup<'_, Comparison> {
+    pub fn comparison(&self, finger: PadId) -> Lookup<'_, Comparison> {
         let recipe = match self.chosen(finger) {
             Some(recipe) => recipe.clone(),
             None => return self.sample().and_then(Absent::NoPrediction, |_| None),
@@ -141,15 +140,15 @@ impl State {
         let Some(sample) = self.sample().ready() else {
             return Ok(());
         };
-        let has = |finger: Finger| sample.finger(finger).is_some_and(|t| t.gelslim.is_some());
-        if Finger::BOTH.into_iter().any(has) { Ok(()) } else { Err(Absent::NoGelSlim) }
+        let has = |finger: PadId| sample.pad(finger).is_some_and(|t| t.color().is_some());
+        if sample.rig.pads().any(has) { Ok(()) } else { Err(Absent::NoGelSlim) }
     }
 
     /// The recipe of the automatic mask that the settings ask for.
     ///
     /// # Errors
     /// Why this source cannot give one for this finger.
-    pub fn mask_recipe(&self, finger: Finger) -> Result<MaskRecipe, Absent> {
+    pub fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
         let mask = &self.settings.mask;
         match mask.source {
             MaskSource::Threshold => Ok(MaskRecipe::Threshold(mask.threshold_m.into())),
@@ -170,7 +169,7 @@ impl State {
                 .bundle(BundleKind::Mask)
                 .map_or(MaskRecipe::Threshold(mask.threshold_m.into()), |bundle| MaskRecipe::Unet(bundle.id.clone()))),
             MaskSource::Truth => {
-                if self.touch(finger).ready().is_some_and(|t| t.bubble.as_ref().is_none_or(|b| b.truth.is_none())) {
+                if self.touch(finger).ready().is_some_and(|t| t.depth().is_none_or(|b| b.truth.is_none())) {
                     return Err(Absent::NotSimulated);
                 }
                 Ok(MaskRecipe::Truth)
@@ -179,7 +178,7 @@ impl State {
     }
 
     /// The automatic mask of one finger's imprint.
-    pub fn automatic_mask(&self, source: ImprintSource, finger: Finger) -> Lookup<'_, Arc<Mask>> {
+    pub fn automatic_mask(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, Arc<Mask>> {
         if self.imprint(source, finger).ready().is_none() {
             return self.imprint(source, finger).without();
         }
@@ -196,7 +195,7 @@ impl State {
     }
 
     /// The corrected mask of one finger, if it is there and as large as the imprint.
-    fn hand_mask_for(&self, source: ImprintSource, finger: Finger) -> Option<&super::document::HandMask> {
+    fn hand_mask_for(&self, source: ImprintSource, finger: PadId) -> Option<&super::document::HandMask> {
         let hand = self.document.hand_mask(self.pair_name(), finger)?;
         let imprint = self.imprint(source, finger).ready()?;
         (hand.mask.size() == imprint.size()).then_some(hand)
@@ -209,7 +208,7 @@ impl State {
     pub fn mask_in_force(
         &self,
         source: ImprintSource,
-        finger: Finger,
+        finger: PadId,
     ) -> Result<MaskInForce<'_>, Lookup<'_, Arc<Mask>>> {
         if let Some(hand) = self.hand_mask_for(source, finger) {
             let label = if hand.base.is_empty() { "By hand".into() } else { format!("By hand, from {}", hand.base) };
@@ -273,14 +272,11 @@ impl State {
             Lookup::Absent(absent) => return Err(absent),
             _ => return Ok(None),
         };
-        let mut parts = [None, None];
+        let mut parts = PerPad::default();
         let mut reason = Absent::NoBubble;
-        for finger in Finger::BOTH {
-            let Some(touch) = sample.finger(finger) else {
-                continue;
-            };
+        for (finger, touch) in sample.pads.entries() {
             if touch.camera().is_none() {
-                if touch.bubble.is_some() || source == ImprintSource::Predicted {
+                if touch.depth().is_some() || source == ImprintSource::Predicted {
                     reason = Absent::NoCamera;
                 }
                 continue;
@@ -303,9 +299,9 @@ impl State {
                 Err(Lookup::Failed(_) | Lookup::Absent(_)) => None,
                 Err(_) => return Ok(None),
             };
-            parts[finger.index()] = Some((key, version));
+            parts[finger] = Some((key, version));
         }
-        if parts.iter().all(Option::is_none) { Err(reason) } else { Ok(Some(CloudKey { parts })) }
+        if parts.is_empty() { Err(reason) } else { Ok(Some(CloudKey { parts })) }
     }
 
     /// The surface points of an imprint, both fingers.
@@ -330,7 +326,7 @@ impl State {
             return Ok(None);
         };
         if cloud.parts.iter().flatten().all(|(_, mask)| mask.is_none()) {
-            return Err(Finger::BOTH.into_iter().find_map(|f| self.mask_recipe(f).err()).unwrap_or(Absent::NoContact));
+            return Err(self.rig().pads().find_map(|f| self.mask_recipe(f).err()).unwrap_or(Absent::NoContact));
         }
         Ok(Some(PoseKey { cloud, tool: tool?.into(), engine: self.settings.pose_engine }))
     }
@@ -463,8 +459,8 @@ impl Wanted<'_> {
         let (scene_measured, cloud_measured) = state.shows_cloud(measured);
         let (scene_predicted, cloud_predicted) = state.shows_cloud(predicted);
 
-        let shown = state.selection.fingers();
-        for finger in Finger::BOTH {
+        let shown = state.fingers();
+        for finger in state.rig().pads() {
             let on_screen = shown.contains(&finger);
             let image = state.is_visible(&[Pane::Predicted]) && on_screen;
             let compared = state.is_visible(&[Pane::Error, Pane::Metrics]) && on_screen;
@@ -507,7 +503,7 @@ impl Wanted<'_> {
     }
 
     /// What was made of a touch before this start of the program.
-    fn stored(&mut self, finger: Finger, touch: TouchKey) {
+    fn stored(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
         if state.gelslim(finger).ready().is_some() && state.bundle(BundleKind::Generator).is_ok() {
             self.ask(state.results.looked_up.contains(&touch), Request::Stored(touch));
@@ -515,10 +511,13 @@ impl Wanted<'_> {
     }
 
     /// The prediction of a finger that nobody looked at when the other one's was made.
-    fn other_finger(&mut self, finger: Finger) {
+    fn other_finger(&mut self, finger: PadId) {
         let state = self.state;
-        let other = if finger == Finger::Right { Finger::Left } else { Finger::Right };
-        let (Some(touch), Some(made)) = (state.touch_key(finger), state.chosen(other)) else { return };
+        let others = state.rig().pads().filter(|pad| *pad != finger);
+        let (Some(touch), Some(made)) = (state.touch_key(finger), others.filter_map(|pad| state.chosen(pad)).next())
+        else {
+            return;
+        };
         let looked_up = state.results.looked_up.contains(&touch);
         if !state.settings.generate.both_fingers || !looked_up || state.chosen(finger).is_some() {
             return;
@@ -530,7 +529,7 @@ impl Wanted<'_> {
         }
     }
 
-    fn imprint(&mut self, finger: Finger, touch: TouchKey) {
+    fn imprint(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
         let Some(recipe) = state.results.chosen.get(&touch) else {
             return;
@@ -543,7 +542,7 @@ impl Wanted<'_> {
         self.ask(state.results.imprints.contains(&key), Request::Imprint(key.0, key.1));
     }
 
-    fn comparison(&mut self, finger: Finger, touch: TouchKey) {
+    fn comparison(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
         let Some(recipe) = state.results.chosen.get(&touch) else {
             return;
@@ -555,7 +554,7 @@ impl Wanted<'_> {
         }
     }
 
-    fn mask(&mut self, source: ImprintSource, finger: Finger) {
+    fn mask(&mut self, source: ImprintSource, finger: PadId) {
         let state = self.state;
         // Stored corrections first: they may make the automatic mask unnecessary.
         if !state.document.stored.contains_key(state.pair_name())
@@ -632,7 +631,9 @@ impl Wanted<'_> {
             return;
         }
         if state.is_visible(&[Pane::Poses]) {
-            for key in PoseOf::iter().filter_map(|of| state.pose_key_of(source, of).ok().flatten()) {
+            for key in
+                PoseOf::all(&state.rig()).into_iter().filter_map(|of| state.pose_key_of(source, of).ok().flatten())
+            {
                 if state.results.clouds.contains(&key.cloud) {
                     self.ask(state.results.poses.contains(&key), Request::Pose(key));
                 } else {

@@ -15,5 +15,5 @@ pub use frechet::frechet_distance;
 pub use image::{MetricError, Psnr, PsnrMean, mse, psnr, psnr_of_mse, unit_range};
 pub use joint::{Joint, Line, line};
 pub use mask::MaskScore;
-pub use split::{Figures, Split, footprint_mask, split};
+pub use split::{Figures, Split, split};
 pub use ssim::{Ssim, SsimRange, ssim, ssim_ranges};

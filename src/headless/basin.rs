@@ -15,8 +15,7 @@ use crate::domain::align::Run;
 use crate::domain::align::basin::{Basin, BasinConfig, Plane};
 use crate::domain::frames::PlanarPose;
 use crate::domain::inspect::basin_map;
-use crate::domain::pose::{Engine, FingerInput, contact_cloud, register};
-use crate::domain::sensor::Finger;
+use crate::domain::pose::{Engine, FingerInput, Fingers, contact_cloud, register};
 use crate::domain::units::{angle_error, fixed, mm, wrap_angle};
 
 /// Arguments of `basin`.
@@ -102,15 +101,11 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let tool = pose::tool_model(&dataset, name)?;
     let mut predictor = Predictor::new(&args.model);
     let predicted = args.imprint == Imprint::Predicted;
-    let imprints = if predicted {
-        predictor.imprints(&sample)?
-    } else {
-        Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
-    };
+    let imprints = if predicted { predictor.imprints(&sample)? } else { pose::measured(&sample) };
     let (mask, masks) = pose::masks(&args.mask, &sample, &tool, &imprints, predicted, &mut predictor)?;
-    let fingers = Finger::BOTH.map(|f| {
-        let camera = sample.finger(f)?.camera()?;
-        Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
+    let fingers = Fingers::new(&sample.rig, |f| {
+        let camera = sample.pad(f)?.camera()?;
+        Some(FingerInput { imprint: imprints[f].as_ref()?, camera, mask: masks[f].as_ref() })
     });
     let cloud = contact_cloud(&fingers)?;
     // What keeps every start from an answer keeps the registration itself from one, and is said once.

@@ -9,7 +9,7 @@ use crate::domain::contact::LAB_CAD_DISTANCE_M;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::pose::ToolModel;
-use crate::domain::sample::FingerTouch;
+use crate::domain::sample::PadTouch;
 
 /// Where masks come from.
 #[derive(Debug, Clone, Copy, Args)]
@@ -59,7 +59,7 @@ pub(super) fn contact_mask(
     source: MaskFrom,
     args: &MaskArgs,
     imprint: &DepthMap,
-    touch: &FingerTouch,
+    touch: &PadTouch,
     tool: Option<&ToolModel>,
     truth: Option<PlanarPose>,
     predictor: &mut Predictor,

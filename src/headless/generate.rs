@@ -1,9 +1,11 @@
 //! `touch2touch generate`: predicted imprints of a whole dataset, beside the measured ones.
 
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde::Serialize;
 
 use super::predict::{ModelArgs, Predictor};
@@ -13,9 +15,9 @@ use crate::app::jobs::compute;
 use crate::app::results::Comparison;
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::rig::{PadId, Rig, Text};
 use crate::domain::sample::{Sample, Scale};
-use crate::domain::sensor::Finger;
 use crate::domain::{metrics, resample};
 use crate::io::dataset::{Dataset, assumed_metres};
 use crate::io::images;
@@ -29,8 +31,8 @@ pub(super) struct GenerateArgs {
     /// The folder for the predictions; created if missing.
     #[arg(long)]
     out: PathBuf,
-    /// Which finger's GelSlim image.
-    #[arg(long, value_enum, default_value_t = FingerArg::Right)]
+    /// Which finger's GelSlim image: right, left (or as the data set names it), both.
+    #[arg(long, default_value = "right")]
     finger: FingerArg,
     /// Take only this many pairs, spread evenly over the dataset.
     #[arg(long)]
@@ -43,22 +45,30 @@ pub(super) struct GenerateArgs {
     common: Common,
 }
 
-/// Which finger's image.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum FingerArg {
-    Right,
-    Left,
-    Both,
+/// Which finger's image: the name of one, or `both`, which means all.
+#[derive(Debug, Clone)]
+pub(super) struct FingerArg(String);
+
+impl FromStr for FingerArg {
+    type Err = Infallible;
+
+    fn from_str(name: &str) -> Result<Self, Infallible> {
+        Ok(Self(name.to_lowercase()))
+    }
 }
 
 impl FingerArg {
-    /// The fingers it stands for.
-    pub(super) fn fingers(self) -> &'static [Finger] {
-        match self {
-            FingerArg::Right => &[Finger::Right],
-            FingerArg::Left => &[Finger::Left],
-            FingerArg::Both => &Finger::BOTH,
+    /// The fingers it stands for. A rig with a single one has no other, however it is called.
+    pub(super) fn fingers(&self, rig: &Rig) -> anyhow::Result<Vec<PadId>> {
+        let all = rig.pad_list();
+        if self.0 == "both" || all.len() == 1 {
+            return Ok(all);
         }
+        let finger = rig.pad_of_key(&self.0).ok_or_else(|| {
+            let names: Vec<_> = all.iter().map(|pad| rig.pad_key(*pad)).collect();
+            anyhow::anyhow!("there is no finger \"{}\"; name one of {} or both", self.0, names.join(", "))
+        })?;
+        Ok(vec![finger])
     }
 }
 
@@ -66,7 +76,7 @@ impl FingerArg {
 #[derive(Debug, Default, Clone, Serialize)]
 struct Pair {
     name: String,
-    finger: &'static str,
+    finger: Text,
     psnr_db: Option<f64>,
     ssim: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -161,7 +171,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     std::fs::create_dir_all(&args.out)
         .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", args.out.display()))?;
     let ids = super::spread(dataset.index.pairs.len(), args.limit);
-    let fingers = args.finger.fingers();
+    let fingers = args.finger.fingers(&dataset.rig)?;
     let output = Output::new(args.common, "generating", ids.len());
     let mut predictor = Predictor::new(&args.model);
     let config = predictor.config()?;
@@ -175,13 +185,13 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
         let done = dataset.load(id).map_err(anyhow::Error::from).and_then(|sample| {
             scale = sample.scale;
             // An image folder has one finger, whichever it was.
-            let present: Vec<Finger> = fingers.iter().copied().filter(|f| sample.finger(*f).is_some()).collect();
-            let fingers = if present.is_empty() { Finger::BOTH.to_vec() } else { present };
+            let present: Vec<PadId> = fingers.iter().copied().filter(|f| sample.pad(*f).is_some()).collect();
+            let fingers = if present.is_empty() { sample.rig.pad_list() } else { present };
             let mut made = Vec::new();
             let mut touches = Vec::new();
             for finger in fingers {
-                let Some(touch) = sample.finger(finger) else { continue };
-                let Some(gelslim) = &touch.gelslim else { anyhow::bail!("no GelSlim image") };
+                let Some(touch) = sample.pad(finger) else { continue };
+                let Some(gelslim) = touch.color() else { anyhow::bail!("no GelSlim image") };
                 touches.push((finger, touch, &gelslim.difference));
             }
             let differences: Vec<_> = touches.iter().map(|(_, _, difference)| *difference).collect();
@@ -192,19 +202,19 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             let seconds = start.elapsed().as_secs_f64() / predictions.len().max(1) as f64;
             for ((finger, touch, difference), predicted) in touches.into_iter().zip(predictions) {
                 let imprint = predictor.generator()?.depth(&predicted.raw, shift)?;
-                write(&args.out, &name, finger, &imprint)?;
+                let stem = stem(&name, &sample.rig.pad_key(finger));
+                write(&args.out, &stem, &imprint)?;
                 let kept = predicted.kept;
-                let ambiguity = touch.gelslim.as_ref().and_then(|g| ambiguity(&g.difference));
-                let mut pair =
-                    Pair { name: name.clone(), finger: finger.name(), ambiguity, seconds, kept, ..Pair::default() };
+                let ambiguity = touch.color().and_then(|g| ambiguity(&g.difference));
+                let key = sample.rig.pad_key(finger);
+                let mut pair = Pair { name: name.clone(), finger: key, ambiguity, seconds, kept, ..Pair::default() };
                 score(&dataset, id, (finger, &sample), &imprint, &mut pair)?;
                 if args.ensemble.seeds > 1 {
                     let found = seeds::predict(&mut predictor, difference, args.ensemble.seeds)?;
                     let mut of_mean = Pair::default();
                     score(&dataset, id, (finger, &sample), &found.spread.mean, &mut of_mean)?;
                     let scores = (of_mean.psnr_db, of_mean.ssim);
-                    pair.ensemble =
-                        Some(seeds::write(&args.out.join(stem(&name, finger)), &found, config.seed, scores)?);
+                    pair.ensemble = Some(seeds::write(&args.out.join(&stem), &found, config.seed, scores)?);
                 }
                 made.push(pair);
             }
@@ -240,26 +250,26 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
 fn score(
     dataset: &Dataset,
     id: PairId,
-    (finger, sample): (Finger, &Sample),
+    (finger, sample): (PadId, &Sample),
     imprint: &DepthMap,
     pair: &mut Pair,
 ) -> anyhow::Result<()> {
     let scale = sample.scale;
     match scale {
         Scale::Measured => {
-            if let Some(bubble) = sample.finger(finger).and_then(|t| t.bubble.as_ref()) {
-                let seen = metrics::footprint_mask(finger, bubble.imprint.size());
-                take(pair, &compared(imprint, &bubble.imprint, scale, &seen)?);
+            if let Some(bubble) = sample.pad(finger).and_then(|t| t.depth()) {
+                let seen = sample.rig.seen_mask(finger, bubble.imprint.size());
+                take(pair, &compared(imprint, &bubble.imprint, scale, seen.as_ref())?);
             }
         }
         Scale::Assumed => {
             // Compared on the tile's own pixels and in its orientation, so that the lab's prediction is not resampled.
             if let Some(tile) = dataset.bubble_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
-                let ours = resample::bilinear(&imprint.rotated_180(), tile.width(), tile.height());
-                let seen = metrics::footprint_mask(finger, tile.size()).rotated_180();
-                take(pair, &compared(&ours, &tile, scale, &seen)?);
+                let ours = resample::bilinear(&turned(imprint, &sample.rig), tile.width(), tile.height());
+                let seen = sample.rig.seen_mask(finger, tile.size()).map(|seen| turned(&seen, &sample.rig));
+                take(pair, &compared(&ours, &tile, scale, seen.as_ref())?);
                 if let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
-                    let theirs = compared(&vqvae, &tile, scale, &seen)?;
+                    let theirs = compared(&vqvae, &tile, scale, seen.as_ref())?;
                     (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
                 }
             }
@@ -269,7 +279,12 @@ fn score(
 }
 
 /// The figures as the studio computes them.
-fn compared(predicted: &DepthMap, measured: &DepthMap, scale: Scale, seen: &Mask) -> anyhow::Result<Comparison> {
+fn compared(
+    predicted: &DepthMap,
+    measured: &DepthMap,
+    scale: Scale,
+    seen: Option<&Mask>,
+) -> anyhow::Result<Comparison> {
     compute::compare_parts(predicted, measured, scale, seen).map_err(|err| anyhow::anyhow!("{err}"))
 }
 
@@ -279,15 +294,19 @@ fn take(pair: &mut Pair, found: &Comparison) {
     pair.invented = found.split.map(|s| s.invented);
 }
 
+/// As a picture shows it: turned as the depth sensor lies to the rig's first one.
+fn turned<T: Copy>(image: &Grid<T>, rig: &Rig) -> Grid<T> {
+    if rig.depth().is_some_and(|sensor| sensor.rotation_deg == 180) { image.rotated_180() } else { image.clone() }
+}
+
 /// The name of a prediction's files.
-fn stem(name: &str, finger: Finger) -> String {
-    format!("{}_{}", name.replace(['/', '\\'], "__"), finger.name())
+fn stem(name: &str, finger: &str) -> String {
+    format!("{}_{finger}", name.replace(['/', '\\'], "__"))
 }
 
 /// Writes `NAME_FINGER.npy` (metres, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
 /// -20 mm) for people.
-fn write(out: &Path, name: &str, finger: Finger, imprint: &DepthMap) -> anyhow::Result<()> {
-    let stem = stem(name, finger);
+fn write(out: &Path, stem: &str, imprint: &DepthMap) -> anyhow::Result<()> {
     crate::io::npz::write_npy(&out.join(format!("{stem}.npy")), imprint)?;
     let picture = imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
     images::write_grey16(&out.join(format!("{stem}.png")), &picture)?;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
+use super::generate::FingerArg;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::app::jobs::compute::LAB_PEAK_M;
@@ -16,7 +17,7 @@ use crate::domain::metrics::Line;
 use crate::domain::postprocess::{
     ChainReading, Flag, Histogram, Ledger, Mapping, Orientation, Shift, Stats, ledger, readings,
 };
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, Text};
 use crate::domain::units::{fixed, mm};
 use crate::io::images;
 
@@ -30,8 +31,8 @@ pub(super) struct LedgerArgs {
     #[arg(long)]
     pair: String,
     /// Which finger (an image folder has only one).
-    #[arg(long, value_enum, default_value_t = OneFinger::Right)]
-    finger: OneFinger,
+    #[arg(long, default_value = "right")]
+    finger: FingerArg,
     /// Read the decoder's range as it is meant instead of twice; leaves no shift to be done.
     #[arg(long, value_enum, conflicts_with = "shift")]
     mapping: Option<MappingArg>,
@@ -43,12 +44,6 @@ pub(super) struct LedgerArgs {
     model: ModelArgs,
     #[command(flatten)]
     common: Common,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum OneFinger {
-    Right,
-    Left,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -96,7 +91,7 @@ struct JointReport {
 #[derive(Debug, Serialize)]
 struct Report {
     pair: String,
-    finger: &'static str,
+    finger: Text,
     bundle: String,
     bundle_hash: String,
     shift: &'static str,
@@ -116,16 +111,17 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let id = super::find_pair(&dataset, &args.pair)?;
     let name = dataset.index.pairs[id.0 as usize].name.clone();
     let sample = dataset.load(id)?;
-    let asked = match args.finger {
-        OneFinger::Right => Finger::Right,
-        OneFinger::Left => Finger::Left,
-    };
     // An image folder has one finger, whichever it was.
-    let there: Vec<Finger> = Finger::BOTH.into_iter().filter(|f| sample.finger(*f).is_some()).collect();
-    let finger = if let [only] = there[..] { only } else { asked };
-    let touch = sample.finger(finger).ok_or_else(|| anyhow::anyhow!("{name}: there is no {} finger", finger.name()))?;
-    let gelslim = touch.gelslim.as_ref().ok_or_else(|| anyhow::anyhow!("{name}: no GelSlim image"))?;
-    let truth = touch.bubble.as_ref().map(|b| &b.imprint);
+    let there: Vec<PadId> = sample.pads.entries().map(|(finger, _)| finger).collect();
+    let asked = args.finger.fingers(&sample.rig)?;
+    let finger = match (&there[..], &asked[..]) {
+        ([only], _) | (_, [only]) => *only,
+        _ => anyhow::bail!("--finger both: the depth chain is that of one finger; name it"),
+    };
+    let key = sample.rig.pad_key(finger);
+    let touch = sample.pad(finger).ok_or_else(|| anyhow::anyhow!("{name}: there is no {key} finger"))?;
+    let gelslim = touch.color().ok_or_else(|| anyhow::anyhow!("{name}: no GelSlim image"))?;
+    let truth = touch.depth().map(|b| &b.imprint);
 
     let output = Output::new(args.common, "generating", 1);
     let mut predictor = Predictor::new(&args.model);
@@ -148,7 +144,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     }
     let report = Report {
         pair: name,
-        finger: finger.name(),
+        finger: key,
         bundle: predictor.bundle_name().to_owned(),
         bundle_hash: predictor.bundle_hash().to_owned(),
         shift: shift_name,

@@ -11,7 +11,6 @@ use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::PairId;
 use crate::domain::pose::ToolModel;
-use crate::domain::sensor::Finger;
 use crate::io::export_unet::{self, ExportConfig, ExportEntry, PARTS};
 use crate::io::masks::MaskStore;
 
@@ -89,7 +88,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let mut ids = Vec::new();
     for id in super::spread(dataset.index.pairs.len(), args.limit) {
         let entry = &dataset.index.pairs[id];
-        for finger in Finger::BOTH {
+        for finger in dataset.rig.pads() {
             let corrected = stored.iter().any(|(pair, f)| *pair == entry.name && *f == finger);
             if corrected || args.pairs == Pairs::All {
                 entries.push(ExportEntry { pair: entry.name.clone(), tool: entry.tool.clone(), finger });
@@ -106,13 +105,13 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let output = Output::new(args.common, "exporting", entries.len());
     let mut predictor = Predictor::new(&args.model);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
-    let config = ExportConfig { seed: args.split_seed, ..ExportConfig::default() };
+    let config = ExportConfig { seed: args.split_seed, rig: dataset.rig.clone(), ..ExportConfig::default() };
     let report = export_unet::export(&args.out, &entries, &config, |i| {
         let (entry, (id, corrected)) = (&entries[i], ids[i]);
         output.step(&entry.pair);
         let sample = dataset.load(id)?;
-        let touch = sample.finger(entry.finger).ok_or("it has no such finger")?;
-        let bubble = touch.bubble.as_ref().ok_or("it has no such imprint")?;
+        let touch = sample.pad(entry.finger).ok_or("it has no such finger")?;
+        let bubble = touch.depth().ok_or("it has no such imprint")?;
         if corrected && let Some(stored) = store.load(&entry.pair, entry.finger)? {
             return Ok((bubble.imprint.clone(), stored.mask));
         }

@@ -20,9 +20,9 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::hand::{AcceptedPose, HandPose};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::{self, Engine, FingerInput, ToolModel};
+use crate::domain::pose::{self, Engine, FingerInput, Fingers, ToolModel};
+use crate::domain::rig::PerPad;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
 use crate::io::masks::MaskStore;
 
@@ -151,7 +151,7 @@ struct Case {
     report: Option<AlignReport>,
     /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
     #[serde(skip_serializing_if = "Option::is_none")]
-    ambiguity: Option<[Option<Ambiguity>; 2]>,
+    ambiguity: Option<PerPad<Ambiguity>>,
     /// With `--seeds`, for predicted imprints.
     #[serde(skip_serializing_if = "Option::is_none")]
     fan: Option<PoseFan>,
@@ -300,19 +300,18 @@ fn pose_cases(
     predictor: &mut Predictor,
 ) -> anyhow::Result<Vec<Case>> {
     let predicted = imprint == "predicted";
-    let imprints: [Option<DepthMap>; 2] = if predicted {
-        predictor.imprints(sample)?
-    } else {
-        Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
-    };
+    let imprints: PerPad<DepthMap> = if predicted { predictor.imprints(sample)? } else { measured(sample) };
     let (mask_name, masks) = masks(&args.mask, sample, tool, &imprints, predicted, predictor)?;
-    let fingers = Finger::BOTH.map(|f| {
-        let camera = sample.finger(f)?.camera()?;
-        Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
+    let fingers = Fingers::new(&sample.rig, |f| {
+        let camera = sample.pad(f)?.camera()?;
+        Some(FingerInput { imprint: imprints[f].as_ref()?, camera, mask: masks[f].as_ref() })
     });
     let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
     // What was measured is as it is; what was predicted may have had nothing to go by.
-    let left_open = predicted.then(|| Finger::BOTH.map(|f| ambiguity(&sample.finger(f)?.gelslim.as_ref()?.difference)));
+    let left_open = predicted.then(|| {
+        let left_open = |f| ambiguity(&sample.pad(f)?.color()?.difference);
+        sample.rig.pads().map(left_open).collect()
+    });
     let several = predicted && args.ensemble.seeds > 1;
     engines
         .iter()
@@ -346,11 +345,16 @@ fn pose_cases(
                 },
                 accepted: accepted.map(|a| Accepted::new(a, truth)),
                 report: result.ok().map(|r| r.report).filter(|_| args.trace),
-                ambiguity: left_open,
+                ambiguity: left_open.clone(),
                 fan,
             })
         })
         .collect()
+}
+
+/// The measured imprints.
+pub(super) fn measured(sample: &Sample) -> PerPad<DepthMap> {
+    sample.rig.pads().map(|f| Some(sample.pad(f)?.depth()?.imprint.clone())).collect()
 }
 
 /// The contact masks and the name of their source.
@@ -358,21 +362,21 @@ pub(super) fn masks(
     args: &MaskArgs,
     sample: &Sample,
     tool: &ToolModel,
-    imprints: &[Option<DepthMap>; 2],
+    imprints: &PerPad<DepthMap>,
     predicted: bool,
     predictor: &mut Predictor,
-) -> anyhow::Result<(&'static str, [Option<Mask>; 2])> {
+) -> anyhow::Result<(&'static str, PerPad<Mask>)> {
     let source = match args.mask {
         MaskFrom::Auto if !predicted && sample.grasp_from_object.is_some() => MaskFrom::Cad,
         // The truth must not leak into the pose of a prediction unless it was asked for.
         MaskFrom::Auto => MaskFrom::Unet,
         other => other,
     };
-    let mut masks = [None, None];
-    for finger in Finger::BOTH {
-        let (Some(imprint), Some(touch)) = (&imprints[finger.index()], sample.finger(finger)) else { continue };
+    let mut masks = PerPad::default();
+    for finger in sample.rig.pads() {
+        let (Some(imprint), Some(touch)) = (&imprints[finger], sample.pad(finger)) else { continue };
         let truth = sample.grasp_from_object;
-        masks[finger.index()] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
+        masks[finger] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
     }
     Ok((source.key(), masks))
 }

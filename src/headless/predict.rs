@@ -11,8 +11,8 @@ use strum::IntoEnumIterator as _;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::postprocess::{RawPrediction, RefitShift, ShiftMode};
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::infer::bundle::{Bundle, default_roots, find};
 use crate::infer::engine::EngineChoice;
 use crate::infer::generator::Generator;
@@ -309,15 +309,15 @@ impl Predictor {
     }
 
     /// Predicted imprints (metres, raw orientation) of the fingers that have a GelSlim image.
-    pub(super) fn imprints(&mut self, sample: &Sample) -> anyhow::Result<[Option<DepthMap>; 2]> {
+    pub(super) fn imprints(&mut self, sample: &Sample) -> anyhow::Result<PerPad<DepthMap>> {
         let shift = self.shift();
-        let gelslim = |finger| sample.finger(finger).and_then(|t| t.gelslim.as_ref());
-        let fingers: Vec<Finger> = Finger::BOTH.into_iter().filter(|finger| gelslim(*finger).is_some()).collect();
+        let gelslim = |finger| sample.pad(finger).and_then(|t| t.color());
+        let fingers: Vec<PadId> = sample.rig.pads().filter(|finger| gelslim(*finger).is_some()).collect();
         let differences: Vec<&RgbGrid> = fingers.iter().filter_map(|f| Some(&gelslim(*f)?.difference)).collect();
         let made = self.predict(&differences)?;
-        let mut out = [None, None];
+        let mut out: PerPad<DepthMap> = sample.rig.pads().map(|_| None).collect();
         for (finger, made) in fingers.into_iter().zip(made) {
-            out[finger.index()] = Some(self.generator()?.depth(&made.raw, shift)?);
+            out[finger] = Some(self.generator()?.depth(&made.raw, shift)?);
         }
         Ok(out)
     }

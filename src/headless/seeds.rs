@@ -9,10 +9,10 @@ use serde::Serialize;
 use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::Predictor;
 use crate::domain::ensemble::{AngleFan, Spread, channel_spread, seeds};
-use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
+use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, estimate};
+use crate::domain::rig::PerPad;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
 use crate::io::{images, npz};
 
@@ -153,34 +153,34 @@ pub(super) fn fan(
     args: &MaskArgs,
     count: u16,
 ) -> anyhow::Result<PoseFan> {
-    let mut fingers: [Option<FingerSeeds>; 2] = [None, None];
-    for finger in Finger::BOTH {
-        if let Some(gelslim) = sample.finger(finger).and_then(|t| t.gelslim.as_ref()) {
-            fingers[finger.index()] = Some(predict(predictor, &gelslim.difference, count)?);
+    let mut fingers: PerPad<FingerSeeds> = PerPad::default();
+    for finger in sample.rig.pads() {
+        if let Some(gelslim) = sample.pad(finger).and_then(|t| t.color()) {
+            fingers[finger] = Some(predict(predictor, &gelslim.difference, count)?);
         }
     }
     let source = match args.mask {
         MaskFrom::Auto => MaskFrom::Unet,
         other => other,
     };
-    let mut angle = |imprints: [Option<&DepthMap>; 2]| -> anyhow::Result<Option<f64>> {
-        let mut masks = [None, None];
-        for finger in Finger::BOTH {
-            let (Some(imprint), Some(touch)) = (imprints[finger.index()], sample.finger(finger)) else { continue };
+    let mut angle = |imprints: PerPad<&DepthMap>| -> anyhow::Result<Option<f64>> {
+        let mut masks: PerPad<Mask> = PerPad::default();
+        for finger in sample.rig.pads() {
+            let (Some(imprint), Some(touch)) = (imprints[finger], sample.pad(finger)) else { continue };
             let truth = sample.grasp_from_object;
-            masks[finger.index()] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
+            masks[finger] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
         }
-        let inputs = Finger::BOTH.map(|f| {
-            let camera = sample.finger(f)?.camera()?;
-            Some(FingerInput { imprint: imprints[f.index()]?, camera, mask: masks[f.index()].as_ref() })
+        let inputs = Fingers::new(&sample.rig, |f| {
+            let camera = sample.pad(f)?.camera()?;
+            Some(FingerInput { imprint: imprints[f]?, camera, mask: masks[f].as_ref() })
         });
         Ok(estimate(&inputs, tool, engine, false).ok().map(|r| r.object_from_grasp.theta_rad))
     };
     let mut angles = Vec::new();
     for i in 0..usize::from(count) {
-        angles.push(angle(fingers.each_ref().map(|f| Some(&f.as_ref()?.imprints[i])))?);
+        angles.push(angle(fingers.as_ref().map(|f| Some(&f?.imprints[i])))?);
     }
-    let of_mean = angle(fingers.each_ref().map(|f| Some(&f.as_ref()?.spread.mean)))?;
+    let of_mean = angle(fingers.as_ref().map(|f| Some(&f?.spread.mean)))?;
     let fan = AngleFan::of(&angles.iter().flatten().copied().collect::<Vec<_>>());
     let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
     let mean = fan.as_ref().and_then(|f| f.mean_rad);

@@ -27,8 +27,8 @@ pub(super) struct StatsArgs {
     /// The file to write; use it with `--shift refit --stats FILE`.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Which finger's touches.
-    #[arg(long, value_enum, default_value_t = FingerArg::Both)]
+    /// Which finger's touches: right, left (or as the data set names it), both.
+    #[arg(long, default_value = "both")]
     finger: FingerArg,
     /// Take only this many pairs, spread evenly over the dataset.
     #[arg(long)]
@@ -64,7 +64,7 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let cx = JobCx::new(Cancel::default(), Arc::new(move |p| bar.set(p.done as usize, p.total as usize)));
     let pass = statistics::pass(
         &ids,
-        args.finger.fingers(),
+        &args.finger.fingers(&dataset.rig)?,
         |id| {
             let sample = dataset.load(id).map_err(|err| TaskError::from_error("Load", &err))?;
             scale.set(sample.scale);
@@ -72,7 +72,7 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
         },
         |id, finger, difference| {
             let name = &dataset.index.pairs[id.0 as usize].name;
-            let what = format!("{name} {}", finger.name());
+            let what = format!("{name} {}", dataset.rig.pad_key(finger));
             let raw = predictor.predict_one(difference).map_err(|err| TaskError::new(&what, err))?;
             Ok((raw, chain.clone()))
         },

@@ -20,7 +20,8 @@ use super::pose::{Engines, parse_engines};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::{PairId, Problem};
-use crate::domain::sample::BubbleCamera;
+use crate::domain::rig::PerPad;
+use crate::domain::sample::DepthCamera;
 use crate::io::dataset::{Dataset, cameras_of};
 use crate::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
 use one::{Done, Worker};
@@ -111,7 +112,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
         existing: args.existing || args.once,
         patience,
         tool_scale: args.unit.tool_scale,
-        rig: rig(args.camera.as_deref())?,
+        cameras: cameras(args.camera.as_deref())?,
     };
     let mut follower = Follower::new(&args.path, config)?;
     let mut worker = Worker::new(args, Predictor::new(&args.model), stop.clone())?;
@@ -168,14 +169,14 @@ fn take_signals(stop: Arc<AtomicBool>) -> anyhow::Result<()> {
 }
 
 /// The cameras that `--camera` names.
-fn rig(named: Option<&Path>) -> anyhow::Result<Option<[Option<BubbleCamera>; 2]>> {
+fn cameras(named: Option<&Path>) -> anyhow::Result<Option<PerPad<DepthCamera>>> {
     let Some(file) = named else { return Ok(None) };
     let cameras = if file == Path::new("demo") {
-        Dataset::demo().load(PairId(0))?.fingers.map(|touch| touch?.bubble?.camera)
+        Dataset::demo().load(PairId(0))?.pads.map(|touch| touch?.depth()?.camera.clone())
     } else {
         cameras_of(file)?
     };
-    if cameras.iter().all(Option::is_none) {
+    if cameras.is_empty() {
         anyhow::bail!(
             "the file has no camera: K, bubbles_tr_quat, grasp_frame_quat and bubble_depth_ref are needed ({})",
             file.display()

@@ -166,8 +166,9 @@ fn pair_problems(dataset: &Dataset, id: PairId) -> (Vec<Problem>, Option<(usize,
     // The bubble's file is the last one.
     let file = dataset.pair_files(id).pop().unwrap_or_default();
     let (mut few, mut pixels) = (0, 0);
-    for (touch, invalid) in sample.fingers.iter().zip(invalid) {
-        let Some(bubble) = touch.as_ref().and_then(|t| t.bubble.as_ref()) else { continue };
+    for (pad, touch) in sample.pads.entries() {
+        let Some(bubble) = touch.depth() else { continue };
+        let invalid = invalid[pad].unwrap_or_default();
         pixels += bubble.imprint.len();
         let share = invalid.total() as f64 / bubble.imprint.len() as f64;
         if invalid.infinite == 0 && share <= MANY_INVALID {

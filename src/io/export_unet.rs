@@ -12,6 +12,7 @@ mod split;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sha2::Digest as _;
@@ -19,7 +20,7 @@ use sha2::Digest as _;
 use super::images::{self, PictureError};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Grid, Mask};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, Rig};
 
 pub use check::{CheckReport, check_folder};
 
@@ -101,7 +102,7 @@ pub struct ExportEntry {
     /// The tool, where known: the loader filters by it as a part of the stem.
     pub tool: Option<String>,
     /// The finger.
-    pub finger: Finger,
+    pub finger: PadId,
 }
 
 /// How to divide.
@@ -115,11 +116,13 @@ pub struct ExportConfig {
     pub test: f64,
     /// Tools whose pairs all go to test (unseen tools).
     pub test_tools: Vec<String>,
+    /// The names of the pads.
+    pub rig: Arc<Rig>,
 }
 
 impl Default for ExportConfig {
     fn default() -> Self {
-        Self { seed: 0, val: 0.1, test: 0.1, test_tools: Vec::new() }
+        Self { seed: 0, val: 0.1, test: 0.1, test_tools: Vec::new(), rig: Rig::lab() }
     }
 }
 
@@ -166,7 +169,7 @@ pub fn export(
     let folder = std::path::absolute(folder).map_err(|s| io(folder, "find the folder", s))?;
     refuse_foreign(&folder)?;
     let parts = split::parts(entries, config)?;
-    let stems = split::stems(entries);
+    let stems = split::stems(entries, &config.rig);
     let parent = folder.parent().unwrap_or(&folder).to_owned();
     std::fs::create_dir_all(&parent).map_err(|s| io(&parent, "make the folder", s))?;
     let staging = tempfile::Builder::new()
@@ -185,7 +188,7 @@ pub fn export(
     let mut mismatches = Vec::new();
     for (i, (stem, &part)) in stems.iter().zip(&parts).enumerate() {
         let (imprint, mask) = load(i).map_err(|err| ExportError::Source {
-            name: format!("{}, {} finger", entries[i].pair, entries[i].finger.name()),
+            name: format!("{}, {} finger", entries[i].pair, config.rig.pad_key(entries[i].finger)),
             reason: err.to_string(),
         })?;
         if imprint.size() != mask.size() {

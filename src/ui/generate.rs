@@ -12,7 +12,6 @@ use crate::app::keys::{Preset, Recipe, Sampler, ShiftMode};
 use crate::app::library::{BundleInfo, BundleKind};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::domain::diffusion::GUIDANCE;
-use crate::domain::sensor::Finger;
 
 /// Width of the captions at the left.
 const LABEL: f32 = 60.0;
@@ -262,7 +261,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
     let finger = cx.state.selection.finger;
     let Some(touch) = cx.state.touch_key(finger) else { return };
     let made: Vec<Recipe> = cx.state.results.made.get(&touch).cloned().unwrap_or_default();
-    ui.label(section(&format!("Results, {} finger", finger.name()), cx.p));
+    ui.label(section(&format!("Results, {} finger", cx.state.finger_name(finger)), cx.p));
     if made.is_empty() {
         ui.label(caption("None yet for this touch.", cx.p));
         return;
@@ -319,7 +318,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// Shows a prediction, and that of the other finger made with the same settings, if there is one.
 fn choose(cx: &mut Cx<'_>, recipe: &Recipe) {
     cx.push(Command::Choose(recipe.clone()));
-    for finger in Finger::BOTH {
+    for finger in cx.state.rig().pads() {
         let Some(touch) = cx.state.touch_key(finger) else { continue };
         let other = Recipe { touch, ..recipe.clone() };
         if other != *recipe && cx.state.results.predictions.contains(&other) {

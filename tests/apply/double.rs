@@ -23,7 +23,8 @@ use touch2touch::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift};
 use touch2touch::domain::resample::Resampling;
-use touch2touch::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
+use touch2touch::domain::rig::lab;
+use touch2touch::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch::domain::sim;
 
 /// `[width, height]` of the imprints of [`Source`].
@@ -128,13 +129,11 @@ impl DataSource for Source {
                 depth + sign * 1e-5 * (x + y) as f32
             });
             let difference = RgbGrid::from_fn(6, 4, |x, y| [x as f32, y as f32, sign]);
-            Some(FingerTouch {
-                gelslim: Some(GelSlimTouch { images: None, difference }),
-                bubble: Some(BubbleTouch { imprint, camera: None, truth: None }),
-                rig: None,
-            })
+            let color = ColorTouch { images: None, difference };
+            let depth = DepthTouch { imprint, camera: None, truth: None };
+            Some(PadTouch::default().with(lab::GELSLIM_ID, Some(color)).with(lab::BUBBLE_ID, Some(depth)))
         };
-        Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, ..Sample::default() })
+        Ok(Sample { pads: [finger(1.0), finger(-1.0)].into(), grasp_from_object: None, ..Sample::default() })
     }
 
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {

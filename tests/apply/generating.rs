@@ -12,13 +12,13 @@ use touch2touch::app::results::{Prediction, Preview};
 use touch2touch::app::settings::GenerateSettings;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::DepthMap;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::{PadId, lab};
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
 
-const RIGHT: Finger = Finger::Right;
-const LEFT: Finger = Finger::Left;
+const RIGHT: PadId = lab::RIGHT;
+const LEFT: PadId = lab::LEFT;
 
 fn preview(recipe: &Recipe, step: u32) -> Arc<Preview> {
     Arc::new(Preview { recipe: recipe.clone(), step, of: recipe.steps, depth: DepthMap::filled(4, 3, 0.001) })

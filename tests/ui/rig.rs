@@ -20,7 +20,7 @@ use touch2touch::domain::postprocess::{
     DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift, ShiftMode, ShiftStats,
 };
 use touch2touch::domain::resample::Resampling;
-use touch2touch::domain::sensor::bubble;
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch::io::statistics::ShiftStatistics;
@@ -106,7 +106,7 @@ impl Services for QuickGenerator {
             mapping: Mapping::Doubled,
             reduction: Reduction::Mean,
             shift: Shift::None,
-            size: [bubble::WIDTH, bubble::HEIGHT],
+            size: [lab::BUBBLE.width, lab::BUBBLE.height],
             resampling: Resampling::Bilinear,
             rotation_deg: 180,
         };

@@ -15,6 +15,7 @@ use super::super::tasks::{Level, Task, Ticket};
 use super::{cancel_all, follow, inspect, is_selected, masks, preferences, refit, remember, reorder, workbench};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
+use crate::domain::rig::PerPad;
 
 pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
     match command {
@@ -253,7 +254,7 @@ fn store(state: &mut State, request: Request, computed: Computed) {
 }
 
 /// The pair and imprint a cloud belongs to.
-fn place_of<M>(parts: &[Option<(ImprintKey, M)>; 2]) -> Option<(PairKey, ImprintSource)> {
+fn place_of<M>(parts: &PerPad<(ImprintKey, M)>) -> Option<(PairKey, ImprintSource)> {
     let (imprint, _) = parts.iter().flatten().next()?;
     let source = match imprint {
         ImprintKey::Measured(_) => ImprintSource::Measured,

@@ -18,8 +18,8 @@ use crate::domain::metrics::{self, SsimRange};
 use crate::domain::pose::{ToolModel, register};
 use crate::domain::postprocess::{DepthChain, PostprocessError, RawPrediction};
 use crate::domain::resample::bilinear;
-use crate::domain::sample::{BubbleCamera, FingerTouch, Sample, Scale};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::PerPad;
+use crate::domain::sample::{DepthCamera, PadTouch, Sample, Scale};
 use crate::domain::{cloud, contact, units};
 
 /// The peak of the lab's PSNR, metres.
@@ -137,10 +137,11 @@ pub fn compare_parts(
     predicted: &DepthMap,
     measured: &DepthMap,
     scale: Scale,
-    seen: &Mask,
+    seen: Option<&Mask>,
 ) -> Result<Comparison, TaskError> {
     let fail = |err: metrics::MetricError| TaskError::from_error("Compare prediction and measurement", &err);
     let whole = compare(predicted, measured, scale)?;
+    let Some(seen) = seen else { return Ok(whole) };
     let mut split = metrics::split(predicted, measured, seen, LAB_PEAK_M).map_err(fail)?;
     if scale == Scale::Assumed {
         // Lengths stay in the assumed metres; PSNR and SSIM are of the stretched images, as those of the whole are.
@@ -165,7 +166,7 @@ pub fn compare_parts(
 pub fn mask(
     recipe: &MaskRecipe,
     imprint: &DepthMap,
-    touch: Option<&FingerTouch>,
+    touch: Option<&PadTouch>,
     tool: Option<&ToolModel>,
     truth: Option<PlanarPose>,
 ) -> Result<Mask, TaskError> {
@@ -177,7 +178,7 @@ pub fn mask(
         }
         MaskRecipe::Cad(limit_m) => {
             let camera = touch
-                .and_then(FingerTouch::camera)
+                .and_then(PadTouch::camera)
                 .ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))?;
             let tool = tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
             let truth = truth.ok_or_else(|| TaskError::new(WHAT, "the true pose is not known"))?;
@@ -186,7 +187,7 @@ pub fn mask(
         }
         MaskRecipe::Truth => {
             let truth = touch
-                .and_then(|t| t.bubble.as_ref()?.truth.as_ref())
+                .and_then(|t| t.depth()?.truth.as_ref())
                 .ok_or_else(|| TaskError::new(WHAT, "only simulated data knows the true contact"))?;
             Ok(truth.contact.clone())
         }
@@ -198,7 +199,7 @@ pub fn mask(
 ///
 /// # Errors
 /// If the sizes differ or the camera's numbers cannot be right.
-pub fn finger_cloud(imprint: &DepthMap, camera: &BubbleCamera, mask: Option<&Mask>) -> Result<FingerCloud, TaskError> {
+pub fn finger_cloud(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Result<FingerCloud, TaskError> {
     let lifted = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error("Point cloud", &err))?;
     if let Some(mask) = mask.filter(|mask| mask.size() != imprint.size()) {
         let why = format!("the mask has {:?} pixels, the imprint {:?}", mask.size(), imprint.size());
@@ -212,17 +213,17 @@ pub fn finger_cloud(imprint: &DepthMap, camera: &BubbleCamera, mask: Option<&Mas
     Ok(FingerCloud { points: lifted.points, pixels: lifted.pixels, contact })
 }
 
-/// The surface points of both fingers of a sample: `parts` holds imprint and mask by [`Finger::index`]; a finger
-/// without a camera is left out.
+/// The surface points of both fingers of a sample: `parts` holds imprint and mask; a finger without a
+/// camera is left out.
 ///
 /// # Errors
 /// As [`finger_cloud`].
-pub fn clouds(sample: &Sample, parts: [Option<(&DepthMap, Option<&Mask>)>; 2]) -> Result<Clouds, TaskError> {
+pub fn clouds(sample: &Sample, parts: &PerPad<(&DepthMap, Option<&Mask>)>) -> Result<Clouds, TaskError> {
     let mut clouds = Clouds::default();
-    for finger in Finger::BOTH {
-        let camera = sample.finger(finger).and_then(|t| t.camera());
-        if let (Some((imprint, mask)), Some(camera)) = (parts[finger.index()], camera) {
-            clouds.fingers[finger.index()] = Some(finger_cloud(imprint, camera, mask)?);
+    for finger in sample.rig.pads() {
+        let camera = sample.pad(finger).and_then(|t| t.camera());
+        if let (Some((imprint, mask)), Some(camera)) = (parts[finger], camera) {
+            clouds.fingers[finger] = Some(finger_cloud(imprint, camera, mask)?);
         }
     }
     Ok(clouds)
@@ -307,10 +308,9 @@ pub fn basin(
     }
 }
 
-/// A small picture of the measured imprint of the right finger, else of the left, else nothing (an empty image).
+/// A small picture of the measured imprint of the first finger that has one, else nothing (an empty image).
 pub fn thumbnail(sample: &Sample) -> DepthMap {
-    let bubble = |finger: Finger| sample.finger(finger).and_then(|t| t.bubble.as_ref());
-    let Some(bubble) = Finger::BOTH.into_iter().find_map(bubble) else { return Grid::filled(0, 0, 0.0) };
+    let Some(bubble) = sample.pads.iter().flatten().find_map(PadTouch::depth) else { return Grid::filled(0, 0, 0.0) };
     let imprint = &bubble.imprint;
     let longest = imprint.width().max(imprint.height());
     if longest <= THUMBNAIL_PX {
@@ -336,13 +336,14 @@ pub fn thumbnail(sample: &Sample) -> DepthMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::rig::lab;
 
     #[test]
     fn a_thumbnail_keeps_means_and_survives_holes() {
         let imprint = Grid::from_fn(175, 140, |x, y| if (x + y) % 2 == 0 { f32::NAN } else { 0.004 });
-        let bubble = crate::domain::sample::BubbleTouch { imprint, camera: None, truth: None };
-        let touch = crate::domain::sample::FingerTouch { bubble: Some(bubble), ..Default::default() };
-        let sample = Sample { fingers: [None, Some(touch)], ..Sample::default() };
+        let bubble = crate::domain::sample::DepthTouch { imprint, camera: None, truth: None };
+        let touch = crate::domain::sample::PadTouch::default().with(lab::BUBBLE_ID, Some(bubble));
+        let sample = Sample { pads: [None, Some(touch)].into(), ..Sample::default() };
         let small = thumbnail(&sample);
         assert_eq!(small.size(), [44, 36]);
         // The mean of equal numbers is that number up to rounding of a sum of at most 20.

@@ -25,7 +25,8 @@ pub fn generate(
     cx: &JobCx,
 ) -> Result<Vec<Arc<Prediction>>, TaskError> {
     let Some(first) = recipes.first() else { return Ok(Vec::new()) };
-    let fingers: Vec<&str> = recipes.iter().map(|recipe| recipe.touch.finger.name()).collect();
+    let rig = source.rig();
+    let fingers: Vec<_> = recipes.iter().map(|recipe| rig.pad_key(recipe.touch.finger)).collect();
     let missing = format!("there is no GelSlim image of the {} finger", fingers.join(" or "));
     let start = Instant::now();
     let sample = match sample {
@@ -35,9 +36,9 @@ pub fn generate(
     let items: Vec<GenerateItem<'_>> = recipes
         .into_iter()
         .filter_map(|recipe| {
-            let touch = sample.finger(recipe.touch.finger)?;
-            let size = touch.bubble.as_ref().map_or([0, 0], |bubble| bubble.imprint.size());
-            Some(GenerateItem { recipe, difference: &touch.gelslim.as_ref()?.difference, size })
+            let touch = sample.pad(recipe.touch.finger)?;
+            let size = touch.depth().map_or([0, 0], |bubble| bubble.imprint.size());
+            Some(GenerateItem { recipe, difference: &touch.color()?.difference, size })
         })
         .collect();
     if items.is_empty() {

@@ -5,6 +5,7 @@ use super::super::results::{Clouds, LayerResult, PoseResult};
 use crate::domain::align::PointFit;
 use crate::domain::align::reason::{self, reasons};
 use crate::domain::grid::Mask;
+use crate::domain::rig::PerPad;
 
 /// Bars of the histogram of residuals.
 pub const BARS: usize = 40;
@@ -17,31 +18,30 @@ const RANGE_M: f64 = 4e-3;
 ///
 /// # Errors
 /// If the run did not record what became of the points, or they are not those of the clouds.
-pub fn layers(clouds: &Clouds, masks: [Option<&Mask>; 2], run: &PoseResult) -> Result<LayerResult, TaskError> {
+pub fn layers(clouds: &Clouds, masks: &PerPad<&Mask>, run: &PoseResult) -> Result<LayerResult, TaskError> {
     const WHAT: &str = "Layers";
     let mut rest = run.report.fits.as_slice();
-    let mut grids = [None, None];
-    let mut fits = [Vec::new(), Vec::new()];
-    for ((cloud, mask), (grid, own)) in clouds.fingers.iter().zip(masks).zip(grids.iter_mut().zip(&mut fits)) {
-        let Some(cloud) = cloud else { continue };
+    let mut grids = PerPad::default();
+    let mut fits = PerPad::default();
+    for (finger, cloud) in clouds.fingers.entries() {
         let contact = cloud.pixels.iter().zip(&cloud.contact).filter(|(_, contact)| **contact);
         let pixels: Vec<[u16; 2]> = contact.map(|(pixel, _)| *pixel).collect();
         let Some((part, others)) = rest.split_at_checked(pixels.len()) else {
             return Err(TaskError::new(WHAT, "the registration did not record what became of its points"));
         };
         rest = others;
-        *own = part.to_vec();
-        *grid = mask.and_then(|mask| reasons(mask, &pixels, part));
+        fits[finger] = Some(part.to_vec());
+        grids[finger] = masks[finger].and_then(|mask| reasons(mask, &pixels, part));
     }
     if !rest.is_empty() {
         return Err(TaskError::new(WHAT, "the registration was of other points than those shown"));
     }
     let kernel_m = run.report.trace.iter().map(|step| step.kernel_m).filter(|k| k.is_finite()).reduce(f64::min);
     let range_m = kernel_m.map_or(RANGE_M, |k| k * RANGE_KERNELS);
-    let (histogram, above) = histogram(fits.iter().flatten(), range_m);
+    let (histogram, above) = histogram(fits.iter().flatten().flatten(), range_m);
     Ok(LayerResult {
         grasp_from_object: run.grasp_from_object,
-        counts: grids.each_ref().map(reason::counts),
+        counts: grids.as_ref().map(|grid| grid.map(|grid| reason::counts([grid]))),
         reasons: grids,
         fits,
         histogram,

@@ -10,7 +10,7 @@ use super::super::services::SharedServices;
 use super::super::state::State;
 use super::{JobCx, Lane, compute, generate, inspect, ledger};
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::metrics::footprint_mask;
+use crate::domain::rig::PerPad;
 use crate::domain::sample::Sample;
 
 /// The body of a job.
@@ -35,7 +35,7 @@ enum Imprint {
 impl Imprint {
     fn get(&self) -> Option<&DepthMap> {
         match self {
-            Self::Measured(sample, touch) => Some(&sample.finger(touch.finger)?.bubble.as_ref()?.imprint),
+            Self::Measured(sample, touch) => Some(&sample.pad(touch.finger)?.depth()?.imprint),
             Self::Predicted(depth) => Some(depth),
         }
     }
@@ -106,12 +106,12 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             let bundles = state.library.bundles.clone();
             let runtime = state.settings.runtime;
             let sample = results.samples.get(&touch.pair)?.clone();
-            sample.finger(touch.finger)?.gelslim.as_ref()?;
+            sample.pad(touch.finger)?.color()?;
             job(
                 Lane::Files,
                 "Look for earlier predictions".into(),
                 Box::new(move |_| {
-                    let gelslim = sample.finger(touch.finger).and_then(|t| t.gelslim.as_ref());
+                    let gelslim = sample.pad(touch.finger).and_then(|t| t.color());
                     let found = gelslim.map(|g| services.stored(&bundles, runtime, touch, &g.difference));
                     Ok(Computed::Predictions(found.unwrap_or_default().into_iter().map(Arc::new).collect()))
                 }),
@@ -145,7 +145,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
         Request::Imprint(recipe, shift) => {
             let prediction = results.predictions.get(recipe)?.clone();
             let sample = results.samples.get(&recipe.touch.pair)?;
-            let bubble = sample.finger(recipe.touch.finger).and_then(|t| t.bubble.as_ref());
+            let bubble = sample.pad(recipe.touch.finger).and_then(|t| t.depth());
             // Without a measurement the bundle's own size is kept.
             let size = bubble.map_or([0, 0], |b| b.imprint.size());
             let shift = *shift;
@@ -165,8 +165,8 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 "Compare prediction and measurement".into(),
                 Box::new(move |_| {
                     let measured = measured.get().ok_or_else(gone)?;
-                    let seen = footprint_mask(finger, measured.size());
-                    let found = compute::compare_parts(&predicted, measured, sample.scale, &seen)?;
+                    let seen = sample.rig.seen_mask(finger, measured.size());
+                    let found = compute::compare_parts(&predicted, measured, sample.scale, seen.as_ref())?;
                     Ok(Computed::Comparison(Arc::new(found)))
                 }),
             )
@@ -179,7 +179,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "Depth chain".into(),
                 Box::new(move |_| {
-                    let measured = sample.finger(finger).and_then(|t| t.bubble.as_ref()).map(|b| &b.imprint);
+                    let measured = sample.pad(finger).and_then(|t| t.depth()).map(|b| &b.imprint);
                     Ok(Computed::Ledger(Arc::new(ledger::of_prediction(&prediction, shift, measured)?)))
                 }),
             )
@@ -191,7 +191,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "What the GelSlim image leaves open".into(),
                 Box::new(move |_| {
-                    let gelslim = sample.finger(finger).and_then(|t| t.gelslim.as_ref());
+                    let gelslim = sample.pad(finger).and_then(|t| t.color());
                     let difference = &gelslim.ok_or_else(gone)?.difference;
                     Ok(Computed::Ambiguity(crate::domain::ambiguity::ambiguity(difference)))
                 }),
@@ -224,7 +224,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                     let mask = compute::mask(
                         &recipe,
                         imprint,
-                        sample.finger(touch.finger),
+                        sample.pad(touch.finger),
                         tool.as_deref().map(|t| &t.model),
                         sample.grasp_from_object,
                     )?;
@@ -233,26 +233,26 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             )
         }
         Request::Cloud(key) => {
-            let mut parts: [Option<(Imprint, Option<Arc<Mask>>)>; 2] = [None, None];
+            let mut parts: PerPad<(Imprint, Option<Arc<Mask>>)> = PerPad::default();
             let mut pair = None;
-            for (part, slot) in key.parts.iter().zip(&mut parts) {
-                let Some((imprint_key, version)) = part else { continue };
+            for (finger, (imprint_key, version)) in key.parts.entries() {
                 pair = Some(imprint_key.touch().pair);
                 let mask = match version {
                     None => None,
                     Some(version) => Some(mask_of(state, imprint_key, version)?),
                 };
-                *slot = Some((imprint(state, imprint_key)?, mask));
+                parts[finger] = Some((imprint(state, imprint_key)?, mask));
             }
             let sample = results.samples.get(&pair?)?.clone();
             job(
                 Lane::Compute,
                 "Point cloud".into(),
                 Box::new(move |_| {
-                    let part = |at: usize| {
-                        parts[at].as_ref().and_then(|(imprint, mask)| Some((imprint.get()?, mask.as_deref())))
-                    };
-                    Ok(Computed::Cloud(Arc::new(compute::clouds(&sample, [part(0), part(1)])?)))
+                    let parts = parts.as_ref().map(|part| {
+                        let (imprint, mask) = part?;
+                        Some((imprint.get()?, mask.as_deref()))
+                    });
+                    Ok(Computed::Cloud(Arc::new(compute::clouds(&sample, &parts)?)))
                 }),
             )
         }
@@ -291,8 +291,8 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "Layers of the registration".into(),
                 Box::new(move |_| {
-                    let masks = [masks[0].as_deref(), masks[1].as_deref()];
-                    Ok(Computed::Layers(Arc::new(inspect::layers(&clouds, masks, &run)?)))
+                    let masks = masks.as_ref().map(|mask| mask.map(|mask| &**mask));
+                    Ok(Computed::Layers(Arc::new(inspect::layers(&clouds, &masks, &run)?)))
                 }),
             )
         }
@@ -326,9 +326,9 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
 }
 
 /// The masks of a cloud, by finger.
-fn masks_of(state: &State, key: &CloudKey) -> [Option<Arc<Mask>>; 2] {
-    key.parts.each_ref().map(|part| {
-        let (imprint, version) = part.as_ref()?;
+fn masks_of(state: &State, key: &CloudKey) -> PerPad<Arc<Mask>> {
+    key.parts.as_ref().map(|part| {
+        let (imprint, version) = part?;
         mask_of(state, imprint, version.as_ref()?)
     })
 }

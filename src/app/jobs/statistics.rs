@@ -13,8 +13,8 @@ use crate::domain::dataset::PairId;
 use crate::domain::grid::RgbGrid;
 use crate::domain::mesh::sampling::spread;
 use crate::domain::postprocess::{DepthChain, RawPrediction, ShiftFit};
+use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::io::masks::now_unix_s;
 use crate::io::statistics::{Provenance, ShiftStatistics, utc_text};
 
@@ -43,9 +43,9 @@ pub struct Pass {
 /// If the job was told to stop, or no touch could be used.
 pub fn pass(
     pairs: &[PairId],
-    fingers: &[Finger],
+    fingers: &[PadId],
     load: impl Fn(PairId) -> Result<Arc<Sample>, TaskError>,
-    mut predict: impl FnMut(PairId, Finger, &RgbGrid) -> Result<Predicted, TaskError>,
+    mut predict: impl FnMut(PairId, PadId, &RgbGrid) -> Result<Predicted, TaskError>,
     cx: &JobCx,
 ) -> Result<Pass, TaskError> {
     let mut pass = Pass::default();
@@ -60,10 +60,8 @@ pub fn pass(
             }
         };
         for finger in fingers {
-            let touch = sample.finger(*finger);
-            let (Some(gelslim), Some(bubble)) =
-                (touch.and_then(|t| t.gelslim.as_ref()), touch.and_then(|t| t.bubble.as_ref()))
-            else {
+            let touch = sample.pad(*finger);
+            let (Some(gelslim), Some(bubble)) = (touch.and_then(|t| t.color()), touch.and_then(|t| t.depth())) else {
                 continue;
             };
             cx.check(WHAT)?;
@@ -106,7 +104,7 @@ pub fn of_data_set(
     let quiet = JobCx::new(cx.cancel.clone(), Arc::new(|_| {}));
     let pass = pass(
         &pairs,
-        &Finger::BOTH,
+        &source.rig().pad_list(),
         |pair| {
             let sample = source.load(pair)?;
             if sample.scale == crate::domain::sample::Scale::Assumed {

@@ -19,8 +19,8 @@ use super::{DataSource, Following, GenerateItem, Generated, Services};
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::mesh::TriMesh;
+use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::infer::bundle::{self, Bundle, BundleSpec};
 use crate::infer::engine::EngineChoice;
 use crate::infer::generator::Generator;
@@ -158,6 +158,10 @@ impl DataSource for LiveSource {
         Some(&self.dataset)
     }
 
+    fn rig(&self) -> Arc<Rig> {
+        self.dataset.rig.clone()
+    }
+
     fn index(&self) -> &Index {
         &self.dataset.index
     }
@@ -193,8 +197,8 @@ impl DataSource for LiveSource {
         let Ok(store) = &self.store else { return Ok(PairLabels::default()) };
         let fail = |err: StoreError| store_error(&what, &err);
         let mut labels = PairLabels::default();
-        for finger in Finger::BOTH {
-            labels.masks[finger.index()] = store.load(name, finger).map_err(fail)?.map(|stored| HandMask {
+        for finger in self.dataset.rig.pads() {
+            labels.masks[finger] = store.load(name, finger).map_err(fail)?.map(|stored| HandMask {
                 mask: Arc::new(stored.mask),
                 revision: Revision::default(),
                 base: stored.base,
@@ -216,9 +220,8 @@ impl DataSource for LiveSource {
         let store = self.store(&what)?;
         let fail = |err: StoreError| store_error(&what, &err);
         let before = lock(&self.saved).get(name).cloned().unwrap_or_default();
-        for finger in Finger::BOTH {
-            let at = finger.index();
-            let same = match (&before.masks[at], &labels.masks[at]) {
+        for finger in self.dataset.rig.pads() {
+            let same = match (&before.masks[finger], &labels.masks[finger]) {
                 (None, None) => true,
                 (Some(a), Some(b)) => a.mask == b.mask && a.base == b.base,
                 _ => false,
@@ -226,7 +229,7 @@ impl DataSource for LiveSource {
             if same {
                 continue;
             }
-            let stored = labels.masks[at].as_ref().map(|hand| StoredMask {
+            let stored = labels.masks[finger].as_ref().map(|hand| StoredMask {
                 mask: (*hand.mask).clone(),
                 base: hand.base.clone(),
                 person: masks::person(),
@@ -252,12 +255,12 @@ impl DataSource for LiveSource {
         let known: BTreeMap<&str, PairId> =
             (0u32..).zip(&self.dataset.index.pairs).map(|(id, entry)| (entry.name.as_str(), PairId(id))).collect();
         // What is on the disk, and over it what was changed since.
-        let mut wanted: BTreeSet<(String, Finger)> =
+        let mut wanted: BTreeSet<(String, PadId)> =
             self.store.as_ref().map_or_else(|_| Vec::new(), MaskStore::masks).into_iter().collect();
         for (pair, labels) in changed {
-            for finger in Finger::BOTH {
+            for finger in self.dataset.rig.pads() {
                 let key = (pair.clone(), finger);
-                if labels.masks[finger.index()].is_some() {
+                if labels.masks[finger].is_some() {
                     wanted.insert(key);
                 } else {
                     wanted.remove(&key);
@@ -280,22 +283,27 @@ impl DataSource for LiveSource {
                 .with_hint("Correct masks, or take automatic ones over with \"Threshold to mask\" (T)."));
         }
         let total = entries.len() as u64;
-        let report = export_unet::export(folder, &entries, &ExportConfig::default(), |at| {
-            let entry = &entries[at];
-            cx.check(WHAT)?;
-            cx.progress(at as u64, total, format!("{}, {}", entry.pair, entry.finger.name()));
-            let sample = self.load(known[entry.pair.as_str()])?;
-            let bubble = sample.finger(entry.finger).and_then(|touch| touch.bubble.as_ref());
-            let imprint = bubble.ok_or_else(|| TaskError::new(WHAT, "the finger has no imprint"))?.imprint.clone();
-            let mask = match changed.get(&entry.pair).and_then(|l| l.masks[entry.finger.index()].as_ref()) {
-                Some(hand) => (*hand.mask).clone(),
-                None => {
-                    let stored = self.store(WHAT)?.load(&entry.pair, entry.finger)?;
-                    stored.ok_or_else(|| TaskError::new(WHAT, "its mask disappeared"))?.mask
-                }
-            };
-            Ok((imprint, mask))
-        })
+        let report = export_unet::export(
+            folder,
+            &entries,
+            &ExportConfig { rig: self.dataset.rig.clone(), ..ExportConfig::default() },
+            |at| {
+                let entry = &entries[at];
+                cx.check(WHAT)?;
+                cx.progress(at as u64, total, format!("{}, {}", entry.pair, self.dataset.rig.pad_key(entry.finger)));
+                let sample = self.load(known[entry.pair.as_str()])?;
+                let bubble = sample.pad(entry.finger).and_then(|touch| touch.depth());
+                let imprint = bubble.ok_or_else(|| TaskError::new(WHAT, "the finger has no imprint"))?.imprint.clone();
+                let mask = match changed.get(&entry.pair).and_then(|l| l.masks[entry.finger].as_ref()) {
+                    Some(hand) => (*hand.mask).clone(),
+                    None => {
+                        let stored = self.store(WHAT)?.load(&entry.pair, entry.finger)?;
+                        stored.ok_or_else(|| TaskError::new(WHAT, "its mask disappeared"))?.mask
+                    }
+                };
+                Ok((imprint, mask))
+            },
+        )
         .map_err(|err| {
             if cx.cancel.is_cancelled() { TaskError::cancelled(WHAT) } else { TaskError::from_error(WHAT, &err) }
         })?;
@@ -485,6 +493,7 @@ mod tests {
     use super::*;
     use crate::domain::frames::PlanarPose;
     use crate::domain::hand::{AcceptedPose, HandPose};
+    use crate::domain::rig::lab;
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
@@ -497,7 +506,7 @@ mod tests {
     fn labels() -> PairLabels {
         let mask = Arc::new(Mask::from_fn(175, 140, |x, y| x > 20 && y < 9));
         PairLabels {
-            masks: [Some(HandMask { mask, revision: Revision(3), base: "Threshold 5.00 mm".into() }), None],
+            masks: [Some(HandMask { mask, revision: Revision(3), base: "Threshold 5.00 mm".into() }), None].into(),
             review: Review::InProgress,
             accepted: [
                 Some(PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
@@ -535,7 +544,7 @@ mod tests {
         let source = open_source(&place).unwrap();
         let name = source.index().pairs[0].name.clone();
         source.save_labels(&name, &labels()).unwrap();
-        let file = source.store("test").unwrap().mask_file(&name, Finger::Right);
+        let file = source.store("test").unwrap().mask_file(&name, lab::RIGHT);
         std::fs::write(&file, b"{ half a fi").unwrap();
         let again = open_source(&place).unwrap();
         assert!(again.load_labels(&name).unwrap_err().hint.is_some());
@@ -553,9 +562,9 @@ mod tests {
         let cx = JobCx::unwatched();
         let none = source.export_masks(&BTreeMap::new(), &out, &cx).unwrap_err();
         assert!(none.why.contains("no mask") && !out.exists());
-        let finger = source.load(PairId(0)).unwrap().fingers.iter().position(Option::is_some).unwrap();
+        let finger = source.load(PairId(0)).unwrap().pads.entries().next().unwrap().0;
         let mut labels = labels();
-        labels.masks.swap(0, finger);
+        assert_eq!(finger, lab::RIGHT);
         let line = source.export_masks(&BTreeMap::from([(name.clone(), labels.clone())]), &out, &cx).unwrap();
         assert!(line.starts_with("Exported 1 masks"), "{line}");
         labels.review = Review::Skip;

@@ -5,11 +5,11 @@ use super::super::results::LedgerResult;
 use super::super::state::{Absent, Lookup, State};
 use super::Wanted;
 use crate::domain::ambiguity::Ambiguity;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::PadId;
 
 impl State {
     /// The depth chain of the prediction shown for one finger.
-    pub fn ledger(&self, finger: Finger) -> Lookup<'_, LedgerResult> {
+    pub fn ledger(&self, finger: PadId) -> Lookup<'_, LedgerResult> {
         let Some(recipe) = self.chosen(finger) else {
             return self.touch(finger).and_then(Absent::NoPrediction, |_| None);
         };
@@ -21,13 +21,13 @@ impl State {
     }
 
     /// What the GelSlim image of one finger leaves open, once it is known.
-    pub fn ambiguity(&self, finger: Finger) -> Option<Ambiguity> {
+    pub fn ambiguity(&self, finger: PadId) -> Option<Ambiguity> {
         **self.results.ambiguities.get(&self.touch_key(finger)?)?
     }
 }
 
 impl Wanted<'_> {
-    pub(super) fn ambiguity(&mut self, finger: Finger, touch: TouchKey) {
+    pub(super) fn ambiguity(&mut self, finger: PadId, touch: TouchKey) {
         if self.state.gelslim(finger).ready().is_some() {
             self.ask(self.state.results.ambiguities.contains(&touch), Request::Ambiguity(touch));
         }

@@ -19,9 +19,9 @@ use crate::app::jobs::compute;
 use crate::app::keys::MaskRecipe;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{Grid, RgbGrid};
-use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
+use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, estimate};
+use crate::domain::rig::{PadId, Text, lab};
 use crate::domain::sample::Sample;
-use crate::domain::sensor::{Finger, gelslim};
 use crate::domain::units::angle_error;
 use crate::infer::generator::GenerateError;
 use crate::io::dataset::{Dataset, read_in_metres};
@@ -41,7 +41,7 @@ pub(super) struct Worker<'a> {
 /// Figures of one finger.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct FingerFigures {
-    finger: &'static str,
+    finger: Text,
     min_m: f64,
     max_m: f64,
     mean_m: f64,
@@ -110,7 +110,7 @@ impl<'a> Worker<'a> {
         };
         let start = Instant::now();
         let config = predictor.config()?;
-        let blank = RgbGrid::filled(gelslim::WIDTH, gelslim::HEIGHT, [0.0; 3]);
+        let blank = RgbGrid::filled(lab::GELSLIM.width, lab::GELSLIM.height, [0.0; 3]);
         let shift = predictor.shift();
         let generator = predictor.generator()?;
         let raw = generator.generate_batch(&[&blank, &blank], &config, &mut |_| ControlFlow::Continue(()))?;
@@ -217,10 +217,8 @@ impl<'a> Worker<'a> {
 
     /// Imprints of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
     fn imprints(&mut self, sample: &Sample) -> anyhow::Result<Option<Vec<FingerResult>>> {
-        let touched: Vec<(Finger, &RgbGrid)> = Finger::BOTH
-            .into_iter()
-            .filter_map(|finger| Some((finger, &sample.finger(finger)?.gelslim.as_ref()?.difference)))
-            .collect();
+        let touched: Vec<(PadId, &RgbGrid)> =
+            sample.rig.pads().filter_map(|finger| Some((finger, &sample.pad(finger)?.color()?.difference))).collect();
         if touched.is_empty() {
             anyhow::bail!("no GelSlim image");
         }
@@ -239,7 +237,12 @@ impl<'a> Worker<'a> {
         };
         let mut out = Vec::new();
         for ((finger, _), raw) in touched.iter().zip(&raw) {
-            out.push(FingerResult { finger: *finger, imprint: generator.depth(raw, shift)?, mask: None });
+            out.push(FingerResult {
+                finger: *finger,
+                name: sample.rig.pad_key(*finger),
+                imprint: generator.depth(raw, shift)?,
+                mask: None,
+            });
         }
         Ok(Some(out))
     }
@@ -254,13 +257,12 @@ impl<'a> Worker<'a> {
     ) -> Result<PoseFigures, String> {
         let engine = self.engine;
         let name = tool.ok_or("the file's name says no tool; name it with --tool")?;
-        let mut inputs = [None, None];
-        for f in fingers {
-            let camera = sample.finger(f.finger).and_then(|t| t.camera());
-            inputs[f.finger.index()] =
-                camera.map(|camera| FingerInput { imprint: &f.imprint, camera, mask: f.mask.as_ref() });
-        }
-        if inputs.iter().all(Option::is_none) {
+        let inputs = Fingers::new(&sample.rig, |finger| {
+            let f = fingers.iter().find(|f| f.finger == finger)?;
+            let camera = sample.pad(finger)?.camera()?;
+            Some(FingerInput { imprint: &f.imprint, camera, mask: f.mask.as_ref() })
+        });
+        if inputs.is_empty() {
             return Err("no bubble camera is known; name a bubble file of the rig with --camera".into());
         }
         let model = self.tool(dataset, name)?;
@@ -304,12 +306,12 @@ fn load_tool(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<
 /// Numbers of one prediction, against the measurement where there is one.
 fn figures(sample: &Sample, result: &FingerResult) -> FingerFigures {
     let stats = crate::domain::postprocess::Stats::of(&result.imprint);
-    let measured = sample.finger(result.finger).and_then(|t| t.bubble.as_ref()).map(|b| &b.imprint);
+    let measured = sample.pad(result.finger).and_then(|t| t.depth()).map(|b| &b.imprint);
     let measured = measured.filter(|m| m.size() == result.imprint.size());
     let compared = measured.and_then(|m| compute::compare(&result.imprint, m, sample.scale).ok());
     let count = |mask: &Grid<bool>| mask.as_slice().iter().filter(|&&m| m).count();
     FingerFigures {
-        finger: result.finger.name(),
+        finger: sample.rig.pad_key(result.finger),
         min_m: stats.min,
         max_m: stats.max,
         mean_m: stats.mean,

@@ -6,8 +6,7 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use crate::domain::dataset::Problem;
 use crate::domain::grid::DepthMap;
-use crate::domain::sample::{BubbleCamera, Sample};
-use crate::domain::sensor::{Finger, bubble};
+use crate::domain::sample::{DepthCamera, Sample};
 
 /// No bubble is pushed in further; the released data reach 26 mm.
 const MAX_IMPRINT_M: f64 = 0.08;
@@ -29,11 +28,11 @@ pub(super) fn sample(sample: &Sample, file: &Path, problems: &mut Vec<Problem>) 
     let mut add = |what: String, hint: &str| {
         problems.push(Problem { file: file.to_owned(), what, hint: hint.into() });
     };
-    let mut sides = [None, None];
-    for finger in Finger::BOTH {
-        let Some(touch) = sample.finger(finger) else { continue };
-        let name = finger.name();
-        if let Some(gel) = &touch.gelslim
+    let mut sides = Vec::new();
+    for finger in sample.rig.pads() {
+        let Some(touch) = sample.pad(finger) else { continue };
+        let name = &*sample.rig.pad_key(finger);
+        if let Some(gel) = touch.color()
             && let Some(images) = &gel.images
         {
             let brightest = images.raw.as_slice().iter().flatten().copied().fold(0f32, f32::max);
@@ -44,14 +43,14 @@ pub(super) fn sample(sample: &Sample, file: &Path, problems: &mut Vec<Problem>) 
                 );
             }
         }
-        let Some(touch) = &touch.bubble else { continue };
+        let Some(touch) = touch.depth() else { continue };
         imprint(&touch.imprint, name, &mut add);
         if let Some(camera) = &touch.camera {
-            sides[finger.index()] = Some(camera.grasp_from_camera.translation.x);
+            sides.push(camera.grasp_from_camera.translation.x);
             self::camera(camera, &touch.imprint, name, &mut add);
         }
     }
-    if let [Some(right), Some(left)] = sides
+    if let [right, left] = sides[..]
         && right * left > 0.0
     {
         add(
@@ -92,11 +91,11 @@ fn imprint(imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
     }
 }
 
-fn camera(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
+fn camera(camera: &DepthCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
     let k = camera.intrinsics;
     let focal_ok = |f: f64| (FOCAL_RANGE_PX[0]..=FOCAL_RANGE_PX[1]).contains(&f);
     let inside = |c: f64, size: usize| (0.0..=size as f64).contains(&c);
-    let centre_ok = inside(k.cx, bubble::FULL_WIDTH) && inside(k.cy, bubble::FULL_HEIGHT);
+    let centre_ok = inside(k.cx, camera.crop.full[0]) && inside(k.cy, camera.crop.full[1]);
     if !(focal_ok(k.fx) && focal_ok(k.fy) && centre_ok) {
         add(
             format!("the {name} camera's K is implausible: fx {} fy {} cx {} cy {}", k.fx, k.fy, k.cx, k.cy),
@@ -118,7 +117,8 @@ fn camera(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut impl 
         );
     }
     // What the middle of the crop sees is the membrane, and that is near the tool.
-    let seen = k.lift(bubble::WIDTH as f64 / 2.0, bubble::HEIGHT as f64 / 2.0, typical);
+    let [width, height] = camera.depth_reference.size();
+    let seen = camera.lift(width as f64 / 2.0, height as f64 / 2.0, typical);
     let distance = camera.grasp_from_camera.transform_point3(seen).length();
     if distance > NEAR_GRASP_M {
         let w_first = reordered(&camera.grasp_from_camera).transform_point3(seen).length() < NEAR_GRASP_M;
@@ -139,7 +139,7 @@ fn reordered(a: &DAffine3) -> DAffine3 {
 }
 
 /// Depth to cloud to pixel: every measured pixel must come back to itself.
-fn round_trip(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
+fn round_trip(camera: &DepthCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
     let camera_from_grasp = camera.grasp_from_camera.inverse();
     let mut lost = 0usize;
     for v in 0..imprint.height() {
@@ -148,9 +148,8 @@ fn round_trip(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut i
             if !depth.is_finite() {
                 continue;
             }
-            let in_grasp: DVec3 =
-                camera.grasp_from_camera.transform_point3(camera.intrinsics.lift(u as f64, v as f64, depth));
-            let back = camera.intrinsics.project(camera_from_grasp.transform_point3(in_grasp));
+            let in_grasp: DVec3 = camera.grasp_from_camera.transform_point3(camera.lift(u as f64, v as f64, depth));
+            let back = camera.project(camera_from_grasp.transform_point3(in_grasp));
             let missed =
                 back.is_none_or(|(x, y)| (x - u as f64).abs() > ROUND_TRIP_PX || (y - v as f64).abs() > ROUND_TRIP_PX);
             lost += usize::from(missed);

@@ -13,8 +13,8 @@ use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{RawPrediction, ShiftMode};
 use crate::domain::resample::bilinear;
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Scale;
-use crate::domain::sensor::Finger;
 use crate::domain::upright::Turn;
 use crate::infer::bundle::Bundle;
 use crate::infer::classifier::ToolClassifier;
@@ -44,7 +44,7 @@ pub(super) struct GeneratorMethod {
 /// What a method makes of one touch.
 pub(super) struct Made {
     /// Imprints in metres, raw orientation, by finger.
-    pub(super) imprints: [Option<DepthMap>; 2],
+    pub(super) imprints: PerPad<DepthMap>,
     /// A picture in the orientation and size of its file, where that is all there is.
     pub(super) tile: Option<Grid<f32>>,
     /// Time per image, seconds.
@@ -166,43 +166,43 @@ impl Method {
 }
 
 fn measured(case: &Case) -> Made {
-    let imprint = |f: Finger| Some(case.sample.finger(f)?.bubble.as_ref()?.imprint.clone());
-    Made { imprints: Finger::BOTH.map(imprint), tile: None, seconds: None }
+    let imprint = |f: PadId| Some(case.sample.pad(f)?.depth()?.imprint.clone());
+    Made { imprints: case.sample.rig.pads().map(imprint).collect(), tile: None, seconds: None }
 }
 
 fn stored(case: &Case) -> Result<Made, String> {
     let tile = case.lab.clone().ok_or("no stored prediction (NAME_vqvae.png) lies by this picture")?;
-    Ok(Made { imprints: [None, None], tile: Some(tile), seconds: None })
+    Ok(Made { imprints: PerPad::default(), tile: Some(tile), seconds: None })
 }
 
 impl GeneratorMethod {
     fn make(&mut self, cases: &[Case], shift: ShiftMode, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
-        let touches: Vec<(usize, Finger, &RgbGrid)> = cases
+        let touches: Vec<(usize, PadId, &RgbGrid)> = cases
             .iter()
             .enumerate()
             .flat_map(|(at, case)| {
-                Finger::BOTH
-                    .into_iter()
-                    .filter_map(move |f| Some((at, f, &case.sample.finger(f)?.gelslim.as_ref()?.difference)))
+                case.sample.pads.entries().filter_map(move |(f, touch)| Some((at, f, &touch.color()?.difference)))
             })
             .collect();
         let images: Vec<&RgbGrid> = touches.iter().map(|t| t.2).collect();
         let start = Instant::now();
         let raws = self.generate(&images, cx)?;
         let seconds = start.elapsed().as_secs_f64() / images.len().max(1) as f64;
-        let mut made: Vec<Result<Made, String>> =
-            cases.iter().map(|_| Ok(Made { imprints: [None, None], tile: None, seconds: Some(seconds) })).collect();
+        let mut made: Vec<Result<Made, String>> = cases
+            .iter()
+            .map(|_| Ok(Made { imprints: PerPad::default(), tile: None, seconds: Some(seconds) }))
+            .collect();
         for ((at, finger, _), raw) in touches.into_iter().zip(raws) {
             let depth = raw.and_then(|raw| {
                 let depth = self.generator.depth(&raw, shift).map_err(|err| err.to_string())?;
-                let bubble = cases[at].sample.finger(finger).and_then(|t| t.bubble.as_ref());
+                let bubble = cases[at].sample.pad(finger).and_then(|t| t.depth());
                 Ok(match bubble.map(|b| b.imprint.size()) {
                     Some([w, h]) if depth.size() != [w, h] && w * h > 0 => bilinear(&depth, w, h),
                     _ => depth,
                 })
             });
             match (depth, &mut made[at]) {
-                (Ok(depth), Ok(made)) => made.imprints[finger.index()] = Some(depth),
+                (Ok(depth), Ok(made)) => made.imprints[finger] = Some(depth),
                 (Err(why), slot) => *slot = Err(why),
                 (Ok(_), Err(_)) => {}
             }

@@ -15,10 +15,10 @@ use crate::domain::contact::LAB_CAD_DISTANCE_M;
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::metrics::{SsimRange, ssim_ranges, unit_range};
-use crate::domain::pose::{FingerInput, ToolModel, estimate};
+use crate::domain::pose::{FingerInput, Fingers, ToolModel, estimate};
 use crate::domain::resample::bilinear;
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{Sample, Scale};
-use crate::domain::sensor::Finger;
 use crate::domain::sim::pattern_of;
 use crate::domain::units::angle_error;
 use crate::infer::classifier::Verdict;
@@ -83,7 +83,7 @@ impl Tool {
             let mut skip = |case: &Case, why: String| {
                 skipped.push(Skipped { what: case.name.clone(), method: method.name().to_owned(), why });
             };
-            let mut kept: Vec<(&Case, Made, [Option<Mask>; 2])> = Vec::new();
+            let mut kept: Vec<(&Case, Made, PerPad<Mask>)> = Vec::new();
             for (case, made) in cases.iter().zip(made) {
                 let made = match made {
                     Ok(made) => made,
@@ -92,18 +92,23 @@ impl Tool {
                         continue;
                     }
                 };
-                let masks = Finger::BOTH.map(|f| {
+                let masks = case.sample.rig.pads().map(|f| {
                     if self.model.is_none() || case.sample.grasp_from_object.is_none() {
                         return None;
                     }
-                    let imprint = made.imprints[f.index()].as_ref()?;
+                    let imprint = made.imprints[f].as_ref()?;
                     let found = match (setup.mask, mask.as_mut()) {
                         (MaskBy::Unet, Some(model)) => model.predict(imprint).map_err(|err| err.to_string()),
                         (MaskBy::Unet, None) => return None,
                         _ => self.mask(setup.mask, &case.sample, f, imprint),
                     };
-                    found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", f.name()))).ok()
+                    found
+                        .map_err(|why| {
+                            skip(case, format!("{} finger: contact mask: {why}", case.sample.rig.pad_key(f)))
+                        })
+                        .ok()
                 });
+                let masks = masks.collect();
                 kept.push((case, made, masks));
             }
             // Poses on all cores; the models run one by one.
@@ -136,26 +141,26 @@ impl Tool {
     }
 
     /// A mask that needs no model.
-    fn mask(&self, by: MaskBy, sample: &Sample, finger: Finger, imprint: &DepthMap) -> Result<Mask, String> {
+    fn mask(&self, by: MaskBy, sample: &Sample, finger: PadId, imprint: &DepthMap) -> Result<Mask, String> {
         let recipe = match by {
             MaskBy::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
             MaskBy::Threshold(m) => MaskRecipe::Threshold(m.into()),
             MaskBy::Truth | MaskBy::Unet => MaskRecipe::Truth,
         };
-        compute::mask(&recipe, imprint, sample.finger(finger), self.model.as_ref(), sample.grasp_from_object)
+        compute::mask(&recipe, imprint, sample.pad(finger), self.model.as_ref(), sample.grasp_from_object)
             .map_err(|err| err.to_string())
     }
 
     /// The error of the angle from both fingers: NaN without a pose, `None` where there can be none.
-    fn angle(&self, setup: &Setup, sample: &Sample, made: &Made, masks: &[Option<Mask>; 2]) -> Option<f64> {
+    fn angle(&self, setup: &Setup, sample: &Sample, made: &Made, masks: &PerPad<Mask>) -> Option<f64> {
         let (model, truth) = (self.model.as_ref()?, sample.grasp_from_object?);
-        let fingers = Finger::BOTH.map(|f| {
-            let camera = sample.finger(f)?.bubble.as_ref()?.camera.as_ref()?;
-            let mask = Some(masks[f.index()].as_ref()?);
-            Some(FingerInput { imprint: made.imprints[f.index()].as_ref()?, camera, mask })
+        let fingers = Fingers::new(&sample.rig, |f| {
+            let camera = sample.pad(f)?.depth()?.camera.as_ref()?;
+            let mask = Some(masks[f].as_ref()?);
+            Some(FingerInput { imprint: made.imprints[f].as_ref()?, camera, mask })
         });
-        if Finger::BOTH.iter().all(|f| {
-            let bubble = sample.finger(*f).and_then(|t| t.bubble.as_ref());
+        if sample.rig.pads().all(|f| {
+            let bubble = sample.pad(f).and_then(|t| t.depth());
             bubble.is_none_or(|b| b.camera.is_none())
         }) {
             return None;
@@ -201,12 +206,12 @@ impl Tool {
 
 /// The compared images of a grasp: in metres, or stretched to 0..1 where the scale was lost.
 fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
-    let image = |finger: Finger| {
-        let bubble = case.sample.finger(finger)?.bubble.as_ref()?;
+    let image = |finger: PadId| {
+        let bubble = case.sample.pad(finger)?.depth()?;
         if case.sample.scale == Scale::Assumed {
             // On the picture's own pixels and in its orientation, so that stored predictions are not resampled.
             let tile = case.tile.as_ref()?;
-            let prediction = match (&made.tile, &made.imprints[finger.index()]) {
+            let prediction = match (&made.tile, &made.imprints[finger]) {
                 (Some(stored), _) => stored.clone(),
                 (None, Some(imprint)) => bilinear(&imprint.rotated_180(), tile.width(), tile.height()),
                 (None, None) => return None,
@@ -220,13 +225,13 @@ fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
                 verdict: None,
             });
         }
-        let prediction = made.imprints[finger.index()].clone()?;
+        let prediction = made.imprints[finger].clone()?;
         let truth = (!upper).then(|| bubble.imprint.clone());
         let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
         Some(Image { finger: finger.index(), prediction, truth, noise_free, verdict: None })
     };
-    let present = |f: &&Finger| case.sample.finger(**f).is_some();
-    fingers(setup.both_fingers).iter().filter(present).filter_map(|f| image(*f)).collect()
+    let present = |f: &PadId| case.sample.pad(*f).is_some();
+    fingers(&case.sample.rig, setup.both_fingers).filter(present).filter_map(image).collect()
 }
 
 /// Largest minus smallest value of some images.
