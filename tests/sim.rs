@@ -87,8 +87,8 @@ fn contact_points_of_both_fingers_lie_on_the_tool() {
             assert!(distances.len() > 150, "{}: only {} contact pixels", tool.name, distances.len());
             distances.sort_by(f64::total_cmp);
             let median = distances[distances.len() / 2];
-            assert!(median < 3e-4, "{} {}: median {median}", tool.name, finger.name());
-            assert!(distances[distances.len() - 1] < 1.05e-3, "{} {}", tool.name, finger.name());
+            assert!(median < 3e-4, "{} {}: median {median}", tool.name, finger.index());
+            assert!(distances[distances.len() - 1] < 1.05e-3, "{} {}", tool.name, finger.index());
         }
     }
 }
@@ -101,7 +101,7 @@ fn the_contact_mask_is_the_labs_signed_distance_rule() {
             let near = lifted(sample, finger).map(|&p| tool.signed_distance(p) <= 1e-3);
             let both = contact.as_slice().iter().zip(near.as_slice()).filter(|(a, b)| **a && **b).count();
             let either = contact.as_slice().iter().zip(near.as_slice()).filter(|(a, b)| **a || **b).count();
-            assert!(both as f64 / either as f64 > 0.98, "{} {}", tool.name, finger.name());
+            assert!(both as f64 / either as f64 > 0.98, "{} {}", tool.name, finger.index());
         }
     }
 }
@@ -112,7 +112,7 @@ fn the_membrane_never_enters_the_tool() {
         for finger in lab::PADS {
             let deepest =
                 lifted(sample, finger).as_slice().iter().map(|&p| tool.signed_distance(p)).fold(0.0, f64::min);
-            assert!(deepest > -5e-5, "{} {}: {deepest}", tool.name, finger.name());
+            assert!(deepest > -5e-5, "{} {}: {deepest}", tool.name, finger.index());
         }
         let membrane =
             sim::Membrane::press(&SimConfig::default().bubble, tool, sample.grasp_from_object.unwrap().inverse());
@@ -149,7 +149,7 @@ fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
                 all == 0 || f64::from(on as u32) > 0.85 * f64::from(all as u32),
                 "{} {}: {on} of {all}",
                 tool.name,
-                finger.name()
+                finger.index()
             );
         }
     }
@@ -178,7 +178,7 @@ fn gelslim_streaks_frame_the_bars() {
             }
             let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
             if near.len() > 500 && far.len() > 500 {
-                assert!(mean(&near) > 2.5 * mean(&far), "{} {}", tool.name, finger.name());
+                assert!(mean(&near) > 2.5 * mean(&far), "{} {}", tool.name, finger.index());
             }
         }
     }

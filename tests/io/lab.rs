@@ -72,7 +72,7 @@ fn the_deepest_pixels_of_both_fingers_lie_on_the_tool() {
                 let near = |p: f64, lo: f64, hi: f64| p > lo - 0.002 && p < hi + 0.002;
                 inside += usize::from(near(p.x, lo.x, hi.x) && near(p.y, lo.y, hi.y) && near(p.z, lo.z, hi.z));
             }
-            assert!(inside >= 90, "{} {}: {inside} of 100", entry.name, finger.name());
+            assert!(inside >= 90, "{} {}: {inside} of 100", entry.name, finger.index());
         }
     }
 }

@@ -253,7 +253,7 @@ fn a_clicked_point_says_all_about_itself() {
     let clouds = rig.model().cloud(MEASURED).ready().unwrap();
     let layers = rig.model().layers(MEASURED).ready().expect("reasons are there once they are shown");
     let (reason, _) = layers.at(picked.finger, clouds.finger(picked.finger).unwrap(), picked.pixel).unwrap();
-    for label in [format!("Reason {reason}"), format!("Pixel {}", picked.finger.name())] {
+    for label in [format!("Reason {reason}"), format!("Pixel {}", rig.model().finger_name(picked.finger))] {
         assert!(rig.harness.query_all_by_label_contains(&label).count() > 0, "{label}");
     }
     rig.shoot("test-picked");
