@@ -148,7 +148,7 @@ fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
     for finger in cx.state.rig().pads() {
         let on = cx.state.selection.finger == finger;
         let name = cx.state.rig().pad_name(finger).to_owned();
-        let button = ui.add(egui::Button::selectable(on, RichText::new(name).size(12.0)).min_size(vec2(44.0, 20.0)));
+        let button = ui.add(egui::Button::selectable(on, RichText::new(&name).size(12.0)).min_size(vec2(44.0, 20.0)));
         let button = button.accessible_name(format!("{name} finger"));
         if button.on_hover_text(format!("Show the {} finger (U switches)", cx.state.finger_name(finger))).clicked() {
             cx.push(Command::SelectFinger(finger));
