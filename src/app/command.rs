@@ -25,7 +25,7 @@ use super::workbench::WorkbenchCommand;
 use crate::domain::align::basin::Basin;
 use crate::domain::ambiguity::Ambiguity;
 use crate::domain::dataset::PairId;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::io::statistics::ShiftStatistics;
@@ -371,6 +371,8 @@ pub enum Computed {
     Predictions(Vec<Arc<Prediction>>),
     /// Of [`Request::Imprint`] and [`Request::Thumbnail`].
     Depth(Arc<DepthMap>),
+    /// Of [`Request::Imprint`] where a color sensor was predicted.
+    Color(Arc<RgbGrid>),
     /// Of [`Request::Comparison`].
     Comparison(Arc<Comparison>),
     /// Of [`Request::Ledger`].

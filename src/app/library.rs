@@ -14,6 +14,8 @@ use super::keys::{DatasetSeq, PairKey};
 use super::services::DataSource;
 use crate::domain::dataset::{Index, PairEntry, PairId};
 use crate::domain::diffusion::GenerateConfig;
+use crate::domain::rig::Rig;
+use crate::infer::bundle::{Ends, Misfit, SensorPair};
 
 /// What can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -108,7 +110,7 @@ pub struct BundleInfo {
 }
 
 /// The choices that a generator's bundle leaves.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GeneratorInfo {
     /// What it recommends.
     pub defaults: GenerateConfig,
@@ -116,12 +118,29 @@ pub struct GeneratorInfo {
     pub training_steps: usize,
     /// Whether it was trained for guidance.
     pub guided: bool,
+    /// The sensors between which it predicts.
+    pub sensors: SensorPair,
+}
+
+impl BundleInfo {
+    /// Where the bundle, if it is a generator, starts and ends in `rig`; `None` for another kind of bundle.
+    ///
+    /// # Errors
+    /// [`Misfit`].
+    pub fn ends(&self, rig: &Rig) -> Option<Result<Ends, Misfit>> {
+        Some(self.generator.as_ref()?.sensors.ends(&self.name, rig))
+    }
+
+    /// Whether it can be used with the sensors of `rig`.
+    pub fn fits(&self, rig: &Rig) -> bool {
+        self.ends(rig).is_none_or(|ends| ends.is_ok())
+    }
 }
 
 /// What a bundle does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BundleKind {
-    /// GelSlim image to Soft Bubble imprint.
+    /// What one sensor felt to what another would have felt.
     Generator,
     /// Imprint to contact mask.
     Mask,
@@ -190,9 +209,9 @@ impl Library {
         self.bundles.iter().find(|b| &*b.id == id)
     }
 
-    /// The first bundle of a kind whose name is `name`, else the first of that kind.
-    pub fn bundle_named(&self, kind: BundleKind, name: Option<&str>) -> Option<&BundleInfo> {
-        let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind);
+    /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind.
+    pub fn bundle_named(&self, kind: BundleKind, name: Option<&str>, rig: &Rig) -> Option<&BundleInfo> {
+        let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind && b.fits(rig));
         let first = of_kind.clone().next();
         match name {
             Some(name) => of_kind.find(|b| b.name == name).or(first),

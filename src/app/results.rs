@@ -17,7 +17,7 @@ use crate::domain::align::{AlignReport, Directions, PointFit, TraceStep};
 use crate::domain::ambiguity::Ambiguity;
 use crate::domain::ensemble::Spread;
 use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use crate::domain::metrics::Split;
 use crate::domain::postprocess::{ChainReading, Ledger};
 use crate::domain::rig::{PadId, PerPad};
@@ -311,6 +311,8 @@ pub struct Results {
     pub predictions: Cache<Recipe, Prediction>,
     /// Predictions in metres, as large as the bubble image.
     pub imprints: Cache<(Recipe, ShiftMode), DepthMap>,
+    /// Predictions of a color sensor: differences, 0..255 scale.
+    pub colors: Cache<Recipe, RgbGrid>,
     /// Several predictions of one touch.
     pub ensembles: Cache<EnsembleKey, Ensemble>,
     /// Predictions against measurements.
@@ -361,6 +363,7 @@ impl Default for Results {
             thumbnails: Cache::new(32 * MIB),
             predictions: Cache::new(256 * MIB),
             imprints: Cache::new(64 * MIB),
+            colors: Cache::new(32 * MIB),
             ensembles: Cache::new(32 * MIB),
             comparisons: Cache::new(32 * MIB),
             ledgers: Cache::new(24 * MIB),
@@ -391,6 +394,7 @@ impl Results {
         self.thumbnails.clear();
         self.predictions.clear();
         self.imprints.clear();
+        self.colors.clear();
         self.ensembles.clear();
         self.comparisons.clear();
         self.ledgers.clear();

@@ -52,10 +52,13 @@ impl State {
     pub fn seed_recipes(&self, finger: PadId) -> Result<Vec<Recipe>, Absent> {
         self.can_generate()?;
         let touch = self.touch_key(finger).ok_or(Absent::NothingSelected)?;
-        if self.sample().ready().is_some() && self.gelslim(finger).ready().is_none() {
-            return Err(Absent::NoGelSlim);
+        if self.sample().ready().is_some() && !self.can_start(finger) {
+            return Err(Absent::NoInput);
         }
         let first = self.recipe(touch).ok_or(Absent::NoGenerator)?;
+        if self.is_color(&first) {
+            return Err(Absent::PredictsColor);
+        }
         let recipe = |seed| Recipe { seed, ..first.clone() };
         Ok(seeds(first.seed, self.seeds.count).into_iter().map(recipe).collect())
     }

@@ -21,7 +21,7 @@ use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::pose::ToolModel;
-use crate::domain::postprocess::{DepthChain, RawPrediction};
+use crate::domain::postprocess::{ColorChain, DepthChain, RawPrediction};
 use crate::domain::rig::Rig;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
@@ -92,7 +92,7 @@ pub trait DataSource: Send + Sync {
 pub struct GenerateItem<'a> {
     /// What to make.
     pub recipe: Recipe,
-    /// The condition.
+    /// The condition: [`crate::domain::sample::PadTouch::picture`] of the sensor that the bundle starts from.
     pub difference: &'a RgbGrid,
     /// `[width, height]` of the bubble image; `[0, 0]` where there is none.
     pub size: [usize; 2],
@@ -130,6 +130,8 @@ pub struct Generated {
     pub raw: RawPrediction,
     /// Per range mapping the steps to metres, or why it cannot be done.
     pub chains: BTreeMap<ShiftMode, Result<DepthChain, String>>,
+    /// The steps to a color sensor's picture; `None` where it is depth that was predicted.
+    pub color: Option<ColorChain>,
     /// The runtime that made it.
     pub runtime: String,
     /// What it took, seconds, where it was made earlier and only read now.
@@ -156,7 +158,7 @@ pub trait Services: Send + Sync {
     /// The bundles that ship with the program and those in `folders`; what is wrong with those that were refused.
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>);
 
-    /// Runs the generator on GelSlim difference images, all in one batch; one answer for each, in order. The model
+    /// Runs the generator on the pictures of its input sensor, all in one batch; one answer for each, in order. The model
     /// stays loaded between calls; the runtime calls this on one lane only.
     ///
     /// # Errors

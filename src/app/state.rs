@@ -201,6 +201,12 @@ pub enum Absent {
     NoFinger,
     /// The finger has no GelSlim image.
     NoGelSlim,
+    /// The finger has no reading of the sensor that the generator starts from.
+    NoInput,
+    /// The prediction is a color picture.
+    PredictsColor,
+    /// The generators that were found are for other sensors.
+    OtherSensors,
     /// The source only has the GelSlim difference image.
     OnlyDifference,
     /// The finger has no measured imprint.
@@ -233,6 +239,9 @@ impl Absent {
             Self::NothingSelected => "No pair is selected.",
             Self::NoFinger => "This source has no such finger.",
             Self::NoGelSlim => "This finger has no GelSlim image.",
+            Self::NoInput => "This finger has no image of the sensor that the model starts from.",
+            Self::PredictsColor => "The prediction is a color picture: no depth, and so no contact, points or pose.",
+            Self::OtherSensors => "No generator fits the sensors of this data set: the list of models says why.",
             Self::OnlyDifference => "This source only has the difference image.",
             Self::NoBubble => "This finger has no measured imprint.",
             Self::NoPrediction => "No prediction yet.",

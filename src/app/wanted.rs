@@ -15,8 +15,8 @@ use super::services::NamedTool;
 use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use super::workbench::PoseOf;
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::rig::{PadId, PerPad};
+use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::rig::{PadId, PerPad, SensorKind};
 use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use crate::domain::units;
 
@@ -79,6 +79,9 @@ impl State {
             ImprintSource::Measured => Ok(ImprintKey::Measured(touch)),
             ImprintSource::Predicted => {
                 let recipe = self.results.chosen.get(&touch).ok_or(Absent::NoPrediction)?;
+                if self.is_color(recipe) {
+                    return Err(Absent::PredictsColor);
+                }
                 Ok(ImprintKey::Predicted(recipe.clone(), self.settings.shift))
             }
         }
@@ -102,6 +105,9 @@ impl State {
             Some(recipe) => recipe.clone(),
             None => return self.sample().and_then(Absent::NoPrediction, |_| None),
         };
+        if self.is_color(&recipe) {
+            return Lookup::Absent(Absent::PredictsColor);
+        }
         if self.bubble(finger).ready().is_none() {
             return self.bubble(finger).without();
         }
@@ -122,7 +128,10 @@ impl State {
             BundleKind::Mask => (self.settings.mask.bundle.as_deref(), Absent::NoMaskModel),
             BundleKind::Classifier => (None, Absent::NoClassifier),
         };
-        self.library.bundle_named(kind, name).ok_or(absent)
+        let rig = self.rig();
+        let others = self.library.bundles.iter().any(|bundle| bundle.kind == kind && !bundle.fits(&rig));
+        let absent = if others { Absent::OtherSensors } else { absent };
+        self.library.bundle_named(kind, name, &rig).ok_or(absent)
     }
 
     /// Whether something can be generated for the selected pair.
@@ -140,8 +149,33 @@ impl State {
         let Some(sample) = self.sample().ready() else {
             return Ok(());
         };
-        let has = |finger: PadId| sample.pad(finger).is_some_and(|t| t.color().is_some());
-        if sample.rig.pads().any(has) { Ok(()) } else { Err(Absent::NoGelSlim) }
+        if sample.rig.pads().any(|finger| self.has_input(sample, finger)) { Ok(()) } else { Err(Absent::NoInput) }
+    }
+
+    /// Whether a finger has a reading of the sensor that the generator starts from.
+    fn has_input(&self, sample: &Sample, finger: PadId) -> bool {
+        let ends = self.bundle(BundleKind::Generator).ok().and_then(|bundle| bundle.ends(&sample.rig)?.ok());
+        ends.is_some_and(|ends| sample.pad(finger).is_some_and(|touch| touch.reading(ends.input).is_some()))
+    }
+
+    /// Whether something can be generated for a finger of the selected pair, which is loaded.
+    pub fn can_start(&self, finger: PadId) -> bool {
+        self.sample().ready().is_some_and(|sample| self.has_input(sample, finger))
+    }
+
+    /// Whether a prediction is a color picture.
+    pub(super) fn is_color(&self, recipe: &Recipe) -> bool {
+        let bundle = self.library.bundle(&recipe.bundle).and_then(|bundle| bundle.generator.as_ref());
+        bundle.is_some_and(|generator| generator.sensors.output.kind == SensorKind::Color)
+    }
+
+    /// The predicted color picture shown for one finger, where that is what the model predicts.
+    pub fn predicted_color(&self, finger: PadId) -> Option<Lookup<'_, RgbGrid>> {
+        let recipe = self.chosen(finger).filter(|recipe| self.is_color(recipe))?;
+        Some(match self.results.colors.get(recipe) {
+            Some(picture) => Lookup::Ready(picture),
+            None => self.missing(&Request::Imprint(recipe.clone(), self.settings.shift)),
+        })
     }
 
     /// The recipe of the automatic mask that the settings ask for.
@@ -505,7 +539,7 @@ impl Wanted<'_> {
     /// What was made of a touch before this start of the program.
     fn stored(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
-        if state.gelslim(finger).ready().is_some() && state.bundle(BundleKind::Generator).is_ok() {
+        if state.can_start(finger) {
             self.ask(state.results.looked_up.contains(&touch), Request::Stored(touch));
         }
     }
@@ -524,7 +558,7 @@ impl Wanted<'_> {
         }
         let recipe = Recipe { touch, ..made.clone() };
         let under_way = state.tasks.generating(&recipe).is_some();
-        if state.library.bundle(&recipe.bundle).is_some() && state.gelslim(finger).ready().is_some() && !under_way {
+        if state.library.bundle(&recipe.bundle).is_some() && state.can_start(finger) && !under_way {
             self.ask(state.results.predictions.contains(&recipe), Request::Prediction(recipe));
         }
     }
@@ -539,7 +573,8 @@ impl Wanted<'_> {
             return;
         }
         let key = (recipe.clone(), state.settings.shift);
-        self.ask(state.results.imprints.contains(&key), Request::Imprint(key.0, key.1));
+        let there = state.results.imprints.contains(&key) || state.results.colors.contains(recipe);
+        self.ask(there, Request::Imprint(key.0, key.1));
     }
 
     fn comparison(&mut self, finger: PadId, touch: TouchKey) {

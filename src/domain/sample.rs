@@ -1,5 +1,6 @@
 //! One loaded grasp: what the sensors of each pad felt, the rig it was felt with, and the truth where it is known.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
@@ -157,6 +158,15 @@ impl PadTouch {
         self.readings.iter_mut().find_map(|(_, reading)| match reading {
             Reading::Depth(touch) => Some(touch),
             Reading::Color(_) => None,
+        })
+    }
+
+    /// A sensor's reading as a model takes it: the color difference, or the imprint in each of three channels. Pixels of an
+    /// imprint that are no measurement count as not pushed in.
+    pub fn picture(&self, sensor: SensorId) -> Option<Cow<'_, RgbGrid>> {
+        Some(match self.reading(sensor)? {
+            Reading::Color(touch) => Cow::Borrowed(&touch.difference),
+            Reading::Depth(touch) => Cow::Owned(touch.imprint.map(|&d| [if d.is_finite() { d } else { 0.0 }; 3])),
         })
     }
 

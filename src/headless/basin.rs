@@ -99,7 +99,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let name = entry.tool.as_deref();
     let name = name.ok_or_else(|| anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name))?;
     let tool = pose::tool_model(&dataset, name)?;
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let predicted = args.imprint == Imprint::Predicted;
     let imprints = if predicted { predictor.imprints(&sample)? } else { pose::measured(&sample) };
     let (mask, masks) = pose::masks(&args.mask, &sample, &tool, &imprints, predicted, &mut predictor)?;

@@ -1,5 +1,6 @@
 //! `touch2touch generate`: predicted imprints of a whole dataset, beside the measured ones.
 
+use crate::domain::postprocess::Picture;
 use std::convert::Infallible;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -15,7 +16,7 @@ use crate::app::jobs::compute;
 use crate::app::results::Comparison;
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
-use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use crate::domain::rig::{PadId, Rig, Text};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::{metrics, resample};
@@ -71,6 +72,18 @@ impl FingerArg {
         Ok(vec![finger])
     }
 }
+
+/// What a prediction is measured in.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Unit {
+    Metres,
+    /// Of 0..255: a color picture.
+    Levels,
+}
+
+/// What PSNR and SSIM of a color picture mean.
+const COLOR_CONVENTION: &str = "difference image of the color sensor on the 0..255 scale, peak and range 255; the split \
+    by footprint, contact and pose need depth and are left out";
 
 /// Figures of one prediction. PSNR and SSIM are those of `convention`.
 #[derive(Debug, Default, Clone, Serialize)]
@@ -173,11 +186,12 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let ids = super::spread(dataset.index.pairs.len(), args.limit);
     let fingers = args.finger.fingers(&dataset.rig)?;
     let output = Output::new(args.common, "generating", ids.len());
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let config = predictor.config()?;
     let mut pairs = Vec::new();
     let mut complete = !ids.is_empty();
     let mut scale = Scale::Measured;
+    let mut unit = Unit::Metres;
     for id in ids {
         let id = PairId(id as u32);
         let name = dataset.index.pairs[id.0 as usize].name.clone();
@@ -191,26 +205,40 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             let mut touches = Vec::new();
             for finger in fingers {
                 let Some(touch) = sample.pad(finger) else { continue };
-                let Some(gelslim) = touch.color() else { anyhow::bail!("no GelSlim image") };
-                touches.push((finger, touch, &gelslim.difference));
+                let Some(picture) = predictor.condition(touch)? else { return Err(predictor.no_condition()) };
+                touches.push((finger, touch, picture));
             }
-            let differences: Vec<_> = touches.iter().map(|(_, _, difference)| *difference).collect();
+            let pictures: Vec<_> = touches.iter().map(|(_, _, picture)| &**picture).collect();
             let shift = predictor.shift();
             predictor.generator()?;
             let start = Instant::now();
-            let predictions = predictor.predict(&differences)?;
+            let predictions = predictor.predict(&pictures)?;
             let seconds = start.elapsed().as_secs_f64() / predictions.len().max(1) as f64;
-            for ((finger, touch, difference), predicted) in touches.into_iter().zip(predictions) {
-                let imprint = predictor.generator()?.depth(&predicted.raw, shift)?;
+            for ((finger, touch, picture), predicted) in touches.into_iter().zip(predictions) {
                 let stem = stem(&name, &sample.rig.pad_key(finger));
-                write(&args.out, &stem, &imprint)?;
                 let kept = predicted.kept;
                 let ambiguity = touch.color().and_then(|g| ambiguity(&g.difference));
                 let key = sample.rig.pad_key(finger);
                 let mut pair = Pair { name: name.clone(), finger: key, ambiguity, seconds, kept, ..Pair::default() };
+                let imprint = match predictor.generator()?.picture(&predicted.raw, shift)? {
+                    Picture::Depth(imprint) => imprint,
+                    Picture::Color(difference) => {
+                        unit = Unit::Levels;
+                        write_color(&args.out, &stem, &difference)?;
+                        if let Some(measured) = touch.color() {
+                            let [w, h] = measured.difference.size();
+                            let sized = resample::bilinear_rgb(&difference, w, h);
+                            let (psnr, ssim) = metrics::color(&sized, &measured.difference)?;
+                            (pair.psnr_db, pair.ssim) = (psnr.db(), Some(ssim));
+                        }
+                        made.push(pair);
+                        continue;
+                    }
+                };
+                write(&args.out, &stem, &imprint)?;
                 score(&dataset, id, (finger, &sample), &imprint, &mut pair)?;
                 if args.ensemble.seeds > 1 {
-                    let found = seeds::predict(&mut predictor, difference, args.ensemble.seeds)?;
+                    let found = seeds::predict(&mut predictor, &picture, args.ensemble.seeds)?;
                     let mut of_mean = Pair::default();
                     score(&dataset, id, (finger, &sample), &found.spread.mean, &mut of_mean)?;
                     let scores = (of_mean.psnr_db, of_mean.ssim);
@@ -230,7 +258,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     }
     let report = Report {
         mean: mean(&pairs),
-        convention: convention(scale),
+        convention: if unit == Unit::Levels { COLOR_CONVENTION } else { convention(scale) },
         bundle: predictor.bundle_name().to_owned(),
         runtime: predictor.generator()?.engine().label(),
         sampler: config.sampler.key(),
@@ -310,6 +338,15 @@ fn write(out: &Path, stem: &str, imprint: &DepthMap) -> anyhow::Result<()> {
     crate::io::npz::write_npy(&out.join(format!("{stem}.npy")), imprint)?;
     let picture = imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
     images::write_grey16(&out.join(format!("{stem}.png")), &picture)?;
+    Ok(())
+}
+
+/// Writes `NAME_FINGER.png`: the difference of a color sensor's images around the middle grey, in its raw orientation;
+/// and `NAME_FINGER.npy` with the numbers (f32, 3 x height x width).
+fn write_color(out: &Path, stem: &str, difference: &RgbGrid) -> anyhow::Result<()> {
+    crate::io::npz::write_npy_planes(&out.join(format!("{stem}.npy")), difference)?;
+    let picture = difference.map(|pixel| pixel.map(|v| v + 128.0));
+    images::write_rgb8(&out.join(format!("{stem}.png")), &picture)?;
     Ok(())
 }
 

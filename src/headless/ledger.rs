@@ -120,14 +120,15 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     };
     let key = sample.rig.pad_key(finger);
     let touch = sample.pad(finger).ok_or_else(|| anyhow::anyhow!("{name}: there is no {key} finger"))?;
-    let gelslim = touch.color().ok_or_else(|| anyhow::anyhow!("{name}: no GelSlim image"))?;
     let truth = touch.depth().map(|b| &b.imprint);
 
     let output = Output::new(args.common, "generating", 1);
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let config = predictor.config()?;
     let shift = predictor.shift();
-    let raw = predictor.predict_one(&gelslim.difference)?;
+    let picture = predictor.condition(touch)?;
+    let picture = picture.ok_or_else(|| predictor.no_condition().context(name.clone()))?;
+    let raw = predictor.predict_one(&picture)?;
     let spec = predictor.generator()?.spec();
     let mut chain = spec.depth_chain(shift)?;
     let mut shift_name = shift.label();
@@ -163,7 +164,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
         }),
         stages: found.stages.iter().map(stage).collect(),
         readings,
-        ambiguity: ambiguity(&gelslim.difference),
+        ambiguity: touch.color().and_then(|color| ambiguity(&color.difference)),
         flags: found.flags,
     };
     output.finish(&report, || text(&report))?;

@@ -103,7 +103,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         );
     }
     let output = Output::new(args.common, "exporting", entries.len());
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
     let config = ExportConfig { seed: args.split_seed, rig: dataset.rig.clone(), ..ExportConfig::default() };
     let report = export_unet::export(&args.out, &entries, &config, |i| {

@@ -222,7 +222,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             .map_err(|err| anyhow::anyhow!("cannot create the folder: {err}: {}", folder.display()))?;
     }
     let output = Output::new(args.common, "aligning", ids.len());
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
     let mut cases = Vec::new();
     let store = MaskStore::for_dataset(&dataset).ok();

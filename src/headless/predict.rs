@@ -1,7 +1,9 @@
 //! The options and models that `generate` and `pose` share. Models are loaded when first needed.
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -11,9 +13,9 @@ use strum::IntoEnumIterator as _;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::postprocess::{RawPrediction, RefitShift, ShiftMode};
-use crate::domain::rig::{PadId, PerPad};
-use crate::domain::sample::Sample;
-use crate::infer::bundle::{Bundle, default_roots, find};
+use crate::domain::rig::{PadId, PerPad, Rig, SensorId};
+use crate::domain::sample::{PadTouch, Sample};
+use crate::infer::bundle::{Bundle, Ends, default_roots, find};
 use crate::infer::engine::EngineChoice;
 use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
@@ -146,7 +148,11 @@ impl RuntimeArg {
 }
 
 /// The bundle in the named folder, else the first one found that fits.
-pub(super) fn find_bundle(named: Option<&PathBuf>, kind: &str, fits: fn(&Bundle) -> bool) -> anyhow::Result<Bundle> {
+pub(super) fn find_bundle(
+    named: Option<&PathBuf>,
+    kind: &str,
+    fits: impl FnMut(&Bundle) -> bool,
+) -> anyhow::Result<Bundle> {
     if let Some(dir) = named {
         return Ok(Bundle::open(dir)?);
     }
@@ -167,6 +173,10 @@ pub(super) struct Predictor {
     generator: Option<Generator>,
     mask_model: Option<MaskModel>,
     store: Option<Store>,
+    /// The sensors of the data.
+    rig: Arc<Rig>,
+    /// Where the generator starts and ends in them.
+    ends: Option<Ends>,
 }
 
 /// A predicted picture, and whether it was made before.
@@ -176,8 +186,8 @@ pub(super) struct Made {
 }
 
 impl Predictor {
-    /// Nothing is loaded yet.
-    pub(super) fn new(args: &ModelArgs) -> Self {
+    /// For data of these sensors. Nothing is loaded yet.
+    pub(super) fn new(args: &ModelArgs, rig: &Arc<Rig>) -> Self {
         let store = if args.no_cache { None } else { super::cache::store() };
         Self {
             args: args.clone(),
@@ -187,6 +197,8 @@ impl Predictor {
             generator: None,
             mask_model: None,
             store,
+            rig: rig.clone(),
+            ends: None,
         }
     }
 
@@ -197,13 +209,34 @@ impl Predictor {
     /// The generator, loaded at the first call.
     pub(super) fn generator(&mut self) -> anyhow::Result<&mut Generator> {
         if self.generator.is_none() {
-            let bundle = find_bundle(self.args.bundle.as_ref(), "generator", |b| b.generator().is_some())?;
+            let rig = &*self.rig;
+            let fits = |b: &Bundle| b.ends(rig).is_some_and(|ends| ends.is_ok());
+            let kind = format!("generator for {}", rig.name);
+            let bundle = find_bundle(self.args.bundle.as_ref(), &kind, fits)?;
+            self.ends = bundle.ends(rig).transpose()?;
             self.refit = self.read_refit(&bundle)?;
             self.bundle_name = bundle.name().to_owned();
             self.bundle_hash = bundle.hash().to_owned();
             self.generator = Some(Generator::open(&bundle, self.choice())?);
         }
         Ok(self.generator.as_mut().expect("it was just loaded"))
+    }
+
+    /// The picture of a touch that the generator starts from; `None` where the touch has no such reading.
+    pub(super) fn condition<'a>(&mut self, touch: &'a PadTouch) -> anyhow::Result<Option<Cow<'a, RgbGrid>>> {
+        self.generator()?;
+        Ok(self.ends.and_then(|ends| touch.picture(ends.input)))
+    }
+
+    /// The sensor that the generator starts from; call it after [`Self::generator`].
+    pub(super) fn input(&self) -> Option<SensorId> {
+        self.ends.map(|ends| ends.input)
+    }
+
+    /// What to say where no touch has it.
+    pub(super) fn no_condition(&self) -> anyhow::Error {
+        let sensor = self.ends.and_then(|ends| self.rig.sensor(ends.input));
+        anyhow::anyhow!("no {} image", sensor.map_or("GelSlim", |sensor| &sensor.name))
     }
 
     /// The statistics for the refit shift, which must be of this bundle.
@@ -308,16 +341,24 @@ impl Predictor {
         }
     }
 
-    /// Predicted imprints (metres, raw orientation) of the fingers that have a GelSlim image.
+    /// The touches of a sample that the generator can start from, with the picture that it takes.
+    pub(super) fn conditions<'a>(&mut self, sample: &'a Sample) -> anyhow::Result<Vec<(PadId, Cow<'a, RgbGrid>)>> {
+        let mut found = Vec::new();
+        for (pad, touch) in sample.pads.entries() {
+            found.extend(self.condition(touch)?.map(|picture| (pad, picture)));
+        }
+        Ok(found)
+    }
+
+    /// Predicted imprints (metres, raw orientation) of the fingers that the generator can start from.
     pub(super) fn imprints(&mut self, sample: &Sample) -> anyhow::Result<PerPad<DepthMap>> {
+        let conditions = self.conditions(sample)?;
         let shift = self.shift();
-        let gelslim = |finger| sample.pad(finger).and_then(|t| t.color());
-        let fingers: Vec<PadId> = sample.rig.pads().filter(|finger| gelslim(*finger).is_some()).collect();
-        let differences: Vec<&RgbGrid> = fingers.iter().filter_map(|f| Some(&gelslim(*f)?.difference)).collect();
-        let made = self.predict(&differences)?;
+        let pictures: Vec<&RgbGrid> = conditions.iter().map(|(_, picture)| &**picture).collect();
+        let made = self.predict(&pictures)?;
         let mut out: PerPad<DepthMap> = sample.rig.pads().map(|_| None).collect();
-        for (finger, made) in fingers.into_iter().zip(made) {
-            out[finger] = Some(self.generator()?.depth(&made.raw, shift)?);
+        for ((finger, _), made) in conditions.iter().zip(made) {
+            out[*finger] = Some(self.generator()?.depth(&made.raw, shift)?);
         }
         Ok(out)
     }

@@ -155,8 +155,9 @@ pub(super) fn fan(
 ) -> anyhow::Result<PoseFan> {
     let mut fingers: PerPad<FingerSeeds> = PerPad::default();
     for finger in sample.rig.pads() {
-        if let Some(gelslim) = sample.pad(finger).and_then(|t| t.color()) {
-            fingers[finger] = Some(predict(predictor, &gelslim.difference, count)?);
+        let Some(touch) = sample.pad(finger) else { continue };
+        if let Some(picture) = predictor.condition(touch)? {
+            fingers[finger] = Some(predict(predictor, &picture, count)?);
         }
     }
     let source = match args.mask {

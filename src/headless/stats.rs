@@ -55,16 +55,18 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let ids: Vec<PairId> =
         super::spread(dataset.index.pairs.len(), args.limit).into_iter().map(|i| PairId(i as u32)).collect();
     let output = Arc::new(Output::new(args.common, "predicting", ids.len()));
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let config = predictor.config()?;
     let chain = predictor.generator()?.spec().depth_chain(ShiftMode::Raw)?;
     let engine = predictor.generator()?.engine().label();
+    let input = predictor.input().ok_or_else(|| anyhow::anyhow!("the bundle is not a generator"))?;
     let scale = std::cell::Cell::new(Scale::Measured);
     let bar = output.clone();
     let cx = JobCx::new(Cancel::default(), Arc::new(move |p| bar.set(p.done as usize, p.total as usize)));
     let pass = statistics::pass(
         &ids,
         &args.finger.fingers(&dataset.rig)?,
+        input,
         |id| {
             let sample = dataset.load(id).map_err(|err| TaskError::from_error("Load", &err))?;
             scale.set(sample.scale);

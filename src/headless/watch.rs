@@ -20,7 +20,7 @@ use super::pose::{Engines, parse_engines};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::{PairId, Problem};
-use crate::domain::rig::PerPad;
+use crate::domain::rig::{PerPad, Rig};
 use crate::domain::sample::DepthCamera;
 use crate::io::dataset::{Dataset, cameras_of};
 use crate::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
@@ -115,7 +115,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
         cameras: cameras(args.camera.as_deref())?,
     };
     let mut follower = Follower::new(&args.path, config)?;
-    let mut worker = Worker::new(args, Predictor::new(&args.model), stop.clone())?;
+    let mut worker = Worker::new(args, Predictor::new(&args.model, &Rig::lab()), stop.clone())?;
     let ready = json!({
         "event": "ready", "folder": args.path, "recipe": worker.recipe(None)?, "period_ms": PERIOD.as_secs_f64() * 1e3,
         "load_and_warm_up_s": worker.warm_s,

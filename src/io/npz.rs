@@ -8,7 +8,7 @@ use npyz::{NpyFile, Order, TypeChar, WriterBuilder as _};
 
 use super::atomic;
 use super::pt::{Tensor, Values};
-use crate::domain::grid::Grid;
+use crate::domain::grid::{Grid, RgbGrid};
 
 /// Why an `.npz` file cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -46,12 +46,24 @@ pub enum NpzError {
 /// # Errors
 /// [`NpzError::Io`] if the file cannot be written.
 pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
-    let shape = [image.height() as u64, image.width() as u64];
+    write_values(file, &[image.height() as u64, image.width() as u64], image.as_slice())
+}
+
+/// Writes the planes of a color picture as `.npy`: f32, 3 x height x width.
+///
+/// # Errors
+/// [`NpzError::Io`] if the file cannot be written.
+pub fn write_npy_planes(file: &Path, picture: &RgbGrid) -> Result<(), NpzError> {
+    let values: Vec<f32> = (0..3).flat_map(|c| picture.as_slice().iter().map(move |pixel| pixel[c])).collect();
+    write_values(file, &[3, picture.height() as u64, picture.width() as u64], &values)
+}
+
+fn write_values(file: &Path, shape: &[u64], values: &[f32]) -> Result<(), NpzError> {
     atomic::write(file, |out| {
         // Buffered: the writer hands over value by value.
-        let mut bytes = Vec::with_capacity(128 + 4 * image.len());
-        let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut bytes).begin_nd()?;
-        writer.extend(image.as_slice())?;
+        let mut bytes = Vec::with_capacity(128 + 4 * values.len());
+        let mut writer = npyz::WriteOptions::new().default_dtype().shape(shape).writer(&mut bytes).begin_nd()?;
+        writer.extend(values)?;
         writer.finish()?;
         out.write_all(&bytes)
     })

@@ -57,8 +57,15 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
         let response = combo.show_ui(ui, |ui| {
             for bundle in bundles {
                 let chosen = bundle.name == current;
-                let option = ui.selectable_label(chosen, &bundle.name);
-                if option.on_hover_text(bundle.folder.display().to_string()).clicked() {
+                // One for other sensors stays in the list, and says why it cannot be used.
+                let misfit = bundle.ends(&cx.state.rig()).and_then(Result::err);
+                let label = egui::Button::selectable(chosen, &bundle.name);
+                let option = ui.add_enabled(misfit.is_none(), label);
+                let option = match misfit {
+                    Some(misfit) => option.on_disabled_hover_text(misfit.to_string()),
+                    None => option.on_hover_text(bundle.folder.display().to_string()),
+                };
+                if option.clicked() {
                     new.bundle = Some(bundle.name.clone());
                 }
             }

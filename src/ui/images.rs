@@ -199,7 +199,13 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId) -> Opti
         Pane::Measured => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Measured, finger)),
         Pane::Predicted => match state.preview(finger) {
             Some(preview) => preview_image(cx, ui, finger, preview),
-            None => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
+            None => match state.predicted_color(finger) {
+                Some(picture) => {
+                    gel_image(cx, ui, pane, finger, picture);
+                    None
+                }
+                None => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
+            },
         },
         _ => {
             let error = state.comparison(finger).and_then(Absent::NoPrediction, |c| Some(&c.error));
@@ -312,8 +318,9 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lo
     let output = canvas.show(ui, &mut view);
     cx.local.gel_view = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), (touch, pane), squares, || {
-        let picture = if pane == Pane::GelDifference {
+    let recipe = cx.state.chosen(finger).filter(|_| pane == Pane::Predicted);
+    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), (touch, pane, recipe), squares, || {
+        let picture = if matches!(pane, Pane::GelDifference | Pane::Predicted) {
             rgb_image(image, difference_gain(image), 128.0)
         } else {
             rgb_image(image, 1.0, 0.0)

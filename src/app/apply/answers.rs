@@ -193,6 +193,10 @@ fn store(state: &mut State, request: Request, computed: Computed) {
             let size = bytes(&depth);
             results.imprints.insert((recipe, shift), depth, size);
         }
+        (Request::Imprint(recipe, _), Computed::Color(picture)) => {
+            let size = picture.len() * 12;
+            results.colors.insert(recipe, picture, size);
+        }
         (Request::Comparison(recipe, shift), Computed::Comparison(comparison)) => {
             let size = bytes(&comparison.error);
             results.comparisons.insert((recipe, shift), comparison, size);

@@ -28,9 +28,9 @@ pub(super) fn same_seed(state: &mut State, effects: &mut Vec<Effect>) {
     // A finger without a GelSlim image is left out; while the sample loads, the job finds out.
     let loaded = state.sample().ready().is_some();
     let mut fingers = state.fingers_to_generate();
-    fingers.retain(|finger| !loaded || state.gelslim(*finger).ready().is_some());
+    fingers.retain(|finger| !loaded || state.can_start(*finger));
     if fingers.is_empty() {
-        return state.log.error(&refusal(Absent::NoGelSlim));
+        return state.log.error(&refusal(Absent::NoInput));
     }
     start(state, &fingers, effects);
 }

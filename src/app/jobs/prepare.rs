@@ -1,5 +1,6 @@
 //! From a request to a job: gathers the inputs from the state, so that the job needs the state no more.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::super::command::Computed;
@@ -10,7 +11,8 @@ use super::super::services::SharedServices;
 use super::super::state::State;
 use super::{JobCx, Lane, compute, generate, inspect, ledger};
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::rig::PerPad;
+use crate::domain::postprocess::PostprocessError;
+use crate::domain::rig::{PerPad, SensorId};
 use crate::domain::sample::Sample;
 
 /// The body of a job.
@@ -106,14 +108,16 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             let bundles = state.library.bundles.clone();
             let runtime = state.settings.runtime;
             let sample = results.samples.get(&touch.pair)?.clone();
-            sample.pad(touch.finger)?.color()?;
+            // Only sensors that some bundle starts from.
+            let starts = bundles.iter().filter_map(|bundle| bundle.ends(&sample.rig)?.ok()).map(|ends| ends.input);
+            let inputs: BTreeSet<SensorId> = starts.collect();
             job(
                 Lane::Files,
                 "Look for earlier predictions".into(),
                 Box::new(move |_| {
-                    let gelslim = sample.pad(touch.finger).and_then(|t| t.color());
-                    let found = gelslim.map(|g| services.stored(&bundles, runtime, touch, &g.difference));
-                    Ok(Computed::Predictions(found.unwrap_or_default().into_iter().map(Arc::new).collect()))
+                    let pictures = inputs.iter().filter_map(|input| sample.pad(touch.finger)?.picture(*input));
+                    let found = pictures.flat_map(|picture| services.stored(&bundles, runtime, touch, &picture));
+                    Ok(Computed::Predictions(found.map(Arc::new).collect()))
                 }),
             )
         }
@@ -149,6 +153,17 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             // Without a measurement the bundle's own size is kept.
             let size = bubble.map_or([0, 0], |b| b.imprint.size());
             let shift = *shift;
+            if let Some(chain) = prediction.output.color {
+                return job(
+                    Lane::Compute,
+                    "Predicted color picture".into(),
+                    Box::new(move |_| {
+                        let picture = chain.run(&prediction.output.raw);
+                        let fail = |err: PostprocessError| TaskError::from_error("Predicted color picture", &err);
+                        Ok(Computed::Color(Arc::new(picture.map_err(fail)?)))
+                    }),
+                );
+            }
             job(
                 Lane::Compute,
                 "Prediction in metres".into(),

@@ -13,7 +13,7 @@ use crate::domain::dataset::PairId;
 use crate::domain::grid::RgbGrid;
 use crate::domain::mesh::sampling::spread;
 use crate::domain::postprocess::{DepthChain, RawPrediction, ShiftFit};
-use crate::domain::rig::PadId;
+use crate::domain::rig::{PadId, SensorId};
 use crate::domain::sample::Sample;
 use crate::io::masks::now_unix_s;
 use crate::io::statistics::{Provenance, ShiftStatistics, utc_text};
@@ -44,6 +44,7 @@ pub struct Pass {
 pub fn pass(
     pairs: &[PairId],
     fingers: &[PadId],
+    input: SensorId,
     load: impl Fn(PairId) -> Result<Arc<Sample>, TaskError>,
     mut predict: impl FnMut(PairId, PadId, &RgbGrid) -> Result<Predicted, TaskError>,
     cx: &JobCx,
@@ -61,11 +62,12 @@ pub fn pass(
         };
         for finger in fingers {
             let touch = sample.pad(*finger);
-            let (Some(gelslim), Some(bubble)) = (touch.and_then(|t| t.color()), touch.and_then(|t| t.depth())) else {
+            let (Some(picture), Some(bubble)) = (touch.and_then(|t| t.picture(input)), touch.and_then(|t| t.depth()))
+            else {
                 continue;
             };
             cx.check(WHAT)?;
-            let added = predict(*pair, *finger, &gelslim.difference).and_then(|(raw, chain)| {
+            let added = predict(*pair, *finger, &picture).and_then(|(raw, chain)| {
                 pass.fit.add(&chain, &raw, &bubble.imprint).map_err(|err| TaskError::from_error(WHAT, &err))
             });
             match added {
@@ -101,10 +103,13 @@ pub fn of_data_set(
     let mut engine = String::new();
     let scale = std::cell::Cell::new("measured");
     // The steps of each prediction are not worth showing; cancelling it is.
+    let ends = bundle.ends(&source.rig()).transpose().map_err(|err| TaskError::from_error(WHAT, &err))?;
+    let input = ends.ok_or_else(|| TaskError::new(WHAT, "the bundle is not a generator"))?.input;
     let quiet = JobCx::new(cx.cancel.clone(), Arc::new(|_| {}));
     let pass = pass(
         &pairs,
         &source.rig().pad_list(),
+        input,
         |pair| {
             let sample = source.load(pair)?;
             if sample.scale == crate::domain::sample::Scale::Assumed {

@@ -464,6 +464,7 @@ pub fn info(bundle: &Bundle) -> BundleInfo {
             defaults: spec.defaults,
             training_steps: spec.schedule.training_steps(),
             guided: spec.guidance.is_some(),
+            sensors: spec.sensors(),
         }),
     }
 }

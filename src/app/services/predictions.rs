@@ -15,7 +15,7 @@ use super::live::{LiveServices, lock, open_bundle};
 use super::{GenerateItem, Generated};
 use crate::domain::diffusion::Progress;
 use crate::domain::grid::RgbGrid;
-use crate::domain::postprocess::{DepthChain, RawPrediction};
+use crate::domain::postprocess::{ColorChain, DepthChain, RawPrediction};
 use crate::infer::bundle::GeneratorSpec;
 use crate::infer::engine::{EngineKind, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
@@ -24,10 +24,11 @@ use crate::infer::recipe::{self, input_digest};
 /// Predictions of one touch that are read back; older ones stay on the disk.
 const LISTED: usize = 16;
 
-type Chains = BTreeMap<ShiftMode, Result<DepthChain, String>>;
+type Chains = (BTreeMap<ShiftMode, Result<DepthChain, String>>, Option<ColorChain>);
 
 fn chains(spec: &GeneratorSpec) -> Chains {
-    ShiftMode::iter().map(|mode| (mode, spec.depth_chain(mode).map_err(|err| err.to_string()))).collect()
+    let depth = ShiftMode::iter().map(|mode| (mode, spec.depth_chain(mode).map_err(|err| err.to_string()))).collect();
+    (depth, spec.color_chain())
 }
 
 /// The recipe on the disk: what the recipe of the studio stands for on this machine.
@@ -73,10 +74,11 @@ pub(super) fn generate<'i>(
 
     if fresh.is_empty() {
         // Nothing has to be loaded to show what is there.
-        let chains = open_bundle(&what, bundle)?.generator().map(chains).unwrap_or_default();
+        let (chains, color) = open_bundle(&what, bundle)?.generator().map(chains).unwrap_or_default();
         let answer = |(raw, seconds)| Generated {
             raw,
             chains: chains.clone(),
+            color,
             runtime: engine.label().into(),
             kept: Some(seconds),
         };
@@ -92,7 +94,7 @@ pub(super) fn generate<'i>(
         *loaded = Some((key, Generator::open(&checked, runtime.into()).map_err(fail)?));
     }
     let Some((_, generator)) = loaded.as_mut() else { return Err(TaskError::new(what, "no model is loaded")) };
-    let chains = chains(generator.spec());
+    let (chains, color) = chains(generator.spec());
     let label = generator.engine().label();
     let begin = std::time::Instant::now();
     let differences: Vec<&RgbGrid> = images.iter().map(|(difference, _)| *difference).collect();
@@ -112,7 +114,7 @@ pub(super) fn generate<'i>(
     let answer = |(at, made): (usize, Option<(RawPrediction, f64)>)| {
         let (raw, seconds) = made?;
         let kept = (!fresh.contains(&at)).then_some(seconds);
-        Some(Generated { raw, chains: chains.clone(), runtime: label.to_owned(), kept })
+        Some(Generated { raw, chains: chains.clone(), color, runtime: label.to_owned(), kept })
     };
     Ok(kept.into_iter().enumerate().filter_map(answer).collect())
 }
@@ -121,7 +123,7 @@ pub(super) fn generate<'i>(
 struct Follow<'a> {
     cx: &'a JobCx,
     items: &'a [&'a GenerateItem<'a>],
-    chains: &'a Chains,
+    chains: &'a BTreeMap<ShiftMode, Result<DepthChain, String>>,
 }
 
 impl Observer for Follow<'_> {
@@ -164,7 +166,7 @@ pub(super) fn stored(
             let checked = open_bundle("Look for earlier predictions", bundle).ok()?;
             checked.generator().map(chains)
         });
-        let Some(chains) = chains.clone() else { continue };
+        let Some((chains, color)) = chains.clone() else { continue };
         let runtime = match stored.recipe.engine {
             made if Some(made) == engine => runtime,
             EngineKind::Rten => RuntimeChoice::Rten,
@@ -172,7 +174,7 @@ pub(super) fn stored(
         };
         let recipe = Recipe::new(touch, bundle.id.clone(), runtime, &stored.recipe.config());
         let (label, seconds) = (stored.recipe.engine.label().to_owned(), stored.seconds);
-        let output = Generated { raw: stored.raw, chains, runtime: label, kept: Some(seconds) };
+        let output = Generated { raw: stored.raw, chains, color, runtime: label, kept: Some(seconds) };
         predictions.push(Prediction { recipe, output, seconds });
     }
     predictions

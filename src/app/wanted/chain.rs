@@ -13,6 +13,9 @@ impl State {
         let Some(recipe) = self.chosen(finger) else {
             return self.touch(finger).and_then(Absent::NoPrediction, |_| None);
         };
+        if self.is_color(recipe) {
+            return Lookup::Absent(Absent::PredictsColor);
+        }
         let key = (recipe.clone(), self.settings.shift);
         match self.results.ledgers.get(&key) {
             Some(ledger) => Lookup::Ready(ledger),
@@ -36,7 +39,8 @@ impl Wanted<'_> {
     pub(super) fn ledger(&mut self, touch: TouchKey) {
         let state = self.state;
         let Some(recipe) = state.results.chosen.get(&touch) else { return };
-        if state.results.samples.contains(&touch.pair) && state.results.predictions.contains(recipe) {
+        let there = state.results.samples.contains(&touch.pair) && state.results.predictions.contains(recipe);
+        if there && !state.is_color(recipe) {
             let key = (recipe.clone(), state.settings.shift);
             self.ask(state.results.ledgers.contains(&key), Request::Ledger(key.0, key.1));
         }

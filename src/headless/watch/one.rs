@@ -20,7 +20,7 @@ use crate::app::keys::MaskRecipe;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{Grid, RgbGrid};
 use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, estimate};
-use crate::domain::rig::{PadId, Text, lab};
+use crate::domain::rig::{Text, lab};
 use crate::domain::sample::Sample;
 use crate::domain::units::angle_error;
 use crate::infer::generator::GenerateError;
@@ -217,10 +217,9 @@ impl<'a> Worker<'a> {
 
     /// Imprints of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
     fn imprints(&mut self, sample: &Sample) -> anyhow::Result<Option<Vec<FingerResult>>> {
-        let touched: Vec<(PadId, &RgbGrid)> =
-            sample.rig.pads().filter_map(|finger| Some((finger, &sample.pad(finger)?.color()?.difference))).collect();
+        let touched = self.predictor.conditions(sample)?;
         if touched.is_empty() {
-            anyhow::bail!("no GelSlim image");
+            return Err(self.predictor.no_condition());
         }
         let config = self.predictor.config()?;
         let shift = self.predictor.shift();
@@ -230,7 +229,7 @@ impl<'a> Worker<'a> {
             false => ControlFlow::Continue(()),
         };
         let generator = self.predictor.generator()?;
-        let differences: Vec<&RgbGrid> = touched.iter().map(|(_, difference)| *difference).collect();
+        let differences: Vec<&RgbGrid> = touched.iter().map(|(_, picture)| &**picture).collect();
         let raw = match generator.generate_batch(&differences, &config, &mut progress) {
             Err(GenerateError::Cancelled) => return Ok(None),
             other => other?,

@@ -13,8 +13,8 @@ use super::{MaskBy, Setup, Skipped};
 use crate::app::keys::MaskRecipe;
 use crate::domain::contact::LAB_CAD_DISTANCE_M;
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
-use crate::domain::grid::{DepthMap, Grid, Mask};
-use crate::domain::metrics::{SsimRange, ssim_ranges, unit_range};
+use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use crate::domain::metrics::{LEVELS, SsimRange, planes, ssim_ranges, unit_range};
 use crate::domain::pose::{FingerInput, Fingers, ToolModel, estimate};
 use crate::domain::resample::bilinear;
 use crate::domain::rig::{PadId, PerPad};
@@ -119,7 +119,9 @@ impl Tool {
                 .collect();
             for ((case, made, _), angle_error_rad) in kept.into_iter().zip(angles) {
                 let mut images = images(case, &made, setup, upper);
-                if let Some(classifier) = classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured) {
+                if let Some(classifier) =
+                    classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured && made.colors.is_empty())
+                {
                     let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
                     match classifier.classify(&pictures) {
                         Ok(verdicts) => images.iter_mut().zip(verdicts).for_each(|(i, v)| i.verdict = Some(v)),
@@ -130,7 +132,8 @@ impl Tool {
                     pair: case.name.clone(),
                     tool: self.pattern.clone(),
                     group: case.group,
-                    scale: case.sample.scale,
+                    // Differences of a color sensor never lost their scale.
+                    scale: if made.colors.is_empty() { case.sample.scale } else { Scale::Measured },
                     images: Vec::new(),
                     angle_error_rad,
                     seconds: made.seconds,
@@ -207,6 +210,13 @@ impl Tool {
 /// The compared images of a grasp: in metres, or stretched to 0..1 where the scale was lost.
 fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
     let image = |finger: PadId| {
+        if let Some(color) = made.colors.get(finger) {
+            // On the scale on which the peak of the depth stands for that of the color: one pooled figure serves both.
+            let levels = |picture: &RgbGrid| planes(picture, PEAK_M / LEVELS);
+            let truth = Some(levels(&case.sample.pad(finger)?.color()?.difference));
+            let prediction = levels(color);
+            return Some(Image { finger: finger.index(), prediction, truth, noise_free: None, verdict: None });
+        }
         let bubble = case.sample.pad(finger)?.depth()?;
         if case.sample.scale == Scale::Assumed {
             // On the picture's own pixels and in its orientation, so that stored predictions are not resampled.
