@@ -26,6 +26,7 @@ use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch::domain::sim;
+use touch2touch::infer::bundle::SensorPair;
 
 /// `[width, height]` of the imprints of [`Source`].
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];
@@ -239,6 +240,7 @@ impl Services for Double {
                 defaults: GenerateConfig { steps: 20, ..GenerateConfig::default() },
                 training_steps: 1000,
                 guided: false,
+                sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
             }),
         };
         match self.bundles {
@@ -305,7 +307,7 @@ impl Double {
         };
         let chains = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse]
             .map(|mode| (mode, chain.clone().with_mode(mode, None).map_err(|err| err.to_string())));
-        Ok(Generated { raw, chains: chains.into(), runtime: "double".into(), kept: None })
+        Ok(Generated { raw, chains: chains.into(), color: None, runtime: "double".into(), kept: None })
     }
 }
 

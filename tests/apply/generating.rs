@@ -13,6 +13,7 @@ use touch2touch::app::settings::GenerateSettings;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::DepthMap;
 use touch2touch::domain::rig::{PadId, lab};
+use touch2touch::infer::bundle::SensorPair;
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
@@ -179,7 +180,12 @@ fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
         name: "x".into(),
         kind: BundleKind::Generator,
         folder: "x".into(),
-        generator: Some(GeneratorInfo { defaults, training_steps: 1000, guided }),
+        generator: Some(GeneratorInfo {
+            defaults,
+            training_steps: 1000,
+            guided,
+            sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
+        }),
     };
     let own = GenerateSettings { preset: None, guidance: 4.0, sampler: Sampler::Ddpm, ..GenerateSettings::default() };
     assert_eq!(own.config(&bundle(true)).guidance, 4.0);

@@ -38,7 +38,7 @@ fn a_written_touch_reads_back_whole() {
         let (a, b) = (got.grasp_from_object.unwrap(), want.grasp_from_object.unwrap());
         assert!((a.theta_rad - b.theta_rad).abs() < 1e-15 && (a.y_m - b.y_m).abs() < 1e-15);
         for finger in lab::PADS {
-            let (a, b) = (got.finger(finger).unwrap(), want.finger(finger).unwrap());
+            let (a, b) = (got.pad(finger).unwrap(), want.pad(finger).unwrap());
             let (ga, gb) = (a.color().unwrap(), b.color().unwrap());
             assert_eq!(ga.images.as_ref().unwrap().raw, gb.images.as_ref().unwrap().raw);
             assert_eq!(ga.difference, gb.difference);
@@ -96,7 +96,8 @@ fn everything_wrong_is_listed_and_the_rest_opens() {
     assert!(error(3).contains("bubble_imprint") && error(3).contains("missing"), "{}", error(3));
     assert!(error(5).contains("empty") && error(6).contains("not a PyTorch file"));
     let odd = dataset.load_with_notes(id(4)).unwrap();
-    assert_eq!((odd.invalid[0].nan, odd.invalid[0].infinite, odd.invalid[1].nan), (1, 1, 1));
+    let [right, left] = lab::PADS.map(|finger| odd.invalid[finger].unwrap());
+    assert_eq!((right.nan, right.infinite, left.nan), (1, 1, 1));
     let right = odd.sample.pad(lab::RIGHT).unwrap().depth().unwrap();
     assert!(right.imprint[(5, 0)].is_nan() && right.imprint[(6, 0)].is_nan() && right.camera.is_none());
     for key in ["bubble_depth_ref", "\"K\"", "bubbles_tr_quat"] {
@@ -118,7 +119,7 @@ fn halves_of_different_grasps_and_camera_zeros_are_noticed() {
     let [gel1, _] = pair_paths(dir.path(), Layout::Test, "rod", 1);
     std::fs::copy(gel1, gel0).unwrap();
     let loaded = Dataset::open(dir.path()).unwrap().load_with_notes(PairId(0)).unwrap();
-    assert_eq!(loaded.invalid[1].dropped, 1);
+    assert_eq!(loaded.invalid[lab::LEFT].unwrap().dropped, 1);
     assert!(loaded.notes[0].what.contains("differ"), "{:#?}", loaded.notes);
 }
 
@@ -184,7 +185,7 @@ fn picture_folders() {
     assert_eq!(dataset.problems.len(), 1);
     assert!(dataset.problems[0].what.contains("lone_gelslim.png"));
     let touch = dataset.load(PairId(0)).unwrap();
-    let imprint = &touch.finger(lab::RIGHT).unwrap().depth().unwrap().imprint;
+    let imprint = &touch.pad(lab::RIGHT).unwrap().depth().unwrap().imprint;
     assert!(imprint[(0, 0)] > imprint[(174, 139)], "turned back by 180 degrees");
     assert!(dataset.load(PairId(1)).unwrap_err().to_string().contains("b10_bubble.png"));
     assert_eq!(dataset.vqvae_tile(PairId(0), Turn::default()).unwrap(), None);

@@ -22,6 +22,7 @@ use touch2touch::domain::postprocess::{
 use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
+use touch2touch::infer::bundle::SensorPair;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::ui::{Options, StudioApp};
@@ -85,6 +86,7 @@ impl Services for QuickGenerator {
                 defaults: GenerateConfig { steps: 4, ..GenerateConfig::default() },
                 training_steps: 1000,
                 guided: false,
+                sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
             }),
         };
         (vec![info], Vec::new())
@@ -129,7 +131,7 @@ impl Services for QuickGenerator {
             // Three channels around one picture, as three-channel decoders give it.
             let mean = picture(item.difference, item.recipe.seed);
             let raw = RawPrediction { channels: [-0.02, 0.0, 0.02].map(|off| mean.map(|v| v + off)).to_vec() };
-            Generated { raw, chains: chains.clone(), runtime: "double".into(), kept: None }
+            Generated { raw, chains: chains.clone(), color: None, runtime: "double".into(), kept: None }
         };
         Ok(items.iter().map(one).collect())
     }
