@@ -59,7 +59,7 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
                 let chosen = bundle.name == current;
                 // One for other sensors stays in the list, and says why it cannot be used.
                 let misfit = bundle.ends(&cx.state.rig()).and_then(Result::err);
-                let label = egui::Button::selectable(chosen, &bundle.name);
+                let label = egui::Button::selectable(chosen, egui::RichText::new(&bundle.name));
                 let option = ui.add_enabled(misfit.is_none(), label);
                 let option = match misfit {
                     Some(misfit) => option.on_disabled_hover_text(misfit.to_string()),

@@ -35,6 +35,18 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
 }
 
 #[test]
+fn a_color_sensor_is_predicted_in_the_same_pane() {
+    let Some(mut rig) = Rig::with_bundle(SIZE, "Tiny generator from Soft Bubble to GelSlim") else { return };
+    rig.send(Command::DismissHint);
+    rig.send(Command::Generate);
+    let state = rig.harness.state().state();
+    let picture = state.predicted_color(lab::RIGHT).expect("the model predicts a color picture").ready().unwrap();
+    assert_eq!(picture.size(), lab::GELSLIM.size());
+    assert!(rig.harness.query_by_label("Predicted imprint right").is_some(), "the picture, not a sentence");
+    rig.shoot("generate-color");
+}
+
+#[test]
 fn presets_are_one_click_and_show_their_numbers() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     let steps = |rig: &Rig| {

@@ -210,6 +210,19 @@ impl Rig {
         Some((rig, gate))
     }
 
+    /// As [`Rig::new`] with the program's own services, the tiny bundles of the tests and one of them chosen.
+    pub(super) fn with_bundle(size: [f32; 2], name: &str) -> Option<Self> {
+        let mut rig = Self::new(size, 1)?;
+        let services = LiveServices::with_config_folder(Some(rig.config.clone()));
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles");
+        let mut settings = Settings { bundle_folders: vec![folder], ..Settings::default() };
+        settings.generate.bundle = Some(name.to_owned());
+        services.save_settings(&settings).unwrap();
+        rig.harness = Self::build(size, Arc::new(services), Some(rig.data.clone()), true);
+        rig.settle();
+        Some(rig)
+    }
+
     /// Frames until something is so; a failure after five minutes.
     pub(super) fn until(&mut self, what: &str, so: impl Fn(&State) -> bool) {
         let begin = std::time::Instant::now();
