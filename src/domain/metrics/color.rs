@@ -39,7 +39,8 @@ mod tests {
         let (psnr, ssim) = color(&prediction, &truth).unwrap();
         // 20 log10(255) - 10 log10(900 / 3)
         assert!((psnr.db().unwrap() - 23.36).abs() < 0.01, "{psnr:?}");
-        assert!(ssim > 0.9 && ssim < 1.0, "{ssim}");
+        // Two channels are equal, the third is not.
+        assert!(ssim > 0.667 && ssim < 0.99, "{ssim}");
         assert_eq!(planes(&truth, 2.0)[(3, 24 + 5)], 10.0);
         assert!(color(&prediction, &RgbGrid::filled(3, 3, [0.0; 3])).is_err());
     }

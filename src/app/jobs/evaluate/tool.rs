@@ -115,7 +115,11 @@ impl Tool {
             let with_masks = setup.mask != MaskBy::Unet || mask.is_some();
             let angles: Vec<Option<f64>> = kept
                 .par_iter()
-                .map(|(case, made, masks)| with_masks.then(|| self.angle(setup, &case.sample, made, masks)).flatten())
+                .map(|(case, made, masks)| {
+                    // A color picture has no depth, so there is nothing that could fail.
+                    let posed = with_masks && made.colors.is_empty();
+                    posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()
+                })
                 .collect();
             for ((case, made, _), angle_error_rad) in kept.into_iter().zip(angles) {
                 let mut images = images(case, &made, setup, upper);
