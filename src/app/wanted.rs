@@ -547,11 +547,8 @@ impl Wanted<'_> {
     /// The prediction of a finger that nobody looked at when the other one's was made.
     fn other_finger(&mut self, finger: PadId) {
         let state = self.state;
-        let others = state.rig().pads().filter(|pad| *pad != finger);
-        let (Some(touch), Some(made)) = (state.touch_key(finger), others.filter_map(|pad| state.chosen(pad)).next())
-        else {
-            return;
-        };
+        let made = state.rig().pads().filter(|pad| *pad != finger).find_map(|pad| state.chosen(pad));
+        let (Some(touch), Some(made)) = (state.touch_key(finger), made) else { return };
         let looked_up = state.results.looked_up.contains(&touch);
         if !state.settings.generate.both_fingers || !looked_up || state.chosen(finger).is_some() {
             return;
