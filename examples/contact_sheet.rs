@@ -8,6 +8,7 @@
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{Rgb, RgbImage};
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
 
 const TILE: u32 = 128;
@@ -32,16 +33,16 @@ fn main() -> anyhow::Result<()> {
         let tool = &tools[(n / per_tool) as usize];
         let number = seed * 1000 + u64::from(n);
         let sample = sim::simulate(tool, sim::random_grasp(number), number, &config);
-        let Some(touch) = &sample.fingers[n as usize % 2] else {
+        let Some(touch) = sample.pad(lab::PADS[n as usize % 2]) else {
             continue;
         };
         let (column, row) = (n % COLUMNS, n / COLUMNS);
-        if let Some(gelslim) = &touch.gelslim {
+        if let Some(gelslim) = touch.color() {
             let image = &gelslim.difference;
             let tile = resample(image.width(), image.height(), |x, y| image[(x, y)]);
             put(&mut sheet, column, row, &scaled(&tile));
         }
-        if let Some(bubble) = &touch.bubble {
+        if let Some(bubble) = touch.depth() {
             let image = bubble.imprint.rotated_180();
             let tile = resample(image.width(), image.height(), |x, y| [image[(x, y)]; 3]);
             put(&mut sheet, column, rows + row, &scaled(&tile));

@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use touch2touch::domain::grid::DepthMap;
 use touch2touch::domain::resample;
-use touch2touch::domain::sensor::{Finger, bubble};
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim::{self, Condition, Grasp, MISALIGNMENT_M, SimConfig, ToolSpec};
 
 /// Side of the resized GelSlim image, pixels.
@@ -129,14 +129,14 @@ fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Re
         grasp
     };
     let sample = sim::simulate_apart(tool, gelslims, grasp, noise, &config);
-    Finger::BOTH
+    lab::PADS
         .iter()
         .map(|&finger| {
-            let touch = sample.finger(finger).context("the simulator left a finger out")?;
-            let gelslim = touch.gelslim.as_ref().context("no GelSlim image")?;
-            let imprint = touch.bubble.as_ref().context("no bubble image")?;
+            let touch = sample.pad(finger).context("the simulator left a finger out")?;
+            let gelslim = touch.color().context("no GelSlim image")?;
+            let imprint = touch.depth().context("no bubble image")?;
             let truth = imprint.truth.as_ref().context("no truth")?;
-            ensure!(imprint.imprint.size() == [bubble::WIDTH, bubble::HEIGHT], "unexpected bubble size");
+            ensure!(imprint.imprint.size() == [lab::BUBBLE.width, lab::BUBBLE.height], "unexpected bubble size");
             let small = resample::bilinear_rgb(&gelslim.difference, SIDE, SIDE);
             let planes =
                 (0..3).flat_map(|c| small.as_slice().iter().map(move |p| (p[c] * STEPS_PER_LEVEL).round() as i16));
@@ -188,7 +188,7 @@ fn main() -> Result<()> {
     std::fs::create_dir_all(folder)?;
 
     let samples = 2 * grasps;
-    let image = [samples, bubble::HEIGHT, bubble::WIDTH];
+    let image = [samples, lab::BUBBLE.height, lab::BUBBLE.width];
     let mut gelslim = Npy::create(folder, "gelslim.npy", "<i2", &[samples, 3, SIDE, SIDE])?;
     let mut imprint = Npy::create(folder, "imprint.npy", "<i2", &image)?;
     let mut clean = Npy::create(folder, "clean.npy", "<i2", &image)?;

@@ -26,6 +26,7 @@ pub mod moments;
 pub mod pose;
 pub mod postprocess;
 pub mod resample;
+pub mod rig;
 pub mod sample;
 pub mod sensor;
 pub mod sim;

@@ -19,11 +19,11 @@ use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::tasks::Level;
 use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::{PadId, lab};
 
 use double::{Bench, IMPRINT_SIZE};
 
-const RIGHT: Finger = Finger::Right;
+const RIGHT: PadId = lab::RIGHT;
 
 fn panes(list: &[Pane]) -> Command {
     Command::ShowPanes(list.iter().copied().collect::<BTreeSet<_>>())

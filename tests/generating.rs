@@ -12,7 +12,7 @@ use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
 use touch2touch::domain::grid::{Grid, RgbGrid};
 use touch2touch::domain::postprocess::RawPrediction;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::bundle::{Bundle, MANIFEST};
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::infer::generator::{GenerateError, Generator, Item, Observer};
@@ -217,7 +217,7 @@ fn bundle(services: &LiveServices) -> BundleInfo {
     bundles.into_iter().find(|b| b.name == "Tiny generator of the tests").expect("the fixture is a generator")
 }
 
-fn touch(finger: Finger) -> TouchKey {
+fn touch(finger: PadId) -> TouchKey {
     PairKey { dataset: DatasetSeq(1), pair: PairId(0) }.finger(finger)
 }
 
@@ -233,7 +233,7 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
         PredictionKey::new(touch(finger), info.id.clone(), EngineChoice::Rten, &GenerateConfig { seed, ..config() })
     };
     let item = |seed, difference| Wanted { difference, seed, size: [0, 0] };
-    assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &a).is_empty());
+    assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a).is_empty());
     let both = [item(1, &a), item(1, &b)];
     let made = services.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
     assert!(made.iter().all(|m| !m.kept));
@@ -245,11 +245,11 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
         assert_eq!(made.raw, found.raw);
         assert_eq!(made.chains.keys().collect::<Vec<_>>(), found.chains.keys().collect::<Vec<_>>());
     }
-    let listed = again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &a);
-    assert_eq!(listed.iter().map(|(key, _)| key.clone()).collect::<Vec<_>>(), [recipe(Finger::Right, 1)]);
+    let listed = again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a);
+    assert_eq!(listed.iter().map(|(key, _)| key.clone()).collect::<Vec<_>>(), [recipe(lab::RIGHT, 1)]);
     // The same pair and finger with another image (another data set of the same names) is another touch.
     assert!(
-        again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &image(2.0)).is_empty()
+        again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &image(2.0)).is_empty()
     );
     let another = image(2.0);
     let other = again.predict(&info, EngineChoice::Rten, &config(), &[item(1, &another)], &cx).unwrap();
@@ -257,8 +257,8 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     // Half known, half new: only the new one is made. Another engine's results are not taken for this one's.
     let half = again.predict(&info, EngineChoice::Rten, &config(), &[item(2, &a), item(1, &b)], &cx).unwrap();
     assert!(!half[0].kept && half[1].kept);
-    assert_eq!(again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &a).len(), 2);
-    assert!(again.stored(&[], EngineChoice::Rten, touch(Finger::Right), &a).is_empty(), "its bundle is gone");
+    assert_eq!(again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a).len(), 2);
+    assert!(again.stored(&[], EngineChoice::Rten, touch(lab::RIGHT), &a).is_empty(), "its bundle is gone");
 
     // Damaged files are not there; a budget of nothing keeps nothing.
     for entry in std::fs::read_dir(folder.path().join("predictions")).unwrap() {
@@ -270,5 +270,5 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     services.save_settings(&settings).unwrap();
     let made_again = services.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
     assert!(made_again.iter().all(|m| !m.kept) && made_again[0].raw == made[0].raw);
-    assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(Finger::Right), &a).is_empty());
+    assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a).is_empty());
 }

@@ -32,7 +32,7 @@ use touch2touch::domain::dataset::{Index, PairId, Problem};
 use touch2touch::domain::grid::{DepthMap, Grid, Mask};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::sample::Sample;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::{PerPad, lab};
 use touch2touch::io::images;
 use touch2touch::io::masks::{FOLDER, MaskStore};
 
@@ -66,7 +66,7 @@ impl DataSource for Source {
     }
     fn load(&self, pair: PairId) -> Result<Sample, TaskError> {
         let mut sample = self.live.load(pair)?;
-        sample.fingers[1] = sample.fingers[0].clone();
+        sample.pads[lab::LEFT] = sample.pads[lab::RIGHT].clone();
         Ok(sample)
     }
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
@@ -123,7 +123,7 @@ fn script(seed: u64) -> Vec<Vec<Command>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut acts = vec![vec![Command::Select(PairId(rng.random_range(0..PAIRS)))]];
     while acts.len() < ACTS {
-        let finger = if rng.random() { Finger::Right } else { Finger::Left };
+        let finger = if rng.random() { lab::RIGHT } else { lab::LEFT };
         acts.push(match rng.random_range(0..20) {
             0..11 => {
                 let mut at = || [rng.random_range(0.0..175.0f32), rng.random_range(0.0..140.0f32)];
@@ -159,7 +159,7 @@ fn ready(state: &State) -> bool {
         let imprint = state.imprint(ImprintSource::Measured, finger).ready().is_some();
         imprint && !matches!(mask, Err(Lookup::Waiting | Lookup::Stale(_)))
     };
-    state.entry().is_some() && state.document.is_editable(state.pair_name()) && Finger::BOTH.into_iter().all(known)
+    state.entry().is_some() && state.document.is_editable(state.pair_name()) && lab::PADS.into_iter().all(known)
 }
 
 /// The child: acts, and says what is saved, until it is killed.
@@ -200,7 +200,7 @@ fn act(role: &str) -> ! {
     }
 }
 
-type Labels = ([Option<Mask>; 2], Review);
+type Labels = (PerPad<Mask>, Review);
 
 fn plain(labels: &PairLabels) -> Labels {
     (labels.masks.clone().map(|mask| mask.map(|hand| (*hand.mask).clone())), labels.review)
@@ -294,11 +294,11 @@ fn compare(folder: &Path, played: &[BTreeMap<String, Labels>], said: &Said) -> u
         let confirmed = said.saved.get(&entry.name).copied().unwrap_or(0);
         // A line may be on its way when the kill comes, an act is announced before it is begun.
         let may_be = &played[confirmed..=said.begun];
-        for finger in Finger::BOTH.map(Finger::index) {
+        for finger in lab::PADS {
             let fits = |labels: &BTreeMap<String, Labels>| labels[&entry.name].0[finger] == masks[finger];
             assert!(
                 may_be.iter().any(fits),
-                "{}, finger {finger}: confirmed at act {confirmed}, begun {}; on the disk is the mask of acts {:?}",
+                "{}, finger {finger:?}: confirmed at act {confirmed}, begun {}; on the disk is the mask of acts {:?}",
                 entry.name,
                 said.begun,
                 (0..played.len()).filter(|&act| fits(&played[act])).collect::<Vec<_>>()

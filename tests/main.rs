@@ -22,5 +22,7 @@ mod stability;
 mod generating;
 #[cfg(feature = "gui")]
 mod gpu;
+#[cfg(feature = "onnx")]
+mod sensors;
 #[cfg(feature = "ui-test")]
 mod ui;

@@ -160,7 +160,17 @@ fn other_versions_formats_and_paths_are_refused() {
         edit(dir.path(), change);
         refusal(dir.path())
     };
-    assert!(with(|m| m["format_version"] = 2.into()).contains("format_version: 2, but this program reads version 1"));
+    let newer = with(|m| m["format_version"] = 3.into());
+    assert!(newer.contains("format_version: 3, but this program reads versions 1 to 2"), "{newer}");
+    // The second version declares its sensors; the first never did.
+    assert!(with(|m| m["format_version"] = 2.into()).contains("input: invalid type"));
+    let color = serde_json::json!({"key": "gelslim", "kind": "color", "size": [427, 320]});
+    let dir = copy("mask");
+    edit(dir.path(), |m| {
+        m["format_version"] = 2.into();
+        m["input"]["sensor"] = color;
+    });
+    assert!(refusal(dir.path()).contains("input.sensor.kind: not depth"));
     assert!(with(|m| m["format"] = "other".into()).contains("another program's file"));
     assert!(with(|m| m["kind"] = "painter".into()).contains("kind: \"painter\" is unknown"));
     for path in ["../mask_unet.onnx", "/etc/hostname", ""] {

@@ -10,8 +10,8 @@ use touch2touch::domain::contact::{
 };
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
-use touch2touch::domain::pose::{Engine, FingerInput, ToolModel, contact_cloud, estimate, fingers_of};
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::pose::{Engine, FingerInput, Fingers, ToolModel, contact_cloud, estimate, fingers_of};
+use touch2touch::domain::rig::{PerPad, Rig, lab};
 use touch2touch::domain::units::angle_error;
 use touch2touch::io::cases::CaseSet;
 use touch2touch::io::dataset::Dataset;
@@ -58,7 +58,8 @@ fn forty_known_grasps_with_spoilt_masks() {
         let every = if matches!(engine, Engine::DistanceField | Engine::LabIcp) { 1 } else { 4 };
         for (name, case) in set.cases.iter().step_by(every) {
             let tool = &tools[&case.tool];
-            let fingers = [0, 1].map(|f| {
+            let fingers = Fingers::new(&Rig::lab(), |pad| {
+                let f = pad.index();
                 Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&case.masks[f]) })
             });
             let begin = Instant::now();
@@ -123,7 +124,8 @@ fn the_fast_answer_costs_what_the_proved_one_does() {
         set.tools.iter().map(|(number, mesh)| (*number, DistanceField::from_mesh(mesh).unwrap())).collect();
     let mut lookups = Vec::new();
     for (name, case) in &set.cases {
-        let fingers = [0, 1].map(|f| {
+        let fingers = Fingers::new(&Rig::lab(), |pad| {
+            let f = pad.index();
             Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&case.masks[f]) })
         });
         let points = contact_cloud(&fingers).unwrap().yz();
@@ -148,14 +150,15 @@ fn the_labs_files_with_the_mask_from_the_cad_give_the_stored_angle() {
         let sample = dataset.load(PairId(i as u32)).unwrap();
         let truth = sample.grasp_from_object.unwrap();
         let tool = ToolModel::new(dataset.tool_mesh(entry.tool.as_ref().unwrap()).unwrap().unwrap()).unwrap();
-        let masks: [Option<Mask>; 2] = Finger::BOTH.map(|finger| {
-            let bubble = sample.finger(finger)?.bubble.as_ref()?;
+        let masks = sample.rig.pads().map(|finger| {
+            let bubble = sample.pad(finger)?.depth()?;
             let camera = bubble.camera.as_ref()?;
             let mask =
                 cad_signed_distance(&bubble.imprint, camera, &tool.distance, truth.inverse(), LAB_CAD_DISTANCE_M);
             Some(mask.unwrap())
         });
-        let fingers = fingers_of(&sample, [masks[0].as_ref(), masks[1].as_ref()]);
+        let masks: PerPad<Mask> = masks.collect();
+        let fingers = fingers_of(&sample, &masks.as_ref());
         let pose = estimate(&fingers, &tool, Engine::DistanceField, false).unwrap();
         let error = angle_error(pose.object_from_grasp.theta_rad, truth.inverse().theta_rad).to_degrees();
         eprintln!(
@@ -175,8 +178,8 @@ fn error_by_depth(dataset: &Dataset, id: PairId, share: Option<f32>) -> (f64, us
     let sample = dataset.load(id).unwrap();
     let name = dataset.index.get(id).unwrap().tool.as_ref().unwrap();
     let tool = ToolModel::new(dataset.tool_mesh(name).unwrap().unwrap()).unwrap();
-    let masks: [Option<Mask>; 2] = Finger::BOTH.map(|finger| {
-        let imprint = &sample.finger(finger)?.bubble.as_ref()?.imprint;
+    let mask = |finger| {
+        let imprint = &sample.pad(finger)?.depth()?.imprint;
         if let Some(share) = share {
             let [rest, top] = rest_and_top(imprint).unwrap();
             return Some(threshold(imprint, rest + share * (top - rest)));
@@ -184,9 +187,10 @@ fn error_by_depth(dataset: &Dataset, id: PairId, share: Option<f32>) -> (f64, us
         let found = settled_model(imprint, Mask::filled(imprint.width(), imprint.height(), false));
         assert!(matches!(found.basis, MaskBasis::Depth(_)), "{name}: {:?}", found.basis);
         Some(found.mask)
-    });
+    };
+    let masks: PerPad<Mask> = sample.rig.pads().map(mask).collect();
     let pose =
-        estimate(&fingers_of(&sample, [masks[0].as_ref(), masks[1].as_ref()]), &tool, Engine::DistanceField, false);
+        estimate(&fingers_of(&sample, &masks.as_ref()), &tool, Engine::DistanceField, false);
     let truth = sample.grasp_from_object.unwrap().inverse().theta_rad;
     pose.map_or((f64::NAN, 0), |pose| {
         (angle_error(pose.object_from_grasp.theta_rad, truth).to_degrees(), pose.cloud.points.len())
@@ -208,7 +212,7 @@ fn depth_stands_in_where_the_mask_model_finds_nothing() {
             for id in &ids {
                 let sample = dataset.load(*id).unwrap();
                 let rises =
-                    Finger::BOTH.map(|f| rest_and_top(&sample.finger(f).unwrap().bubble.as_ref().unwrap().imprint));
+                    lab::PADS.map(|f| rest_and_top(&sample.pad(f).unwrap().depth().unwrap().imprint));
                 eprintln!("{name} {id:?}: rest and top {rises:?}");
             }
             for share in [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9] {

@@ -4,33 +4,33 @@ use std::sync::LazyLock;
 
 use glam::{DVec2, DVec3};
 use touch2touch::domain::grid::Grid;
-use touch2touch::domain::sample::{BubbleTouch, GelSlimTouch, Sample};
-use touch2touch::domain::sensor::{Finger, bubble, gelslim};
+use touch2touch::domain::rig::{PadId, lab};
+use touch2touch::domain::sample::{ColorTouch, DepthTouch, Sample};
 use touch2touch::domain::sim::{self, Grasp, SimConfig, ToolSpec};
 
-fn bubble_of(sample: &Sample, finger: Finger) -> &BubbleTouch {
-    sample.finger(finger).and_then(|t| t.bubble.as_ref()).expect("both fingers have a bubble")
+fn bubble_of(sample: &Sample, finger: PadId) -> &DepthTouch {
+    sample.pad(finger).and_then(|t| t.depth()).expect("both fingers have a bubble")
 }
 
-fn gelslim_of(sample: &Sample, finger: Finger) -> &GelSlimTouch {
-    sample.finger(finger).and_then(|t| t.gelslim.as_ref()).expect("both fingers have a GelSlim")
+fn gelslim_of(sample: &Sample, finger: PadId) -> &ColorTouch {
+    sample.pad(finger).and_then(|t| t.color()).expect("both fingers have a GelSlim")
 }
 
 /// The noise-free membrane point behind every pixel, object frame.
-fn lifted(sample: &Sample, finger: Finger) -> Grid<DVec3> {
+fn lifted(sample: &Sample, finger: PadId) -> Grid<DVec3> {
     let touch = bubble_of(sample, finger);
     let (camera, truth) = (touch.camera.as_ref().unwrap(), touch.truth.as_ref().unwrap());
     let object_from_grasp = sample.grasp_from_object.unwrap().inverse().to_affine();
-    Grid::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| {
+    Grid::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| {
         let z = f64::from(camera.depth_reference[(u, v)] - truth.imprint[(u, v)]);
-        let p = camera.grasp_from_camera.transform_point3(camera.intrinsics.lift(u as f64, v as f64, z));
+        let p = camera.grasp_from_camera.transform_point3(camera.lift(u as f64, v as f64, z));
         object_from_grasp.transform_point3(p)
     })
 }
 
-fn contact_pixels(sample: &Sample, finger: Finger) -> Vec<(usize, usize)> {
+fn contact_pixels(sample: &Sample, finger: PadId) -> Vec<(usize, usize)> {
     let contact = &bubble_of(sample, finger).truth.as_ref().unwrap().contact;
-    (0..bubble::HEIGHT).flat_map(|v| (0..bubble::WIDTH).map(move |u| (u, v))).filter(|&p| contact[p]).collect()
+    (0..lab::BUBBLE.height).flat_map(|v| (0..lab::BUBBLE.width).map(move |u| (u, v))).filter(|&p| contact[p]).collect()
 }
 
 /// One sample of each tool and of a few random ones, made once for all tests.
@@ -49,7 +49,7 @@ fn a_few() -> &'static [(ToolSpec, Sample)] {
 }
 
 fn same_bits(a: &Sample, b: &Sample) -> bool {
-    Finger::BOTH.iter().all(|&f| {
+    lab::PADS.iter().all(|&f| {
         let bits = |s: &Sample| -> Vec<u32> {
             let (bubble, gel) = (bubble_of(s, f), gelslim_of(s, f));
             bubble
@@ -80,15 +80,15 @@ fn the_same_seed_gives_the_same_sample_in_any_thread() {
 #[test]
 fn contact_points_of_both_fingers_lie_on_the_tool() {
     for (tool, sample) in a_few() {
-        for finger in Finger::BOTH {
+        for finger in lab::PADS {
             let points = lifted(sample, finger);
             let mut distances: Vec<f64> =
                 contact_pixels(sample, finger).iter().map(|&p| tool.signed_distance(points[p]).abs()).collect();
             assert!(distances.len() > 150, "{}: only {} contact pixels", tool.name, distances.len());
             distances.sort_by(f64::total_cmp);
             let median = distances[distances.len() / 2];
-            assert!(median < 3e-4, "{} {}: median {median}", tool.name, finger.name());
-            assert!(distances[distances.len() - 1] < 1.05e-3, "{} {}", tool.name, finger.name());
+            assert!(median < 3e-4, "{} {}: median {median}", tool.name, finger.index());
+            assert!(distances[distances.len() - 1] < 1.05e-3, "{} {}", tool.name, finger.index());
         }
     }
 }
@@ -96,12 +96,12 @@ fn contact_points_of_both_fingers_lie_on_the_tool() {
 #[test]
 fn the_contact_mask_is_the_labs_signed_distance_rule() {
     for (tool, sample) in a_few() {
-        for finger in Finger::BOTH {
+        for finger in lab::PADS {
             let contact = &bubble_of(sample, finger).truth.as_ref().unwrap().contact;
             let near = lifted(sample, finger).map(|&p| tool.signed_distance(p) <= 1e-3);
             let both = contact.as_slice().iter().zip(near.as_slice()).filter(|(a, b)| **a && **b).count();
             let either = contact.as_slice().iter().zip(near.as_slice()).filter(|(a, b)| **a || **b).count();
-            assert!(both as f64 / either as f64 > 0.98, "{} {}", tool.name, finger.name());
+            assert!(both as f64 / either as f64 > 0.98, "{} {}", tool.name, finger.index());
         }
     }
 }
@@ -109,10 +109,10 @@ fn the_contact_mask_is_the_labs_signed_distance_rule() {
 #[test]
 fn the_membrane_never_enters_the_tool() {
     for (tool, sample) in a_few() {
-        for finger in Finger::BOTH {
+        for finger in lab::PADS {
             let deepest =
                 lifted(sample, finger).as_slice().iter().map(|&p| tool.signed_distance(p)).fold(0.0, f64::min);
-            assert!(deepest > -5e-5, "{} {}: {deepest}", tool.name, finger.name());
+            assert!(deepest > -5e-5, "{} {}: {deepest}", tool.name, finger.index());
         }
         let membrane =
             sim::Membrane::press(&SimConfig::default().bubble, tool, sample.grasp_from_object.unwrap().inverse());
@@ -126,13 +126,13 @@ fn the_membrane_never_enters_the_tool() {
 fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
     for (tool, sample) in a_few() {
         let grasp_from_object = sample.grasp_from_object.unwrap();
-        for finger in Finger::BOTH {
+        for finger in lab::PADS {
             let camera = bubble_of(sample, finger).camera.as_ref().unwrap();
             let camera_from_grasp = camera.grasp_from_camera.inverse();
             let contact = &bubble_of(sample, finger).truth.as_ref().unwrap().contact;
             let (mut on, mut all) = (0, 0);
-            for row in (0..gelslim::HEIGHT).step_by(8) {
-                for column in (0..gelslim::WIDTH).step_by(8) {
+            for row in (0..lab::GELSLIM.height).step_by(8) {
+                for column in (0..lab::GELSLIM.width).step_by(8) {
                     let yz = sim::gelslim_yz(finger, column as f64, row as f64);
                     let object = grasp_from_object.inverse().transform_yz(yz);
                     // the flat ridge only: the bevel is hidden on the side that faces away
@@ -140,7 +140,7 @@ fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
                         continue;
                     }
                     let p = DVec3::new(-sim::outward(finger) * tool.half_thickness_m, yz.x, yz.y);
-                    let (u, v) = camera.intrinsics.project(camera_from_grasp.transform_point3(p)).unwrap();
+                    let (u, v) = camera.project(camera_from_grasp.transform_point3(p)).unwrap();
                     all += 1;
                     on += usize::from(contact.get(u.round() as usize, v.round() as usize) == Some(&true));
                 }
@@ -149,7 +149,7 @@ fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
                 all == 0 || f64::from(on as u32) > 0.85 * f64::from(all as u32),
                 "{} {}: {on} of {all}",
                 tool.name,
-                finger.name()
+                finger.index()
             );
         }
     }
@@ -160,11 +160,11 @@ fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
 fn gelslim_streaks_frame_the_bars() {
     for (tool, sample) in a_few() {
         let object_from_grasp = sample.grasp_from_object.unwrap().inverse();
-        for finger in Finger::BOTH {
+        for finger in lab::PADS {
             let difference = &gelslim_of(sample, finger).difference;
             let (mut near, mut far) = (Vec::new(), Vec::new());
-            for row in 0..gelslim::HEIGHT {
-                for column in 0..gelslim::WIDTH {
+            for row in 0..lab::GELSLIM.height {
+                for column in 0..lab::GELSLIM.width {
                     let yz = sim::gelslim_yz(finger, column as f64, row as f64);
                     let s = tool.outline_distance(object_from_grasp.transform_yz(yz));
                     let [r, g, b] = difference[(column, row)];
@@ -178,7 +178,7 @@ fn gelslim_streaks_frame_the_bars() {
             }
             let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
             if near.len() > 500 && far.len() > 500 {
-                assert!(mean(&near) > 2.5 * mean(&far), "{} {}", tool.name, finger.name());
+                assert!(mean(&near) > 2.5 * mean(&far), "{} {}", tool.name, finger.index());
             }
         }
     }
@@ -190,7 +190,7 @@ fn gelslim_streaks_frame_the_bars() {
 fn the_fingers_mirror_each_other() {
     let sample = sim::simulate(&sim::tools()[5], Grasp::default(), 1, &SimConfig::default());
     let object = |finger| lifted(&sample, finger);
-    let (right, left) = (object(Finger::Right), object(Finger::Left));
+    let (right, left) = (object(lab::RIGHT), object(lab::LEFT));
     // the same (y, z) has mirrored x: compare over a common grid of (y, z)
     let height_at = |points: &Grid<DVec3>, yz: DVec2| {
         points
@@ -261,7 +261,7 @@ fn statistics_are_those_of_the_labs_data() {
             sim::simulate(tool, sim::random_grasp(900 + i as u64), i as u64, &SimConfig::default())
         })
         .collect();
-    let each = || samples.iter().flat_map(|s| Finger::BOTH.map(|f| (s, f)));
+    let each = || samples.iter().flat_map(|s| lab::PADS.map(|f| (s, f)));
 
     let m = moments(each().flat_map(|(s, f)| bubble_of(s, f).imprint.as_slice().iter().map(|&v| f64::from(v))));
     assert!((0.0030..0.0066).contains(&m.mean), "imprint mean {}", m.mean);
@@ -296,7 +296,7 @@ fn random_sensors_and_tools_give_finite_images() {
     for seed in 0..6 {
         let config = SimConfig::randomised(seed);
         let sample = sim::simulate(&sim::random_tool(seed), sim::random_grasp(seed), seed, &config);
-        for finger in Finger::BOTH {
+        for finger in lab::PADS {
             let touch = bubble_of(&sample, finger);
             assert!(touch.imprint.as_slice().iter().all(|v| v.is_finite() && v.abs() < 0.06));
             assert!(touch.truth.as_ref().unwrap().contact.as_slice().iter().any(|&c| c));

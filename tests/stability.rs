@@ -19,7 +19,8 @@ use touch2touch::domain::align::{
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::mesh::TriMesh;
-use touch2touch::domain::pose::{Engine, FingerInput, PoseError, PoseReport, estimate, register};
+use touch2touch::domain::pose::{Engine, FingerInput, Fingers, PoseError, PoseReport, estimate, register};
+use touch2touch::domain::rig::Rig;
 use touch2touch::domain::tool::{ToolError, ToolModel};
 use touch2touch::domain::units::{angle_error, scale_to_metres};
 use touch2touch::io::cases::{self, Case};
@@ -86,8 +87,10 @@ fn case() -> (&'static Case, &'static ToolModel) {
 }
 
 fn solve(case: &Case, imprints: &[DepthMap; 2], masks: &[Mask; 2], engine: Engine) -> Result<PoseReport, PoseError> {
-    let fingers =
-        [0, 1].map(|f| Some(FingerInput { imprint: &imprints[f], camera: &case.cameras[f], mask: Some(&masks[f]) }));
+    let fingers = Fingers::new(&Rig::lab(), |pad| {
+        let f = pad.index();
+        Some(FingerInput { imprint: &imprints[f], camera: &case.cameras[f], mask: Some(&masks[f]) })
+    });
     estimate(&fingers, case_tool(), engine, false)
 }
 

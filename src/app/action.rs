@@ -13,7 +13,6 @@ use super::settings::{ColourRange, MaskTool, Theme, Workspace};
 use super::state::State;
 use super::workbench::{Layer, SceneTool, WorkbenchCommand};
 use crate::domain::hand::HandAxis;
-use crate::domain::sensor::Finger;
 
 /// A key, by what is printed on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -377,7 +376,7 @@ impl Action {
         let listed = !state.library.order.is_empty();
         let editable = state.document.is_editable(state.pair_name());
         let settings = &state.settings;
-        let fingers = state.selection.fingers();
+        let fingers = state.fingers();
         let when = |condition: bool, command: Command| condition.then_some(command);
         let ui = |request: UiRequest| Some(Command::Ui(request));
         match self {
@@ -398,10 +397,7 @@ impl Action {
             Self::FirstSample => when(listed, Command::First),
             Self::LastSample => when(listed, Command::Last),
             Self::NextUnfinished => when(listed, Command::NextUnfinished),
-            Self::OtherFinger => {
-                let other = if state.selection.finger == Finger::Right { Finger::Left } else { Finger::Right };
-                Some(Command::SelectFinger(other))
-            }
+            Self::OtherFinger => Some(Command::SelectFinger(state.other_finger())),
             Self::BothFingers => Some(Command::ShowBothFingers(!state.selection.both_fingers)),
             Self::FindSample => {
                 when(state.selection.panes.contains(&Pane::Browser), Command::Ui(UiRequest::FocusFilter))

@@ -25,9 +25,9 @@ use crate::domain::align::basin::Basin;
 use crate::domain::ambiguity::Ambiguity;
 use crate::domain::contact::ContactMask;
 use crate::domain::dataset::PairId;
-use crate::domain::grid::DepthMap;
+use crate::domain::grid::{DepthMap, RgbGrid};
+use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::infer::engine::EngineChoice;
 use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::BundleInfo;
@@ -97,7 +97,7 @@ pub enum Pane {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hover {
     /// The finger.
-    pub finger: Finger,
+    pub finger: PadId,
     /// Column and row; (0, 0) is the centre of the top-left pixel.
     pub at_px: [f32; 2],
 }
@@ -181,7 +181,7 @@ pub enum Command {
     /// Shows the next of the list whose review is not finished, going round.
     NextUnfinished,
     /// Makes a finger the active one.
-    SelectFinger(Finger),
+    SelectFinger(PadId),
     /// Shows both fingers, or only the active one.
     ShowBothFingers(bool),
     /// The pixel under the pointer, shared by all images.
@@ -219,7 +219,7 @@ pub enum Command {
     /// Pointer down on an image, raw bubble pixels. `erase` swaps brush and eraser for this stroke.
     BeginStroke {
         /// The finger drawn on.
-        finger: Finger,
+        finger: PadId,
         /// The imprint it is drawn on: its mask in force is where the correction starts.
         source: ImprintSource,
         /// Position.
@@ -382,6 +382,8 @@ pub enum Computed {
     Predictions(Keyed),
     /// Of [`Request::Imprint`] and [`Request::Thumbnail`].
     Depth(Arc<DepthMap>),
+    /// Of [`Request::Imprint`] where a color sensor was predicted.
+    Color(Arc<RgbGrid>),
     /// Of [`Request::Comparison`].
     Comparison(Arc<Comparison>),
     /// Of [`Request::Ledger`].

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::keys::Revision;
 use crate::domain::grid::Mask;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
 pub use crate::work::labels::{HandMask, PairLabels, Review};
 
@@ -43,7 +43,7 @@ pub struct Stroke {
     /// The pair's name.
     pub pair: String,
     /// The finger.
-    pub finger: Finger,
+    pub finger: PadId,
     /// Whether it adds or removes.
     pub value: bool,
     /// Radius, image pixels.
@@ -63,8 +63,8 @@ impl Document {
     }
 
     /// The corrected mask of one finger.
-    pub fn hand_mask(&self, name: &str, finger: Finger) -> Option<&HandMask> {
-        self.labels.get(name)?.masks[finger.index()].as_ref()
+    pub fn hand_mask(&self, name: &str, finger: PadId) -> Option<&HandMask> {
+        self.labels.get(name)?.masks[finger].as_ref()
     }
 
     /// The review state of a pair.

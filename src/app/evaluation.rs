@@ -52,12 +52,13 @@ pub enum EvaluateCommand {
 }
 
 impl State {
-    /// The generators, and whether each gets a row.
+    /// The generators for the sensors of the data, and whether each gets a row.
     pub fn evaluated(&self) -> impl Iterator<Item = (&BundleInfo, bool)> {
+        let rig = self.rig();
         self.library
             .bundles
             .iter()
-            .filter(|b| b.kind == BundleKind::Generator)
+            .filter(move |b| b.kind == BundleKind::Generator && b.fits(&rig))
             .map(|b| (b, !self.table.left_out.contains(&b.id)))
     }
 

@@ -7,8 +7,8 @@ use super::jobs::PreviewWish;
 use super::keys::{ImprintSource, PredictionKey, TouchKey};
 use super::results::Preview;
 use super::state::State;
-use crate::domain::sensor::Finger;
 use crate::work::bundles::BundleKind;
+use crate::domain::rig::PadId;
 
 impl State {
     /// The recipe that the settings give a touch; `None` without a generator.
@@ -20,12 +20,12 @@ impl State {
 
     /// The fingers whose prediction is looked at: those on screen, and both where a visible pane makes one cloud or
     /// pose of them (unless the settings say otherwise).
-    pub fn fingers_to_generate(&self) -> Vec<Finger> {
+    pub fn fingers_to_generate(&self) -> Vec<PadId> {
         let (_, cloud) = self.shows_cloud(ImprintSource::Predicted);
         if cloud && self.settings.generate.both_fingers {
-            return Finger::BOTH.to_vec();
+            return self.rig().pad_list();
         }
-        let mut fingers = self.selection.fingers();
+        let mut fingers = self.fingers();
         if !self.settings.generate.both_fingers {
             fingers.truncate(1);
         }
@@ -33,7 +33,7 @@ impl State {
     }
 
     /// The prediction on its way to one finger of the selected pair, as it looks now.
-    pub fn preview(&self, finger: Finger) -> Option<&Arc<Preview>> {
+    pub fn preview(&self, finger: PadId) -> Option<&Arc<Preview>> {
         self.results.previews.get(&self.touch_key(finger)?).filter(|_| self.document.stroke.is_none())
     }
 
@@ -41,7 +41,7 @@ impl State {
     pub fn preview_wish(&self) -> PreviewWish {
         let shown = self.is_visible(&[Pane::Predicted]) && self.document.stroke.is_none();
         let touches = match self.pair_key().filter(|_| shown) {
-            Some(pair) => self.selection.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
+            Some(pair) => self.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
             None => Default::default(),
         };
         PreviewWish { every: self.settings.generate.preview_every, shift: self.settings.shift, touches }

@@ -4,7 +4,7 @@ use super::document::{Document, HandMask, Review};
 use super::keys::ImprintSource;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::Patch;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::PadId;
 
 /// One reversible change of the document.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +14,7 @@ pub enum Edit {
         /// The pair's name.
         pair: String,
         /// The finger.
-        finger: Finger,
+        finger: PadId,
         /// The pixels.
         patch: Patch,
     },
@@ -23,7 +23,7 @@ pub enum Edit {
         /// The pair's name.
         pair: String,
         /// The finger.
-        finger: Finger,
+        finger: PadId,
         /// The mask.
         mask: Option<HandMask>,
     },
@@ -51,7 +51,7 @@ impl Edit {
         match self {
             Self::Patch { pair, finger, patch } => {
                 let revision = doc.next_revision();
-                let hand = doc.labels.get_mut(pair).and_then(|l| l.masks[finger.index()].as_mut());
+                let hand = doc.labels.get_mut(pair).and_then(|l| l.masks[*finger].as_mut());
                 // The edits of a gesture are swapped in order, so the mask is there and as large as it was.
                 let Some(hand) = hand else { return };
                 if patch.swap(std::sync::Arc::make_mut(&mut hand.mask)).is_err() {
@@ -61,7 +61,7 @@ impl Edit {
             }
             Self::HandMask { pair, finger, mask } => {
                 let labels = doc.labels.entry(pair.clone()).or_default();
-                std::mem::swap(&mut labels.masks[finger.index()], mask);
+                std::mem::swap(&mut labels.masks[*finger], mask);
             }
             Self::Review { pair, review } => *review = doc.set_review(pair, *review),
             Self::Pose { pair, source, pose } => {
@@ -82,7 +82,7 @@ impl Edit {
     }
 
     /// The finger, if it concerns one.
-    pub fn finger(&self) -> Option<Finger> {
+    pub fn finger(&self) -> Option<PadId> {
         match self {
             Self::Patch { finger, .. } | Self::HandMask { finger, .. } => Some(*finger),
             Self::Review { .. } | Self::Pose { .. } => None,
@@ -115,7 +115,7 @@ impl Gesture {
     }
 
     /// Whether everything it changes is on screen.
-    fn is_on_screen(&self, pair: &str, fingers: &[Finger]) -> bool {
+    fn is_on_screen(&self, pair: &str, fingers: &[PadId]) -> bool {
         self.edits.iter().all(|e| e.pair() == pair && e.finger().is_none_or(|f| fingers.contains(&f)))
     }
 
@@ -173,7 +173,7 @@ impl History {
     }
 
     /// Takes back the last gesture on screen. Returns what it did.
-    pub fn undo(&mut self, doc: &mut Document, pair: &str, fingers: &[Finger]) -> Option<&Gesture> {
+    pub fn undo(&mut self, doc: &mut Document, pair: &str, fingers: &[PadId]) -> Option<&Gesture> {
         let at = Self::position(&self.done, pair, fingers)?;
         let mut gesture = self.done.remove(at);
         gesture.edits.iter_mut().rev().for_each(|edit| edit.swap(doc));
@@ -182,7 +182,7 @@ impl History {
     }
 
     /// Does the last gesture taken back on screen again. Returns what it did.
-    pub fn redo(&mut self, doc: &mut Document, pair: &str, fingers: &[Finger]) -> Option<&Gesture> {
+    pub fn redo(&mut self, doc: &mut Document, pair: &str, fingers: &[PadId]) -> Option<&Gesture> {
         let at = Self::position(&self.undone, pair, fingers)?;
         let mut gesture = self.undone.remove(at);
         gesture.edits.iter_mut().for_each(|edit| edit.swap(doc));
@@ -191,12 +191,12 @@ impl History {
     }
 
     /// What undo would take back.
-    pub fn next_undo(&self, pair: &str, fingers: &[Finger]) -> Option<&Gesture> {
+    pub fn next_undo(&self, pair: &str, fingers: &[PadId]) -> Option<&Gesture> {
         Self::position(&self.done, pair, fingers).map(|at| &self.done[at])
     }
 
     /// What redo would do.
-    pub fn next_redo(&self, pair: &str, fingers: &[Finger]) -> Option<&Gesture> {
+    pub fn next_redo(&self, pair: &str, fingers: &[PadId]) -> Option<&Gesture> {
         Self::position(&self.undone, pair, fingers).map(|at| &self.undone[at])
     }
 
@@ -206,7 +206,7 @@ impl History {
         self.undone.clear();
     }
 
-    fn position(stack: &[Gesture], pair: &str, fingers: &[Finger]) -> Option<usize> {
+    fn position(stack: &[Gesture], pair: &str, fingers: &[PadId]) -> Option<usize> {
         (0..stack.len()).rev().find(|&at| {
             stack[at].is_on_screen(pair, fingers) && !stack[at + 1..].iter().any(|later| later.overlaps(&stack[at]))
         })
@@ -220,21 +220,22 @@ mod tests {
     use super::super::keys::Revision;
     use super::*;
     use crate::domain::grid::Mask;
+    use crate::domain::rig::lab;
 
-    fn hand(doc: &mut Document, pair: &str, finger: Finger) -> HandMask {
+    fn hand(doc: &mut Document, pair: &str, finger: PadId) -> HandMask {
         let hand = HandMask { mask: Arc::new(Mask::filled(8, 4, false)), revision: Revision(0), base: String::new() };
-        doc.labels.entry(pair.into()).or_default().masks[finger.index()] = Some(hand.clone());
+        doc.labels.entry(pair.into()).or_default().masks[finger] = Some(hand.clone());
         hand
     }
 
     /// The edit that sets 2 x 2 pixels from `(x, 1)` on.
-    fn edit(pair: &str, finger: Finger, x: usize) -> Edit {
+    fn edit(pair: &str, finger: PadId, x: usize) -> Edit {
         let empty = Mask::filled(8, 4, false);
         let full = Mask::from_fn(8, 4, |px, py| (x..x + 2).contains(&px) && (1..3).contains(&py));
         Edit::Patch { pair: pair.into(), finger, patch: Patch::between(&empty, &full).unwrap() }
     }
 
-    fn patch(doc: &mut Document, history: &mut History, pair: &str, finger: Finger, x: usize) {
+    fn patch(doc: &mut Document, history: &mut History, pair: &str, finger: PadId, x: usize) {
         let mut edit = edit(pair, finger, x);
         edit.swap(doc);
         history.record(Gesture { name: "stroke", edits: vec![edit] });
@@ -243,49 +244,49 @@ mod tests {
     #[test]
     fn swapping_twice_changes_nothing() {
         let mut doc = Document::default();
-        let before = hand(&mut doc, "a", Finger::Right).mask;
-        let mut edit = edit("a", Finger::Right, 6);
+        let before = hand(&mut doc, "a", lab::RIGHT).mask;
+        let mut edit = edit("a", lab::RIGHT, 6);
         let copy = edit.clone();
         edit.swap(&mut doc);
-        assert!(doc.hand_mask("a", Finger::Right).unwrap().mask[(7, 2)]);
+        assert!(doc.hand_mask("a", lab::RIGHT).unwrap().mask[(7, 2)]);
         assert!(!before[(7, 2)], "the mask that others hold is not changed under them");
         edit.swap(&mut doc);
-        assert_eq!(doc.hand_mask("a", Finger::Right).unwrap().mask, before);
+        assert_eq!(doc.hand_mask("a", lab::RIGHT).unwrap().mask, before);
         assert_eq!(edit, copy);
-        assert!(doc.hand_mask("a", Finger::Right).unwrap().revision > Revision(1), "revisions are never reused");
+        assert!(doc.hand_mask("a", lab::RIGHT).unwrap().revision > Revision(1), "revisions are never reused");
     }
 
     #[test]
     fn undo_stays_on_screen() {
         let mut doc = Document::default();
         let mut history = History::default();
-        for (pair, finger) in [("a", Finger::Right), ("a", Finger::Left), ("b", Finger::Right)] {
+        for (pair, finger) in [("a", lab::RIGHT), ("a", lab::LEFT), ("b", lab::RIGHT)] {
             hand(&mut doc, pair, finger);
             patch(&mut doc, &mut history, pair, finger, 0);
         }
-        assert!(history.undo(&mut doc, "c", &Finger::BOTH).is_none());
-        assert!(history.undo(&mut doc, "a", &[Finger::Right]).is_some());
-        assert!(history.undo(&mut doc, "a", &[Finger::Right]).is_none());
-        assert!(!doc.hand_mask("a", Finger::Right).unwrap().mask[(0, 1)]);
-        assert!(doc.hand_mask("a", Finger::Left).unwrap().mask[(0, 1)]);
-        assert!(doc.hand_mask("b", Finger::Right).unwrap().mask[(0, 1)]);
+        assert!(history.undo(&mut doc, "c", &lab::PADS).is_none());
+        assert!(history.undo(&mut doc, "a", &[lab::RIGHT]).is_some());
+        assert!(history.undo(&mut doc, "a", &[lab::RIGHT]).is_none());
+        assert!(!doc.hand_mask("a", lab::RIGHT).unwrap().mask[(0, 1)]);
+        assert!(doc.hand_mask("a", lab::LEFT).unwrap().mask[(0, 1)]);
+        assert!(doc.hand_mask("b", lab::RIGHT).unwrap().mask[(0, 1)]);
         // A new stroke on the other finger does not take the redo of this one away; one on this finger does.
-        patch(&mut doc, &mut history, "a", Finger::Left, 4);
-        assert!(history.next_redo("a", &[Finger::Right]).is_some());
-        patch(&mut doc, &mut history, "a", Finger::Right, 4);
-        assert!(history.next_redo("a", &[Finger::Right]).is_none());
+        patch(&mut doc, &mut history, "a", lab::LEFT, 4);
+        assert!(history.next_redo("a", &[lab::RIGHT]).is_some());
+        patch(&mut doc, &mut history, "a", lab::RIGHT, 4);
+        assert!(history.next_redo("a", &[lab::RIGHT]).is_none());
     }
 
     #[test]
     fn the_budget_drops_the_oldest() {
         let mut doc = Document::default();
-        hand(&mut doc, "a", Finger::Right);
+        hand(&mut doc, "a", lab::RIGHT);
         let mut history = History::new(3 * (std::mem::size_of::<Edit>() + 4));
         for x in 0..6 {
-            patch(&mut doc, &mut history, "a", Finger::Right, x);
+            patch(&mut doc, &mut history, "a", lab::RIGHT, x);
         }
         let mut undone = 0;
-        while history.undo(&mut doc, "a", &Finger::BOTH).is_some() {
+        while history.undo(&mut doc, "a", &lab::PADS).is_some() {
             undone += 1;
         }
         assert_eq!(undone, 3);

@@ -2,8 +2,6 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-use strum::EnumIter;
 
 pub use crate::domain::bits::Bits;
 pub use crate::domain::diffusion::{Preset, Sampler, Spacing};
@@ -15,8 +13,8 @@ use crate::domain::align::basin::Plane;
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::frames::PlanarPose;
-use crate::domain::sensor::Finger;
 use crate::infer::engine::EngineChoice;
+use crate::domain::rig::{PadId, PerPad};
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -33,7 +31,7 @@ pub struct PairKey {
 
 impl PairKey {
     /// One finger of this pair.
-    pub fn finger(self, finger: Finger) -> TouchKey {
+    pub fn finger(self, finger: PadId) -> TouchKey {
         TouchKey { pair: self, finger }
     }
 }
@@ -44,7 +42,7 @@ pub struct TouchKey {
     /// The pair.
     pub pair: PairKey,
     /// The finger.
-    pub finger: Finger,
+    pub finger: PadId,
 }
 
 /// What a range mapping does, for its tooltip.
@@ -146,11 +144,11 @@ pub enum MaskVersion {
     Hand(Revision),
 }
 
-/// A cloud of both fingers: imprint and (where one can be had) mask of each finger, by [`Finger::index`].
+/// A cloud of both fingers: imprint and (where one can be had) mask of each finger.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CloudKey {
     /// Per finger.
-    pub parts: [Option<(ImprintKey, Option<MaskVersion>)>; 2],
+    pub parts: PerPad<(ImprintKey, Option<MaskVersion>)>,
 }
 
 pub use crate::domain::pose::Engine as PoseEngine;

@@ -14,6 +14,7 @@ use super::services::DataSource;
 use crate::domain::dataset::{Index, PairEntry, PairId};
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
+use crate::domain::rig::Rig;
 
 /// What can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -153,9 +154,9 @@ impl Library {
         self.bundles.iter().find(|b| &*b.id == id)
     }
 
-    /// The first bundle of a kind whose name is `name`, else the first of that kind.
-    pub fn bundle_named(&self, kind: BundleKind, name: Option<&str>) -> Option<&BundleInfo> {
-        let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind);
+    /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind.
+    pub fn bundle_named(&self, kind: BundleKind, name: Option<&str>, rig: &Rig) -> Option<&BundleInfo> {
+        let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind && b.fits(rig));
         let first = of_kind.clone().next();
         match name {
             Some(name) => of_kind.find(|b| b.name == name).or(first),

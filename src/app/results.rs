@@ -12,7 +12,7 @@ use super::keys::{
 use crate::domain::align::basin::Basin;
 use crate::domain::ambiguity::Ambiguity;
 use crate::domain::contact::MaskBasis;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::sample::Sample;
 use crate::work::cloud::Clouds;
 use crate::work::compare::Comparison;
@@ -134,6 +134,8 @@ pub struct Results {
     pub predictions: Cache<PredictionKey, Prediction>,
     /// Predictions in metres, as large as the bubble image.
     pub imprints: Cache<(PredictionKey, ShiftMode), DepthMap>,
+    /// Predictions of a color sensor: differences, 0..255 scale.
+    pub colors: Cache<PredictionKey, RgbGrid>,
     /// Several predictions of one touch.
     pub ensembles: Cache<EnsembleKey, Ensemble>,
     /// Predictions against measurements.
@@ -188,6 +190,7 @@ impl Default for Results {
             thumbnails: Cache::new(32 * MIB),
             predictions: Cache::new(256 * MIB),
             imprints: Cache::new(64 * MIB),
+            colors: Cache::new(32 * MIB),
             ensembles: Cache::new(32 * MIB),
             comparisons: Cache::new(32 * MIB),
             ledgers: Cache::new(24 * MIB),
@@ -220,6 +223,7 @@ impl Results {
         self.thumbnails.clear();
         self.predictions.clear();
         self.imprints.clear();
+        self.colors.clear();
         self.ensembles.clear();
         self.comparisons.clear();
         self.ledgers.clear();

@@ -5,9 +5,9 @@ use super::keys::{CloudKey, EnsembleKey, ImprintKey, MaskKey, MaskVersion, PoseK
 use super::state::{Absent, Lookup, State};
 use crate::domain::ensemble::seeds;
 use crate::domain::grid::DepthMap;
-use crate::domain::sensor::Finger;
 use crate::work::ensemble::Ensemble;
 use crate::work::pose::PoseResult;
+use crate::domain::rig::{PadId, PerPad};
 
 /// Fewest and most seeds of an ensemble.
 pub const COUNT: std::ops::RangeInclusive<usize> = 2..=16;
@@ -50,13 +50,16 @@ impl State {
     ///
     /// # Errors
     /// Why nothing can be generated.
-    pub fn seed_recipes(&self, finger: Finger) -> Result<Vec<PredictionKey>, Absent> {
+    pub fn seed_recipes(&self, finger: PadId) -> Result<Vec<PredictionKey>, Absent> {
         self.can_generate()?;
         let touch = self.touch_key(finger).ok_or(Absent::NothingSelected)?;
-        if self.sample().ready().is_some() && self.gelslim(finger).ready().is_none() {
-            return Err(Absent::NoGelSlim);
+        if self.sample().ready().is_some() && !self.can_start(finger) {
+            return Err(Absent::NoInput);
         }
         let first = self.recipe(touch).ok_or(Absent::NoGenerator)?;
+        if self.is_color(&first) {
+            return Err(Absent::PredictsColor);
+        }
         let recipe = |seed| PredictionKey { seed, ..first.clone() };
         Ok(seeds(first.seed, self.seeds.count).into_iter().map(recipe).collect())
     }
@@ -67,14 +70,14 @@ impl State {
     }
 
     /// The ensemble of what is there of one finger; `None` before the first seed.
-    fn ensemble_key(&self, finger: Finger) -> Option<EnsembleKey> {
+    fn ensemble_key(&self, finger: PadId) -> Option<EnsembleKey> {
         let there = |r: &PredictionKey| self.results.predictions.contains(r) && self.seed_imprint(r).is_some();
         let recipes: Vec<PredictionKey> = self.seed_recipes(finger).ok()?.into_iter().filter(there).collect();
         (!recipes.is_empty()).then_some(EnsembleKey { recipes, shift: self.settings.shift })
     }
 
     /// Mean and spreads of the seeds that are there; the ensemble before while the next is computed.
-    pub fn ensemble(&self, finger: Finger) -> Lookup<'_, Ensemble> {
+    pub fn ensemble(&self, finger: PadId) -> Lookup<'_, Ensemble> {
         let Some(key) = self.ensemble_key(finger) else { return Lookup::Absent(Absent::NoPrediction) };
         let before = || {
             let mut key = key.clone();
@@ -93,16 +96,16 @@ impl State {
     }
 
     /// The fingers whose seeds make a pose: both, or only the active one, as in generating.
-    pub fn seed_fingers(&self) -> Vec<Finger> {
+    pub fn seed_fingers(&self) -> Vec<PadId> {
         match self.settings.generate.both_fingers {
-            true => Finger::BOTH.into_iter().filter(|f| self.seed_recipes(*f).is_ok()).collect(),
+            true => self.rig().pads().filter(|f| self.seed_recipes(*f).is_ok()).collect(),
             false => vec![self.selection.finger],
         }
     }
 
     /// The cloud of one seed with the automatic masks; `Err` holds what is missing for it.
     fn seed_cloud(&self, at: usize) -> Result<CloudKey, Vec<Request>> {
-        let mut parts = [None, None];
+        let mut parts = PerPad::default();
         let mut missing = Vec::new();
         for finger in self.seed_fingers() {
             let camera = self.touch(finger).ready().is_some_and(|t| t.camera().is_some());
@@ -118,9 +121,9 @@ impl State {
             if !self.results.masks.contains(&key) {
                 missing.push(Request::Mask(key));
             }
-            parts[finger.index()] = Some((imprint, Some(MaskVersion::Auto(mask))));
+            parts[finger] = Some((imprint, Some(MaskVersion::Auto(mask))));
         }
-        if missing.is_empty() && parts.iter().any(Option::is_some) { Ok(CloudKey { parts }) } else { Err(missing) }
+        if missing.is_empty() && !parts.is_empty() { Ok(CloudKey { parts }) } else { Err(missing) }
     }
 
     fn seed_pose_key(&self, at: usize) -> Option<PoseKey> {
@@ -140,7 +143,7 @@ impl State {
             return Some(absent);
         }
         let sample = self.sample().ready()?;
-        let camera = |f: &Finger| sample.finger(*f).is_some_and(|t| t.camera().is_some());
+        let camera = |f: &PadId| sample.pad(*f).is_some_and(|t| t.camera().is_some());
         (!self.seed_fingers().iter().any(camera)).then_some(Absent::NoCamera)
     }
 

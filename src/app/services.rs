@@ -18,6 +18,7 @@ use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::mesh::TriMesh;
+use crate::domain::rig::Rig;
 use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
 use crate::io::dataset::Dataset;
@@ -36,6 +37,10 @@ pub trait DataSource: Send + Sync {
     /// The same as the command line sees it, for work on all of its pairs; `None` where there is no such thing.
     fn as_dataset(&self) -> Option<&Dataset> {
         None
+    }
+    /// The sensors that its touches were felt with.
+    fn rig(&self) -> Arc<Rig> {
+        Rig::lab()
     }
     /// All pairs.
     fn index(&self) -> &Index;
@@ -119,7 +124,7 @@ pub trait Services: Send + Sync {
     /// The bundles that ship with the program and those in `folders`; what is wrong with those that were refused.
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>);
 
-    /// Runs the generator on GelSlim difference images, all in one batch; one answer for each, in order. The model
+    /// Runs the generator on the pictures of its input sensor, all in one batch; one answer for each, in order. The model
     /// stays loaded between calls; the runtime calls this on one lane only.
     ///
     /// # Errors

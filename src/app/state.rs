@@ -1,6 +1,7 @@
 //! [`State`]: everything the studio shows. Changed by [`super::apply::apply`] only.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -18,8 +19,8 @@ use super::settings::Settings;
 use super::tasks::{Log, Tasks};
 use super::workbench::Workbench;
 use crate::domain::dataset::{PairEntry, PairId};
-use crate::domain::sensor::Finger;
 use crate::work::error::TaskError;
+use crate::domain::rig::{PadId, Rig, Text};
 
 /// Everything the studio shows.
 #[derive(Debug, Default)]
@@ -56,7 +57,7 @@ pub struct Selection {
     /// The pair.
     pub pair: Option<PairId>,
     /// The active finger.
-    pub finger: Finger,
+    pub finger: PadId,
     /// Whether both fingers are shown, or only the active one.
     pub both_fingers: bool,
     /// The pixel under the pointer: the cross-hair of all images.
@@ -75,7 +76,7 @@ impl Default for Selection {
     fn default() -> Self {
         Self {
             pair: None,
-            finger: Finger::Right,
+            finger: PadId::default(),
             both_fingers: false,
             hover: None,
             hover_point: None,
@@ -86,15 +87,29 @@ impl Default for Selection {
     }
 }
 
-impl Selection {
-    /// The fingers on screen, the active one first.
-    pub fn fingers(&self) -> Vec<Finger> {
-        let other = if self.finger == Finger::Right { Finger::Left } else { Finger::Right };
-        if self.both_fingers { vec![self.finger, other] } else { vec![self.finger] }
-    }
-}
-
 impl State {
+    /// The sensors of the open data set; the lab's while none is open.
+    pub fn rig(&self) -> Arc<Rig> {
+        self.library.open.as_ref().map_or_else(Rig::lab, |open| open.source.rig())
+    }
+
+    /// The fingers on screen, the active one first.
+    pub fn fingers(&self) -> Vec<PadId> {
+        let active = self.selection.finger;
+        let others = self.rig().pads().filter(|pad| self.selection.both_fingers && *pad != active);
+        std::iter::once(active).chain(others).collect()
+    }
+
+    /// The finger after the active one.
+    pub fn other_finger(&self) -> PadId {
+        PadId::new((self.selection.finger.index() + 1) % self.rig().pads().len().max(1))
+    }
+
+    /// A finger's name in files, such as `right`.
+    pub fn finger_name(&self, finger: PadId) -> Text {
+        self.rig().pad_key(finger)
+    }
+
     /// The selected pair's entry.
     pub fn entry(&self) -> Option<&PairEntry> {
         self.library.entry(self.selection.pair?)
@@ -111,7 +126,7 @@ impl State {
     }
 
     /// One finger of the selected pair.
-    pub fn touch_key(&self, finger: Finger) -> Option<TouchKey> {
+    pub fn touch_key(&self, finger: PadId) -> Option<TouchKey> {
         Some(self.pair_key()?.finger(finger))
     }
 }
@@ -186,6 +201,12 @@ pub enum Absent {
     NoFinger,
     /// The finger has no GelSlim image.
     NoGelSlim,
+    /// The finger has no reading of the sensor that the generator starts from.
+    NoInput,
+    /// The prediction is a color picture.
+    PredictsColor,
+    /// The generators that were found are for other sensors.
+    OtherSensors,
     /// The source only has the GelSlim difference image.
     OnlyDifference,
     /// The finger has no measured imprint.
@@ -218,6 +239,9 @@ impl Absent {
             Self::NothingSelected => "No pair is selected.",
             Self::NoFinger => "This source has no such finger.",
             Self::NoGelSlim => "This finger has no GelSlim image.",
+            Self::NoInput => "This finger has no image of the sensor that the model starts from.",
+            Self::PredictsColor => "The prediction is a color picture: no depth, and so no contact, points or pose.",
+            Self::OtherSensors => "No generator fits the sensors of this data set: the list of models says why.",
             Self::OnlyDifference => "This source only has the difference image.",
             Self::NoBubble => "This finger has no measured imprint.",
             Self::NoPrediction => "No prediction yet.",

@@ -13,16 +13,15 @@ use super::keys::{
 use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use super::workbench::PoseOf;
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
-use crate::domain::sensor::Finger;
+use crate::domain::grid::{DepthMap, Mask, RgbGrid};
+use crate::domain::rig::{PadId, PerPad, SensorKind};
+use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use crate::domain::units;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::cloud::Clouds;
 use crate::work::compare::Comparison;
 use crate::work::pose::PoseResult;
 use crate::work::tool::NamedTool;
-use strum::IntoEnumIterator as _;
 
 /// Neighbours loaded ahead on each side of the selection.
 pub const PREFETCH: usize = 4;
@@ -54,22 +53,22 @@ impl State {
     }
 
     /// What one finger felt.
-    pub fn touch(&self, finger: Finger) -> Lookup<'_, FingerTouch> {
-        self.sample().and_then(Absent::NoFinger, |sample| sample.finger(finger))
+    pub fn touch(&self, finger: PadId) -> Lookup<'_, PadTouch> {
+        self.sample().and_then(Absent::NoFinger, |sample| sample.pad(finger))
     }
 
     /// What one GelSlim felt.
-    pub fn gelslim(&self, finger: Finger) -> Lookup<'_, GelSlimTouch> {
-        self.touch(finger).and_then(Absent::NoGelSlim, |touch| touch.gelslim.as_ref())
+    pub fn gelslim(&self, finger: PadId) -> Lookup<'_, ColorTouch> {
+        self.touch(finger).and_then(Absent::NoGelSlim, |touch| touch.color())
     }
 
     /// What one Soft Bubble felt.
-    pub fn bubble(&self, finger: Finger) -> Lookup<'_, BubbleTouch> {
-        self.touch(finger).and_then(Absent::NoBubble, |touch| touch.bubble.as_ref())
+    pub fn bubble(&self, finger: PadId) -> Lookup<'_, DepthTouch> {
+        self.touch(finger).and_then(Absent::NoBubble, |touch| touch.depth())
     }
 
     /// The prediction shown for one finger, if one was made.
-    pub fn chosen(&self, finger: Finger) -> Option<&PredictionKey> {
+    pub fn chosen(&self, finger: PadId) -> Option<&PredictionKey> {
         self.results.chosen.get(&self.touch_key(finger)?)
     }
 
@@ -77,19 +76,22 @@ impl State {
     ///
     /// # Errors
     /// Why there is none.
-    pub fn imprint_key(&self, source: ImprintSource, finger: Finger) -> Result<ImprintKey, Absent> {
+    pub fn imprint_key(&self, source: ImprintSource, finger: PadId) -> Result<ImprintKey, Absent> {
         let touch = self.touch_key(finger).ok_or(Absent::NothingSelected)?;
         match source {
             ImprintSource::Measured => Ok(ImprintKey::Measured(touch)),
             ImprintSource::Predicted => {
                 let recipe = self.results.chosen.get(&touch).ok_or(Absent::NoPrediction)?;
+                if self.is_color(recipe) {
+                    return Err(Absent::PredictsColor);
+                }
                 Ok(ImprintKey::Predicted(recipe.clone(), self.settings.shift))
             }
         }
     }
 
     /// The imprint shown for one finger, metres, raw bubble orientation.
-    pub fn imprint(&self, source: ImprintSource, finger: Finger) -> Lookup<'_, DepthMap> {
+    pub fn imprint(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
         match self.imprint_key(source, finger) {
             Err(absent) => Lookup::Absent(absent),
             Ok(ImprintKey::Measured(_)) => self.bubble(finger).and_then(Absent::NoBubble, |b| Some(&b.imprint)),
@@ -101,11 +103,14 @@ impl State {
     }
 
     /// Prediction against measurement of one finger.
-    pub fn comparison(&self, finger: Finger) -> Lookup<'_, Comparison> {
+    pub fn comparison(&self, finger: PadId) -> Lookup<'_, Comparison> {
         let recipe = match self.chosen(finger) {
             Some(recipe) => recipe.clone(),
             None => return self.sample().and_then(Absent::NoPrediction, |_| None),
         };
+        if self.is_color(&recipe) {
+            return Lookup::Absent(Absent::PredictsColor);
+        }
         if self.bubble(finger).ready().is_none() {
             return self.bubble(finger).without();
         }
@@ -126,7 +131,10 @@ impl State {
             BundleKind::Mask => (self.settings.mask.bundle.as_deref(), Absent::NoMaskModel),
             BundleKind::Classifier => (None, Absent::NoClassifier),
         };
-        self.library.bundle_named(kind, name).ok_or(absent)
+        let rig = self.rig();
+        let others = self.library.bundles.iter().any(|bundle| bundle.kind == kind && !bundle.fits(&rig));
+        let absent = if others { Absent::OtherSensors } else { absent };
+        self.library.bundle_named(kind, name, &rig).ok_or(absent)
     }
 
     /// Whether something can be generated for the selected pair.
@@ -144,15 +152,40 @@ impl State {
         let Some(sample) = self.sample().ready() else {
             return Ok(());
         };
-        let has = |finger: Finger| sample.finger(finger).is_some_and(|t| t.gelslim.is_some());
-        if Finger::BOTH.into_iter().any(has) { Ok(()) } else { Err(Absent::NoGelSlim) }
+        if sample.rig.pads().any(|finger| self.has_input(sample, finger)) { Ok(()) } else { Err(Absent::NoInput) }
+    }
+
+    /// Whether a finger has a reading of the sensor that the generator starts from.
+    fn has_input(&self, sample: &Sample, finger: PadId) -> bool {
+        let ends = self.bundle(BundleKind::Generator).ok().and_then(|bundle| bundle.ends(&sample.rig)?.ok());
+        ends.is_some_and(|ends| sample.pad(finger).is_some_and(|touch| touch.reading(ends.input).is_some()))
+    }
+
+    /// Whether something can be generated for a finger of the selected pair, which is loaded.
+    pub fn can_start(&self, finger: PadId) -> bool {
+        self.sample().ready().is_some_and(|sample| self.has_input(sample, finger))
+    }
+
+    /// Whether a prediction is a color picture.
+    pub(super) fn is_color(&self, recipe: &PredictionKey) -> bool {
+        let bundle = self.library.bundle(&recipe.bundle).and_then(|bundle| bundle.generator.as_ref());
+        bundle.is_some_and(|generator| generator.sensors.output.kind == SensorKind::Color)
+    }
+
+    /// The predicted color picture shown for one finger, where that is what the model predicts.
+    pub fn predicted_color(&self, finger: PadId) -> Option<Lookup<'_, RgbGrid>> {
+        let recipe = self.chosen(finger).filter(|recipe| self.is_color(recipe))?;
+        Some(match self.results.colors.get(recipe) {
+            Some(picture) => Lookup::Ready(picture),
+            None => self.missing(&Request::Imprint(recipe.clone(), self.settings.shift)),
+        })
     }
 
     /// The recipe of the automatic mask that the settings ask for.
     ///
     /// # Errors
     /// Why this source cannot give one for this finger.
-    pub fn mask_recipe(&self, finger: Finger) -> Result<MaskRecipe, Absent> {
+    pub fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
         let mask = &self.settings.mask;
         match mask.source {
             MaskSource::Threshold => Ok(MaskRecipe::Threshold(mask.threshold_m.into())),
@@ -173,7 +206,7 @@ impl State {
                 .bundle(BundleKind::Mask)
                 .map_or(MaskRecipe::Threshold(mask.threshold_m.into()), |bundle| MaskRecipe::Unet(bundle.id.clone()))),
             MaskSource::Truth => {
-                if self.touch(finger).ready().is_some_and(|t| t.bubble.as_ref().is_none_or(|b| b.truth.is_none())) {
+                if self.touch(finger).ready().is_some_and(|t| t.depth().is_none_or(|b| b.truth.is_none())) {
                     return Err(Absent::NotSimulated);
                 }
                 Ok(MaskRecipe::Truth)
@@ -182,7 +215,7 @@ impl State {
     }
 
     /// The automatic mask of one finger's imprint.
-    pub fn automatic_mask(&self, source: ImprintSource, finger: Finger) -> Lookup<'_, Arc<Mask>> {
+    pub fn automatic_mask(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, Arc<Mask>> {
         if self.imprint(source, finger).ready().is_none() {
             return self.imprint(source, finger).without();
         }
@@ -199,7 +232,7 @@ impl State {
     }
 
     /// The corrected mask of one finger, if it is there and as large as the imprint.
-    fn hand_mask_for(&self, source: ImprintSource, finger: Finger) -> Option<&super::document::HandMask> {
+    fn hand_mask_for(&self, source: ImprintSource, finger: PadId) -> Option<&super::document::HandMask> {
         let hand = self.document.hand_mask(self.pair_name(), finger)?;
         let imprint = self.imprint(source, finger).ready()?;
         (hand.mask.size() == imprint.size()).then_some(hand)
@@ -212,7 +245,7 @@ impl State {
     pub fn mask_in_force(
         &self,
         source: ImprintSource,
-        finger: Finger,
+        finger: PadId,
     ) -> Result<MaskInForce<'_>, Lookup<'_, Arc<Mask>>> {
         if let Some(hand) = self.hand_mask_for(source, finger) {
             let label = if hand.base.is_empty() { "By hand".into() } else { format!("By hand, from {}", hand.base) };
@@ -230,7 +263,7 @@ impl State {
     }
 
     /// What an automatic mask that is there is made of, in words.
-    pub fn automatic_label(&self, source: ImprintSource, finger: Finger, recipe: &MaskRecipe) -> String {
+    pub fn automatic_label(&self, source: ImprintSource, finger: PadId, recipe: &MaskRecipe) -> String {
         let label = self.mask_label(recipe);
         let key = self.imprint_key(source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
         let basis = key.ok().and_then(|key| self.results.mask_bases.get(&key));
@@ -284,14 +317,11 @@ impl State {
             Lookup::Absent(absent) => return Err(absent),
             _ => return Ok(None),
         };
-        let mut parts = [None, None];
+        let mut parts = PerPad::default();
         let mut reason = Absent::NoBubble;
-        for finger in Finger::BOTH {
-            let Some(touch) = sample.finger(finger) else {
-                continue;
-            };
+        for (finger, touch) in sample.pads.entries() {
             if touch.camera().is_none() {
-                if touch.bubble.is_some() || source == ImprintSource::Predicted {
+                if touch.depth().is_some() || source == ImprintSource::Predicted {
                     reason = Absent::NoCamera;
                 }
                 continue;
@@ -314,9 +344,9 @@ impl State {
                 Err(Lookup::Failed(_) | Lookup::Absent(_)) => None,
                 Err(_) => return Ok(None),
             };
-            parts[finger.index()] = Some((key, version));
+            parts[finger] = Some((key, version));
         }
-        if parts.iter().all(Option::is_none) { Err(reason) } else { Ok(Some(CloudKey { parts })) }
+        if parts.is_empty() { Err(reason) } else { Ok(Some(CloudKey { parts })) }
     }
 
     /// The surface points of an imprint, both fingers.
@@ -341,7 +371,7 @@ impl State {
             return Ok(None);
         };
         if cloud.parts.iter().flatten().all(|(_, mask)| mask.is_none()) {
-            return Err(Finger::BOTH.into_iter().find_map(|f| self.mask_recipe(f).err()).unwrap_or(Absent::NoContact));
+            return Err(self.rig().pads().find_map(|f| self.mask_recipe(f).err()).unwrap_or(Absent::NoContact));
         }
         Ok(Some(PoseKey { cloud, tool: tool?.into(), engine: self.settings.pose_engine }))
     }
@@ -474,8 +504,8 @@ impl Wanted<'_> {
         let (scene_measured, cloud_measured) = state.shows_cloud(measured);
         let (scene_predicted, cloud_predicted) = state.shows_cloud(predicted);
 
-        let shown = state.selection.fingers();
-        for finger in Finger::BOTH {
+        let shown = state.fingers();
+        for finger in state.rig().pads() {
             let on_screen = shown.contains(&finger);
             let image = state.is_visible(&[Pane::Predicted]) && on_screen;
             let compared = state.is_visible(&[Pane::Error, Pane::Metrics]) && on_screen;
@@ -518,30 +548,30 @@ impl Wanted<'_> {
     }
 
     /// What was made of a touch before this start of the program.
-    fn stored(&mut self, finger: Finger, touch: TouchKey) {
+    fn stored(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
-        if state.gelslim(finger).ready().is_some() && state.bundle(BundleKind::Generator).is_ok() {
+        if state.can_start(finger) {
             self.ask(state.results.looked_up.contains(&touch), Request::Stored(touch));
         }
     }
 
     /// The prediction of a finger that nobody looked at when the other one's was made.
-    fn other_finger(&mut self, finger: Finger) {
+    fn other_finger(&mut self, finger: PadId) {
         let state = self.state;
-        let other = if finger == Finger::Right { Finger::Left } else { Finger::Right };
-        let (Some(touch), Some(made)) = (state.touch_key(finger), state.chosen(other)) else { return };
+        let made = state.rig().pads().filter(|pad| *pad != finger).find_map(|pad| state.chosen(pad));
+        let (Some(touch), Some(made)) = (state.touch_key(finger), made) else { return };
         let looked_up = state.results.looked_up.contains(&touch);
         if !state.settings.generate.both_fingers || !looked_up || state.chosen(finger).is_some() {
             return;
         }
         let recipe = PredictionKey { touch, ..made.clone() };
         let under_way = state.tasks.generating(&recipe).is_some();
-        if state.library.bundle(&recipe.bundle).is_some() && state.gelslim(finger).ready().is_some() && !under_way {
+        if state.library.bundle(&recipe.bundle).is_some() && state.can_start(finger) && !under_way {
             self.ask(state.results.predictions.contains(&recipe), Request::Prediction(recipe));
         }
     }
 
-    fn imprint(&mut self, finger: Finger, touch: TouchKey) {
+    fn imprint(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
         let Some(recipe) = state.results.chosen.get(&touch) else {
             return;
@@ -551,10 +581,11 @@ impl Wanted<'_> {
             return;
         }
         let key = (recipe.clone(), state.settings.shift);
-        self.ask(state.results.imprints.contains(&key), Request::Imprint(key.0, key.1));
+        let there = state.results.imprints.contains(&key) || state.results.colors.contains(recipe);
+        self.ask(there, Request::Imprint(key.0, key.1));
     }
 
-    fn comparison(&mut self, finger: Finger, touch: TouchKey) {
+    fn comparison(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
         let Some(recipe) = state.results.chosen.get(&touch) else {
             return;
@@ -566,7 +597,7 @@ impl Wanted<'_> {
         }
     }
 
-    fn mask(&mut self, source: ImprintSource, finger: Finger) {
+    fn mask(&mut self, source: ImprintSource, finger: PadId) {
         let state = self.state;
         // Stored corrections first: they may make the automatic mask unnecessary.
         if !state.document.stored.contains_key(state.pair_name())
@@ -643,7 +674,9 @@ impl Wanted<'_> {
             return;
         }
         if state.is_visible(&[Pane::Poses]) {
-            for key in PoseOf::iter().filter_map(|of| state.pose_key_of(source, of).ok().flatten()) {
+            for key in
+                PoseOf::all(&state.rig()).into_iter().filter_map(|of| state.pose_key_of(source, of).ok().flatten())
+            {
                 if state.results.clouds.contains(&key.cloud) {
                     self.ask(state.results.poses.contains(&key), Request::Pose(key));
                 } else {

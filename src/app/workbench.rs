@@ -10,9 +10,9 @@ use super::keys::{ImprintSource, PairKey, PoseKey, Request, RunKey};
 use super::state::{Lookup, State};
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::{AcceptedPose, HandAxis, HandCost, HandPose, PoseDifference};
-use crate::domain::sensor::Finger;
 use crate::work::layers::LayerResult;
 use crate::work::pose::PoseResult;
+use crate::domain::rig::{PadId, PerPad, Rig};
 
 /// What colours the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
@@ -81,7 +81,7 @@ pub struct Picked {
     /// Of which imprint.
     pub source: ImprintSource,
     /// Of which finger.
-    pub finger: Finger,
+    pub finger: PadId,
     /// Its raw bubble pixel.
     pub pixel: [u16; 2],
 }
@@ -194,30 +194,31 @@ pub enum WorkbenchCommand {
 }
 
 /// A finger's row, or the joint one, of the table of poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumIter)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseOf {
-    /// From the right finger alone.
-    Right,
-    /// From the left finger alone.
-    Left,
-    /// From both.
+    /// From one finger alone.
+    Finger(PadId),
+    /// From all together.
     Joint,
 }
 
 impl PoseOf {
     /// The name on screen.
-    pub fn name(self) -> &'static str {
+    pub fn name(self, rig: &Rig) -> String {
         match self {
-            Self::Right => "Right finger",
-            Self::Left => "Left finger",
-            Self::Joint => "Joint",
+            Self::Finger(finger) => format!("{} finger", rig.pad_name(finger)),
+            Self::Joint => "Joint".into(),
         }
     }
 
-    fn finger(self) -> Option<Finger> {
+    /// All rows of a rig's table.
+    pub fn all(rig: &Rig) -> Vec<Self> {
+        rig.pads().map(Self::Finger).chain([Self::Joint]).collect()
+    }
+
+    fn finger(self) -> Option<PadId> {
         match self {
-            Self::Right => Some(Finger::Right),
-            Self::Left => Some(Finger::Left),
+            Self::Finger(finger) => Some(finger),
             Self::Joint => None,
         }
     }
@@ -295,12 +296,12 @@ impl State {
     pub fn pose_key_of(&self, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, super::state::Absent> {
         let Some(mut key) = self.pose_key(source)? else { return Ok(None) };
         if let Some(finger) = of.finger() {
-            let part = key.cloud.parts[finger.index()].take();
+            let part = key.cloud.parts[finger].take();
             if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
                 return Err(super::state::Absent::NoFinger);
             }
-            key.cloud.parts = [None, None];
-            key.cloud.parts[finger.index()] = part;
+            key.cloud.parts = PerPad::default();
+            key.cloud.parts[finger] = part;
         }
         Ok(Some(key))
     }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::grid::RgbGrid;
 use super::resample::area;
-use super::sensor::gelslim;
+use super::rig::lab;
 
 /// Columns that the image is reduced to: 0.28 mm per pixel of a GelSlim, and little of the camera's noise left.
 const COLUMNS: usize = 64;
@@ -79,7 +79,7 @@ pub fn ambiguity(difference: &RgbGrid) -> Option<Ambiguity> {
         return None;
     }
     // Square pixels in the aspect of a GelSlim, whatever the image was resized to.
-    let rows = COLUMNS * gelslim::HEIGHT / gelslim::WIDTH;
+    let rows = COLUMNS * lab::GELSLIM.height / lab::GELSLIM.width;
     let planes: Vec<Vec<f64>> = (0..3)
         .map(|c| {
             let plane = difference.map(|p| if p[c].is_finite() { p[c] } else { 0.0 });

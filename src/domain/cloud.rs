@@ -5,17 +5,17 @@
 use glam::{DVec2, DVec3};
 
 use super::grid::{DepthMap, Mask};
-use super::sample::{BubbleCamera, BubbleTouch, Sample};
-use super::sensor::Finger;
+use super::rig::{PadId, PerPad, Rig, Text};
+use super::sample::{DepthCamera, DepthTouch, Sample};
 
 /// Why an imprint cannot be lifted.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CloudError {
     /// The source has no camera (an image folder), so there is no third dimension.
-    #[error("the {} finger has no camera data (intrinsics, reference depth): its pixels have no place in space", .finger.name())]
+    #[error("the {finger} finger has no camera data (intrinsics, reference depth): its pixels have no place in space")]
     NoCamera {
         /// The finger asked for.
-        finger: Finger,
+        finger: Text,
     },
     /// Two images that must cover the same pixels do not.
     #[error("the {what} is {} x {} pixels, the imprint {} x {}: they must be equal", .size[0], .size[1], .imprint[0], .imprint[1])]
@@ -58,7 +58,7 @@ pub struct Lifted {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FingerCloud {
     /// The finger that felt it.
-    pub finger: Finger,
+    pub finger: PadId,
     /// Its points.
     pub lifted: Lifted,
 }
@@ -67,7 +67,7 @@ pub struct FingerCloud {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PointSource {
     /// The finger.
-    pub finger: Finger,
+    pub finger: PadId,
     /// Column and row in that finger's imprint.
     pub pixel: [u16; 2],
 }
@@ -90,8 +90,8 @@ pub struct ContactCloud {
     pub points: Vec<DVec3>,
     /// Finger and pixel, one per point.
     pub sources: Vec<PointSource>,
-    /// Indexed by [`Finger::index`]; `None` for a finger that is missing.
-    pub counts: [Option<FingerCounts>; 2],
+    /// None for a finger that is missing.
+    pub counts: PerPad<FingerCounts>,
 }
 
 /// Lifts the pixels of `imprint` that `mask` contains (all without one) to the grasp frame.
@@ -105,7 +105,7 @@ pub struct ContactCloud {
 /// # Source
 /// The lab's `ICP_dataset_cal.py` lines 426-463 (pinhole with crop offset, camera to grasp); the lab does not drop
 /// invalid pixels.
-pub fn lift(imprint: &DepthMap, camera: &BubbleCamera, mask: Option<&Mask>) -> Result<Lifted, CloudError> {
+pub fn lift(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Result<Lifted, CloudError> {
     check(imprint, camera)?;
     if let Some(mask) = mask {
         same_size("mask", mask.size(), imprint)?;
@@ -132,22 +132,22 @@ pub fn lift(imprint: &DepthMap, camera: &BubbleCamera, mask: Option<&Mask>) -> R
 }
 
 /// The point of one pixel, metres, grasp frame; `None` outside the images and where the depth is unusable.
-pub fn lift_pixel(imprint: &DepthMap, camera: &BubbleCamera, x: usize, y: usize) -> Option<DVec3> {
+pub fn lift_pixel(imprint: &DepthMap, camera: &DepthCamera, x: usize, y: usize) -> Option<DVec3> {
     let reference = *camera.depth_reference.get(x, y)?;
     let depth = reference - imprint.get(x, y)?;
     if !(reference.is_finite() && reference > 0.0 && depth.is_finite() && depth > 0.0) {
         return None;
     }
-    let in_camera = camera.intrinsics.lift(x as f64, y as f64, f64::from(depth));
+    let in_camera = camera.lift(x as f64, y as f64, f64::from(depth));
     Some(camera.grasp_from_camera.transform_point3(in_camera))
 }
 
 /// The pixel position (column, row; not rounded) that sees a point given in the grasp frame, metres.
 ///
 /// `None` behind the camera, for a point that is not finite, and for a camera whose transform has no inverse.
-pub fn project(camera: &BubbleCamera, in_grasp: DVec3) -> Option<DVec2> {
+pub fn project(camera: &DepthCamera, in_grasp: DVec3) -> Option<DVec2> {
     let p = camera.grasp_from_camera.inverse().transform_point3(in_grasp);
-    let (u, v) = camera.intrinsics.project(p)?;
+    let (u, v) = camera.project(p)?;
     (u.is_finite() && v.is_finite()).then(|| DVec2::new(u, v))
 }
 
@@ -155,23 +155,28 @@ pub fn project(camera: &BubbleCamera, in_grasp: DVec3) -> Option<DVec2> {
 ///
 /// # Errors
 /// [`CloudError::NoCamera`] for a touch of an image folder; otherwise as [`lift`].
-pub fn lift_finger(touch: &BubbleTouch, finger: Finger, mask: Option<&Mask>) -> Result<FingerCloud, CloudError> {
-    let camera = touch.camera.as_ref().ok_or(CloudError::NoCamera { finger })?;
+pub fn lift_finger(
+    touch: &DepthTouch,
+    rig: &Rig,
+    finger: PadId,
+    mask: Option<&Mask>,
+) -> Result<FingerCloud, CloudError> {
+    let camera = touch.camera.as_ref().ok_or_else(|| CloudError::NoCamera { finger: rig.pad_key(finger) })?;
     Ok(FingerCloud { finger, lifted: lift(&touch.imprint, camera, mask)? })
 }
 
 impl ContactCloud {
-    /// Joins the measured imprints of a sample; `masks` is indexed by [`Finger::index`], `None` takes every pixel.
+    /// Joins the measured imprints of a sample; a finger without a mask is taken whole.
     ///
     /// A finger without a bubble image is left out and has no counts.
     ///
     /// # Errors
     /// As [`lift_finger`], for the first finger that fails.
-    pub fn from_sample(sample: &Sample, masks: [Option<&Mask>; 2]) -> Result<Self, CloudError> {
+    pub fn from_sample(sample: &Sample, masks: &PerPad<&Mask>) -> Result<Self, CloudError> {
         let mut cloud = Self::default();
-        for finger in Finger::BOTH {
-            if let Some(bubble) = sample.finger(finger).and_then(|f| f.bubble.as_ref()) {
-                cloud.push(lift_finger(bubble, finger, masks[finger.index()])?);
+        for (finger, touch) in sample.pads.entries() {
+            if let Some(bubble) = touch.depth() {
+                cloud.push(lift_finger(bubble, &sample.rig, finger, masks[finger])?);
             }
         }
         Ok(cloud)
@@ -180,7 +185,7 @@ impl ContactCloud {
     /// Adds a finger's points.
     pub fn push(&mut self, part: FingerCloud) {
         let FingerCloud { finger, lifted } = part;
-        self.counts[finger.index()] = Some(FingerCounts {
+        self.counts[finger] = Some(FingerCounts {
             points: lifted.points.len(),
             invalid: lifted.invalid,
             outside_mask: lifted.outside_mask,
@@ -201,7 +206,7 @@ impl ContactCloud {
 }
 
 /// Whether the camera can lift `imprint` at all.
-pub(super) fn check(imprint: &DepthMap, camera: &BubbleCamera) -> Result<(), CloudError> {
+pub(super) fn check(imprint: &DepthMap, camera: &DepthCamera) -> Result<(), CloudError> {
     same_size("reference depth", camera.depth_reference.size(), imprint)?;
     let size = imprint.size();
     if size.iter().any(|&n| n > usize::from(u16::MAX)) {
@@ -223,16 +228,18 @@ fn same_size(what: &'static str, size: [usize; 2], imprint: &DepthMap) -> Result
 #[cfg(test)]
 pub(super) mod testing {
     use super::*;
+    use crate::domain::rig::lab;
     use crate::domain::sensor::Intrinsics;
     use glam::{DAffine3, DMat3};
 
     /// A camera as on the lab's rig: optical axis 35 degrees off the closing axis, 93 mm from the grasp origin.
-    pub(crate) fn camera(width: usize, height: usize) -> BubbleCamera {
+    pub(crate) fn camera(width: usize, height: usize) -> DepthCamera {
         let x = DVec3::new(0.5729, 0.0, -0.8196).normalize();
         let z = DVec3::new(0.8196, 0.0, 0.5729).normalize();
-        BubbleCamera {
+        DepthCamera {
             depth_reference: DepthMap::filled(width, height, 0.09),
             intrinsics: Intrinsics { fx: 212.0, fy: 211.0, cx: 112.3, cy: 86.1 },
+            crop: lab::BUBBLE.crop,
             grasp_from_camera: DAffine3::from_mat3_translation(
                 DMat3::from_cols(x, DVec3::Y, z),
                 DVec3::new(-0.0764, 0.0, -0.0541),
@@ -244,8 +251,11 @@ pub(super) mod testing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::sample::FingerTouch;
-    use crate::domain::sensor::bubble::{HEIGHT, WIDTH};
+    use crate::domain::rig::lab;
+    use crate::domain::sample::PadTouch;
+
+    const WIDTH: usize = lab::BUBBLE.width;
+    const HEIGHT: usize = lab::BUBBLE.height;
 
     fn imprint() -> DepthMap {
         DepthMap::from_fn(WIDTH, HEIGHT, |x, y| 1e-4 * ((x * 7 + y * 13) % 100) as f32)
@@ -283,21 +293,21 @@ mod tests {
 
     #[test]
     fn fingers_are_joined_and_a_missing_one_is_fine() {
-        let bubble = BubbleTouch { imprint: imprint(), camera: Some(testing::camera(WIDTH, HEIGHT)), truth: None };
-        let touch = |bubble| Some(FingerTouch { bubble, ..FingerTouch::default() });
-        let mut sample = Sample { fingers: [None, touch(Some(bubble.clone()))], ..Sample::default() };
+        let bubble = DepthTouch { imprint: imprint(), camera: Some(testing::camera(WIDTH, HEIGHT)), truth: None };
+        let touch = |bubble| Some(PadTouch::default().with(lab::BUBBLE_ID, Some(bubble)));
+        let mut sample = Sample { pads: [None, touch(bubble.clone())].into(), ..Sample::default() };
         let mask = Mask::from_fn(WIDTH, HEIGHT, |x, _| x < 10);
-        let cloud = ContactCloud::from_sample(&sample, [None, Some(&mask)]).unwrap();
+        let cloud = ContactCloud::from_sample(&sample, &[None, Some(&mask)].into()).unwrap();
         assert_eq!(cloud.points.len(), 10 * HEIGHT);
-        assert_eq!(cloud.sources[0], PointSource { finger: Finger::Left, pixel: [0, 0] });
-        assert_eq!(cloud.counts[0], None);
-        sample.fingers[0] = touch(Some(bubble.clone()));
-        let both = ContactCloud::from_sample(&sample, [Some(&mask), Some(&mask)]).unwrap();
+        assert_eq!(cloud.sources[0], PointSource { finger: lab::LEFT, pixel: [0, 0] });
+        assert_eq!(cloud.counts[lab::RIGHT], None);
+        sample.pads[lab::RIGHT] = touch(bubble.clone());
+        let both = ContactCloud::from_sample(&sample, &[Some(&mask), Some(&mask)].into()).unwrap();
         assert_eq!((both.points.len(), both.yz().len(), both.invalid()), (20 * HEIGHT, 20 * HEIGHT, 0));
-        sample.fingers[0] = touch(Some(BubbleTouch { camera: None, ..bubble }));
+        sample.pads[lab::RIGHT] = touch(DepthTouch { camera: None, ..bubble });
         assert_eq!(
-            ContactCloud::from_sample(&sample, [None, None]),
-            Err(CloudError::NoCamera { finger: Finger::Right })
+            ContactCloud::from_sample(&sample, &PerPad::default()),
+            Err(CloudError::NoCamera { finger: "right".into() })
         );
     }
 

@@ -5,7 +5,7 @@ use super::cloud::{self, CloudError};
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Grid, Mask};
 use super::mesh::MeshDistance;
-use super::sample::BubbleCamera;
+use super::sample::DepthCamera;
 use super::units::text_mm;
 
 /// Distance to the CAD model that the lab still calls contact, metres (`ICP_dataset_cal.py` lines 337-391).
@@ -44,7 +44,7 @@ pub fn top_percent(imprint: &DepthMap, percent: f64, min_m: f32) -> Mask {
 /// [`CloudError`] if the sizes differ or the camera's numbers cannot be right.
 pub fn cad_signed_distance(
     imprint: &DepthMap,
-    camera: &BubbleCamera,
+    camera: &DepthCamera,
     tool: &MeshDistance,
     object_from_grasp: PlanarPose,
     max_m: f64,

@@ -16,8 +16,8 @@ use serde::Serialize;
 
 use super::dataset::{PairEntry, Split};
 use super::metrics::{AngleSummary, frechet_distance};
+use super::rig::{PadId, Rig};
 use super::sample::Scale;
-use super::sensor::Finger;
 use super::sim;
 
 pub use paper::paper_rows;
@@ -357,9 +357,9 @@ pub fn squared_error(prediction: &super::grid::Grid<f32>, truth: &super::grid::G
     Some(SquaredError { sum: mse * pixels as f64, pixels })
 }
 
-/// The fingers that a finger choice names, in the lab's order.
-pub fn fingers(both: bool) -> &'static [Finger] {
-    if both { &Finger::BOTH } else { &[Finger::Right] }
+/// The pads that a finger choice names, in the rig's order: all, or the first.
+pub fn fingers(rig: &Rig, all: bool) -> impl Iterator<Item = PadId> + use<> {
+    rig.pads().take(if all { usize::MAX } else { 1 })
 }
 
 #[cfg(test)]

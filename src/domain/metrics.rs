@@ -3,6 +3,7 @@
 //! Sums run in f64. Pixels that are not finite in either image are left out of the error metrics.
 
 mod angle;
+mod color;
 mod frechet;
 mod image;
 mod joint;
@@ -10,8 +11,9 @@ mod split;
 mod ssim;
 
 pub use angle::AngleSummary;
+pub use color::{LEVELS, color, planes};
 pub use frechet::frechet_distance;
 pub use image::{MetricError, Psnr, PsnrMean, mse, psnr, psnr_of_mse, unit_range};
 pub use joint::{Joint, Line, line};
-pub use split::{Figures, Split, footprint_mask, split};
+pub use split::{Figures, Split, split};
 pub use ssim::{Ssim, SsimRange, ssim, ssim_ranges};

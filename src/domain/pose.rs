@@ -1,5 +1,7 @@
 //! Depth to pose in one call: what the command line and the studio both use.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -9,8 +11,8 @@ use super::align::{
 use super::cloud::{CloudError, ContactCloud, FingerCloud, lift};
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Mask};
-use super::sample::{BubbleCamera, Sample};
-use super::sensor::Finger;
+use super::rig::{PadId, PerPad, Rig, Text};
+use super::sample::{DepthCamera, Sample};
 
 pub use super::tool::{ToolError, ToolModel};
 
@@ -129,20 +131,36 @@ pub struct FingerInput<'a> {
     /// Measured or predicted imprint, metres, raw orientation.
     pub imprint: &'a DepthMap,
     /// The camera that saw it, or that would have.
-    pub camera: &'a BubbleCamera,
+    pub camera: &'a DepthCamera,
     /// Contact pixels; all without one.
     pub mask: Option<&'a Mask>,
 }
 
-/// Which fingers take part, indexed by [`Finger::index`].
-pub type Fingers<'a> = [Option<FingerInput<'a>>; 2];
+/// Which fingers take part.
+#[derive(Clone, Debug)]
+pub struct Fingers<'a> {
+    rig: Arc<Rig>,
+    inputs: PerPad<FingerInput<'a>>,
+}
+
+impl<'a> Fingers<'a> {
+    /// Whether no pad takes part.
+    pub fn is_empty(&self) -> bool {
+        self.inputs.is_empty()
+    }
+
+    /// Those pads of a rig for which there is something.
+    pub fn new(rig: &Arc<Rig>, of: impl FnMut(PadId) -> Option<FingerInput<'a>>) -> Self {
+        Self { rig: rig.clone(), inputs: rig.pads().map(of).collect() }
+    }
+}
 
 /// The measured imprints of a sample with the given masks; fingers without a bubble camera are left out.
-pub fn fingers_of<'a>(sample: &'a Sample, masks: [Option<&'a Mask>; 2]) -> Fingers<'a> {
-    Finger::BOTH.map(|finger| {
-        let bubble = sample.finger(finger)?.bubble.as_ref()?;
+pub fn fingers_of<'a>(sample: &'a Sample, masks: &PerPad<&'a Mask>) -> Fingers<'a> {
+    Fingers::new(&sample.rig, |finger| {
+        let bubble = sample.pad(finger)?.depth()?;
         let camera = bubble.camera.as_ref()?;
-        Some(FingerInput { imprint: &bubble.imprint, camera, mask: masks[finger.index()] })
+        Some(FingerInput { imprint: &bubble.imprint, camera, mask: masks[finger] })
     })
 }
 
@@ -153,10 +171,10 @@ pub enum PoseError {
     #[error("neither finger has an imprint with camera data, so there are no points to align")]
     NoFinger,
     /// An imprint cannot be lifted.
-    #[error("{} finger: {source}", .finger.name())]
+    #[error("{finger} finger: {source}")]
     Cloud {
-        /// The finger.
-        finger: Finger,
+        /// The finger's name.
+        finger: Text,
         /// The reason.
         source: CloudError,
     },
@@ -186,14 +204,12 @@ pub struct PoseReport {
 /// [`PoseError::NoFinger`] or [`PoseError::Cloud`].
 pub fn contact_cloud(fingers: &Fingers<'_>) -> Result<ContactCloud, PoseError> {
     let mut cloud = ContactCloud::default();
-    for finger in Finger::BOTH {
-        if let Some(input) = &fingers[finger.index()] {
-            let lifted =
-                lift(input.imprint, input.camera, input.mask).map_err(|source| PoseError::Cloud { finger, source })?;
-            cloud.push(FingerCloud { finger, lifted });
-        }
+    for (finger, input) in fingers.inputs.entries() {
+        let lifted = lift(input.imprint, input.camera, input.mask)
+            .map_err(|source| PoseError::Cloud { finger: fingers.rig.pad_key(finger), source })?;
+        cloud.push(FingerCloud { finger, lifted });
     }
-    if cloud.counts == [None, None] { Err(PoseError::NoFinger) } else { Ok(cloud) }
+    if cloud.counts.is_empty() { Err(PoseError::NoFinger) } else { Ok(cloud) }
 }
 
 /// Contact points (grasp frame, metres) to the tool's pose: what every caller ends in. `record` keeps per-iteration
@@ -282,6 +298,7 @@ mod tests {
     use crate::domain::cloud::testing::camera;
     use crate::domain::contact::{LAB_CAD_DISTANCE_M, cad_signed_distance};
     use crate::domain::mesh::TriMesh;
+    use crate::domain::rig::lab;
     use glam::{DAffine3, DQuat};
     use strum::IntoEnumIterator as _;
 
@@ -299,7 +316,8 @@ mod tests {
         let imprint = DepthMap::filled(175, 140, 0.0);
         let mask = cad_signed_distance(&imprint, &camera, &tool.distance, truth.inverse(), LAB_CAD_DISTANCE_M).unwrap();
         assert!(mask.as_slice().iter().filter(|&&m| m).count() > 200);
-        let fingers = [Some(FingerInput { imprint: &imprint, camera: &camera, mask: Some(&mask) }), None];
+        let input = FingerInput { imprint: &imprint, camera: &camera, mask: Some(&mask) };
+        let fingers = Fingers::new(&Rig::lab(), |pad| (pad == lab::RIGHT).then_some(input));
         for (engine, limit_deg) in [(Engine::DistanceField, 2.0), (Engine::LabIcp, 12.0)] {
             let report = estimate(&fingers, &tool, engine, false).unwrap();
             let error = (report.grasp_from_object.theta_rad - truth.theta_rad).to_degrees();
@@ -324,7 +342,8 @@ mod tests {
         }
         for engine in [Engine::DistanceField, Engine::LabIcp] {
             let ask = |mask| {
-                let fingers = [Some(FingerInput { imprint: &imprint, camera: &camera, mask: Some(mask) }), None];
+                let input = FingerInput { imprint: &imprint, camera: &camera, mask: Some(mask) };
+                let fingers = Fingers::new(&Rig::lab(), |pad| (pad == lab::RIGHT).then_some(input));
                 estimate(&fingers, &tool, engine, false).unwrap()
             };
             let (with, without) = (ask(&mask), ask(&thinned));
@@ -336,16 +355,21 @@ mod tests {
     #[test]
     fn missing_and_empty_inputs_are_errors() {
         let tool = ToolModel::new(cross()).unwrap();
-        assert_eq!(estimate(&[None, None], &tool, Engine::default(), false), Err(PoseError::NoFinger));
+        assert_eq!(
+            estimate(&Fingers::new(&Rig::lab(), |_| None), &tool, Engine::default(), false),
+            Err(PoseError::NoFinger)
+        );
         let camera = camera(175, 140);
         let imprint = DepthMap::filled(175, 140, f32::NAN);
-        let fingers = [None, Some(FingerInput { imprint: &imprint, camera: &camera, mask: None })];
+        let input = FingerInput { imprint: &imprint, camera: &camera, mask: None };
+        let fingers = Fingers::new(&Rig::lab(), |pad| (pad == lab::LEFT).then_some(input));
         for engine in [Engine::DistanceField, Engine::LabIcp] {
             let error = estimate(&fingers, &tool, engine, false).unwrap_err();
             assert!(matches!(error, PoseError::Align(AlignError::TooFewPoints { got: 0, .. })), "{error}");
         }
         let small = DepthMap::filled(4, 4, 0.0);
-        let fingers = [None, Some(FingerInput { imprint: &small, camera: &camera, mask: None })];
+        let input = FingerInput { imprint: &small, camera: &camera, mask: None };
+        let fingers = Fingers::new(&Rig::lab(), |pad| (pad == lab::LEFT).then_some(input));
         let error = estimate(&fingers, &tool, Engine::default(), false).unwrap_err();
         assert!(error.to_string().starts_with("left finger: the reference depth is"), "{error}");
         assert!(ToolModel::new(TriMesh::default()).is_err());

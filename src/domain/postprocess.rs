@@ -8,10 +8,12 @@
 
 use serde::{Deserialize, Serialize};
 
+mod color;
 mod flags;
 mod ledger;
 mod refit;
 
+pub use color::{ColorChain, Picture};
 pub use flags::{Flag, FlagKind, Severity};
 pub use ledger::{
     Against, ChainReading, Histogram, Ledger, Orientation, Stage, StageRecord, Stats, correlation, ledger, readings,
@@ -166,6 +168,15 @@ pub enum PostprocessError {
         min_m: f64,
         /// Upper end, metres.
         max_m: f64,
+    },
+    /// A color picture was asked for its depth.
+    #[error("this model predicts a color picture: it has no depth, and so no contact, points or pose")]
+    NotDepth,
+    /// Not three channels of one size.
+    #[error("a color picture needs 3 channels of one size, the prediction has {count}; correct the model's manifest")]
+    NotColor {
+        /// Its channels.
+        count: usize,
     },
     /// A rotation other than by 0 or 180 degrees.
     #[error("a rotation by {0} degrees is not supported; only 0 and 180 are")]

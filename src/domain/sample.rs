@@ -1,20 +1,24 @@
-//! One loaded grasp: what both sensors felt, the rig it was felt with, and the truth where it is known.
+//! One loaded grasp: what the sensors of each pad felt, the rig it was felt with, and the truth where it is known.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use super::dataset::Problem;
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Mask, RgbGrid};
-use super::sensor::{Finger, Intrinsics};
+use super::rig::{Crop, PadId, PerPad, Rig, SensorId};
+use super::sensor::Intrinsics;
 use super::upright::Turn;
 
-/// One grasp, both fingers where the source has them.
-#[derive(Clone, Debug, Default)]
+/// One grasp, as far as the source has it.
+#[derive(Clone, Debug)]
 pub struct Sample {
-    /// Indexed by [`Finger::index`]; `None` where the source has no such finger.
-    pub fingers: [Option<FingerTouch>; 2],
+    /// The sensors that felt it.
+    pub rig: Arc<Rig>,
+    /// What each pad felt; none where the source has no such pad.
+    pub pads: PerPad<PadTouch>,
     /// The true in-hand pose, where known. Its inverse carries the lab's angle sign.
     pub grasp_from_object: Option<PlanarPose>,
     /// Whether lengths are measured, or assumed because the source lost its scale.
@@ -23,6 +27,20 @@ pub struct Sample {
     pub laid: Turn,
     /// What is odd about its files and numbers: whoever answers from this sample says so.
     pub notes: Vec<Problem>,
+}
+
+impl Default for Sample {
+    /// Nothing felt, with the lab's rig.
+    fn default() -> Self {
+        Self {
+            rig: Rig::lab(),
+            pads: PerPad::default(),
+            grasp_from_object: None,
+            scale: Scale::default(),
+            laid: Turn::default(),
+            notes: Vec::new(),
+        }
+    }
 }
 
 /// Where the metres of a sample come from.
@@ -47,41 +65,150 @@ impl Scale {
 
 /// What one finger felt, with each sensor.
 #[derive(Clone, Debug, Default)]
-pub struct FingerTouch {
-    /// The GelSlim's touch.
-    pub gelslim: Option<GelSlimTouch>,
-    /// The Soft Bubble's touch.
-    pub bubble: Option<BubbleTouch>,
-    /// The bubble camera of the same rig, where the bubble itself was not recorded: what a prediction is lifted with.
-    pub rig: Option<Arc<BubbleCamera>>,
+pub struct PadTouch {
+    /// In the order of the rig's sensors.
+    readings: Vec<(SensorId, Reading)>,
+    /// The depth camera of the same rig, where its own picture was not recorded: what a prediction is lifted with.
+    pub lent: Option<Arc<DepthCamera>>,
 }
 
-impl FingerTouch {
-    /// The camera that saw the imprint, or would have seen it.
-    pub fn camera(&self) -> Option<&BubbleCamera> {
-        self.bubble.as_ref().and_then(|b| b.camera.as_ref()).or(self.rig.as_deref())
+/// What one sensor felt.
+#[derive(Clone, Debug)]
+pub enum Reading {
+    /// A color sensor's touch.
+    Color(ColorTouch),
+    /// A depth sensor's touch.
+    Depth(DepthTouch),
+}
+
+impl From<ColorTouch> for Reading {
+    fn from(touch: ColorTouch) -> Self {
+        Self::Color(touch)
     }
 }
 
-/// A GelSlim touch: 427 x 320 px from the lab's files, any size from an image folder.
+impl From<DepthTouch> for Reading {
+    fn from(touch: DepthTouch) -> Self {
+        Self::Depth(touch)
+    }
+}
+
+impl Reading {
+    /// Its picture's columns and rows.
+    pub fn size(&self) -> [usize; 2] {
+        match self {
+            Self::Color(touch) => touch.difference.size(),
+            Self::Depth(touch) => touch.imprint.size(),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        let rgb = |g: &RgbGrid| g.len() * 12;
+        let depth = |g: &DepthMap| g.len() * 4;
+        match self {
+            Self::Color(g) => rgb(&g.difference) + g.images.as_ref().map_or(0, |i| rgb(&i.raw) + rgb(&i.reference)),
+            Self::Depth(b) => {
+                depth(&b.imprint)
+                    + b.camera.as_ref().map_or(0, |c| depth(&c.depth_reference))
+                    + b.truth.as_ref().map_or(0, |t| depth(&t.imprint) + t.contact.len())
+            }
+        }
+    }
+}
+
+impl PadTouch {
+    /// With one more reading, in place of an earlier one of the same sensor; as it is without one.
+    #[must_use]
+    pub fn with(mut self, sensor: SensorId, reading: Option<impl Into<Reading>>) -> Self {
+        if let Some(reading) = reading {
+            self.set(sensor, reading);
+        }
+        self
+    }
+
+    /// Adds a reading, in place of an earlier one of the same sensor.
+    pub fn set(&mut self, sensor: SensorId, reading: impl Into<Reading>) {
+        self.readings.retain(|(of, _)| *of != sensor);
+        let at = self.readings.partition_point(|(of, _)| *of < sensor);
+        self.readings.insert(at, (sensor, reading.into()));
+    }
+
+    /// What this sensor felt.
+    pub fn reading(&self, sensor: SensorId) -> Option<&Reading> {
+        self.readings.iter().find(|(of, _)| *of == sensor).map(|(_, reading)| reading)
+    }
+
+    /// All readings with their sensors.
+    pub fn readings(&self) -> &[(SensorId, Reading)] {
+        &self.readings
+    }
+
+    /// What the first color sensor with a reading felt.
+    pub fn color(&self) -> Option<&ColorTouch> {
+        self.readings.iter().find_map(|(_, reading)| match reading {
+            Reading::Color(touch) => Some(touch),
+            Reading::Depth(_) => None,
+        })
+    }
+
+    /// As [`PadTouch::color`], to be changed.
+    pub fn color_mut(&mut self) -> Option<&mut ColorTouch> {
+        self.readings.iter_mut().find_map(|(_, reading)| match reading {
+            Reading::Color(touch) => Some(touch),
+            Reading::Depth(_) => None,
+        })
+    }
+
+    /// What the first depth sensor with a reading felt.
+    pub fn depth(&self) -> Option<&DepthTouch> {
+        self.readings.iter().find_map(|(_, reading)| match reading {
+            Reading::Depth(touch) => Some(touch),
+            Reading::Color(_) => None,
+        })
+    }
+
+    /// As [`PadTouch::depth`], to be changed.
+    pub fn depth_mut(&mut self) -> Option<&mut DepthTouch> {
+        self.readings.iter_mut().find_map(|(_, reading)| match reading {
+            Reading::Depth(touch) => Some(touch),
+            Reading::Color(_) => None,
+        })
+    }
+
+    /// A sensor's reading as a model takes it: the color difference, or the imprint in each of three channels. Pixels of an
+    /// imprint that are no measurement count as not pushed in.
+    pub fn picture(&self, sensor: SensorId) -> Option<Cow<'_, RgbGrid>> {
+        Some(match self.reading(sensor)? {
+            Reading::Color(touch) => Cow::Borrowed(&touch.difference),
+            Reading::Depth(touch) => Cow::Owned(touch.imprint.map(|&d| [if d.is_finite() { d } else { 0.0 }; 3])),
+        })
+    }
+
+    /// The camera that saw the imprint, or would have seen it.
+    pub fn camera(&self) -> Option<&DepthCamera> {
+        self.depth().and_then(|b| b.camera.as_ref()).or(self.lent.as_deref())
+    }
+}
+
+/// A color sensor's touch: 427 x 320 px from the lab's GelSlim, any size from an image folder.
 #[derive(Clone, Debug)]
-pub struct GelSlimTouch {
+pub struct ColorTouch {
     /// Touched and untouched image on the 0..255 scale; `None` where the source only has the difference.
-    pub images: Option<GelSlimImages>,
+    pub images: Option<ColorImages>,
     /// Touched minus untouched, signed, 0..255 scale. What the models see.
     pub difference: RgbGrid,
 }
 
 /// The two camera images behind a difference.
 #[derive(Clone, Debug)]
-pub struct GelSlimImages {
+pub struct ColorImages {
     /// The image during the touch.
     pub raw: RgbGrid,
     /// The image without contact.
     pub reference: RgbGrid,
 }
 
-impl GelSlimTouch {
+impl ColorTouch {
     /// From the touched and the untouched image, which must have the same size.
     pub fn from_images(raw: RgbGrid, reference: RgbGrid) -> Option<Self> {
         if raw.size() != reference.size() {
@@ -91,35 +218,49 @@ impl GelSlimTouch {
             let (a, b) = (raw[(x, y)], reference[(x, y)]);
             [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
         });
-        Some(Self { images: Some(GelSlimImages { raw, reference }), difference })
+        Some(Self { images: Some(ColorImages { raw, reference }), difference })
     }
 }
 
-/// A Soft Bubble touch in the *raw* orientation of the lab's files (not rotated by 180 degrees).
+/// A depth sensor's touch, in the sensor's own *raw* orientation (the lab's Soft Bubble: not rotated by 180 degrees).
 #[derive(Clone, Debug)]
-pub struct BubbleTouch {
+pub struct DepthTouch {
     /// Reference depth minus current depth, metres, positive = pushed in. 175 x 140 px from the lab's files.
     pub imprint: DepthMap,
     /// What is needed to lift the imprint to points in the grasp frame; `None` for image folders.
-    pub camera: Option<BubbleCamera>,
+    pub camera: Option<DepthCamera>,
     /// The simulator's truth; `None` for measured data.
-    pub truth: Option<BubbleTruth>,
+    pub truth: Option<DepthTruth>,
 }
 
-/// A bubble's depth camera: untouched depth, intrinsics and its place in the rig.
+/// A depth camera: untouched depth, intrinsics and its place in the gripper.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BubbleCamera {
+pub struct DepthCamera {
     /// Depth without contact, metres, same size as the imprint.
     pub depth_reference: DepthMap,
     /// Intrinsics of the full image.
     pub intrinsics: Intrinsics,
+    /// Which part of the full image is stored.
+    pub crop: Crop,
     /// Camera frame to grasp frame.
     pub grasp_from_camera: DAffine3,
 }
 
+impl DepthCamera {
+    /// Lifts pixel `(u, v)` of the imprint at depth `z` (metres) to a point in the camera frame, metres.
+    pub fn lift(&self, u: f64, v: f64, z: f64) -> DVec3 {
+        self.crop.lift(&self.intrinsics, u, v, z)
+    }
+
+    /// Projects a point in the camera frame to a pixel of the imprint; `None` behind the camera.
+    pub fn project(&self, p_in_camera: DVec3) -> Option<(f64, f64)> {
+        self.crop.project(&self.intrinsics, p_in_camera)
+    }
+}
+
 /// What only a simulator knows.
 #[derive(Clone, Debug)]
-pub struct BubbleTruth {
+pub struct DepthTruth {
     /// The imprint before camera noise, metres.
     pub imprint: DepthMap,
     /// Pixels whose membrane point lies on the tool.
@@ -127,29 +268,13 @@ pub struct BubbleTruth {
 }
 
 impl Sample {
-    /// The finger's touch, if the source has it.
-    pub fn finger(&self, finger: Finger) -> Option<&FingerTouch> {
-        self.fingers[finger.index()].as_ref()
+    /// What a pad felt, if the source has it.
+    pub fn pad(&self, pad: PadId) -> Option<&PadTouch> {
+        self.pads.get(pad)
     }
 
     /// Bytes held by the images, for the cache's budget.
     pub fn bytes(&self) -> usize {
-        let rgb = |g: &RgbGrid| g.len() * 12;
-        let depth = |g: &DepthMap| g.len() * 4;
-        self.fingers
-            .iter()
-            .flatten()
-            .map(|touch| {
-                let gel = touch.gelslim.as_ref().map_or(0, |g| {
-                    rgb(&g.difference) + g.images.as_ref().map_or(0, |i| rgb(&i.raw) + rgb(&i.reference))
-                });
-                let bubble = touch.bubble.as_ref().map_or(0, |b| {
-                    depth(&b.imprint)
-                        + b.camera.as_ref().map_or(0, |c| depth(&c.depth_reference))
-                        + b.truth.as_ref().map_or(0, |t| depth(&t.imprint) + t.contact.len())
-                });
-                gel + bubble
-            })
-            .sum()
+        self.pads.iter().flatten().flat_map(PadTouch::readings).map(|(_, reading)| reading.bytes()).sum()
     }
 }

@@ -1,4 +1,4 @@
-//! Simulator of both sensors and their ground truth.
+//! Simulator of both sensors of the lab's rig and their ground truth.
 //!
 //! [`simulate`] presses a tool ([`tools()`], [`random_tool`]) between two Soft Bubbles and two GelSlims at a
 //! [`Grasp`] and returns what the lab's files hold, plus the truth. The same arguments give the same numbers on
@@ -38,8 +38,8 @@ pub use rig::{INTRINSICS, RANGE_M, gelslim_pixel, gelslim_yz, grasp_from_camera,
 pub use spoil::{Spoil, spoil_mask};
 pub use tools::{Bar, ToolSpec, random_tool, tools};
 
-use super::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, Sample};
-use super::sensor::Finger;
+use super::rig::{PadId, lab};
+use super::sample::{DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
 use noise::{Noise, Stream};
 
 /// Grid spacing of the membrane, metres.
@@ -57,23 +57,21 @@ pub fn simulate_apart(tool: &ToolSpec, gelslims: Grasp, bubbles: Grasp, seed: u6
     let (gelslims, bubbles) = (gelslims.object_from_grasp(), bubbles.object_from_grasp());
     // the tool and the rig mirror each other, so one membrane serves both fingers
     let membrane = Membrane::press(&config.bubble, tool, bubbles);
-    let fingers = Finger::BOTH.map(|finger| {
-        Some(FingerTouch {
-            gelslim: Some(gelslim::touch(&config.gelslim, tool, gelslims, finger, seed)),
-            bubble: Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed)),
-            rig: None,
-        })
+    let pads = lab::PADS.map(|finger| {
+        let felt = PadTouch::default()
+            .with(lab::GELSLIM_ID, Some(gelslim::touch(&config.gelslim, tool, gelslims, finger, seed)));
+        Some(felt.with(lab::BUBBLE_ID, Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed))))
     });
-    Sample { fingers, grasp_from_object: Some(bubbles.inverse()), ..Sample::default() }
+    Sample { pads: pads.into(), grasp_from_object: Some(bubbles.inverse()), ..Sample::default() }
 }
 
 fn bubble_touch(
     config: &BubbleConfig,
     tool: &ToolSpec,
     membrane: &Membrane<'_>,
-    finger: Finger,
+    finger: PadId,
     seed: u64,
-) -> BubbleTouch {
+) -> DepthTouch {
     let nominal = grasp_from_camera(finger, tool.half_thickness_m);
     let truly = nominal * calibration_error(config, finger, seed);
     let rays = depth_camera::Rays::new(finger, INTRINSICS, truly);
@@ -84,15 +82,20 @@ fn bubble_touch(
     for (imprint, depth) in truth.as_mut_slice().iter_mut().zip(depth.as_slice()) {
         *imprint -= depth;
     }
-    BubbleTouch {
+    DepthTouch {
         imprint,
-        camera: Some(BubbleCamera { depth_reference, intrinsics: INTRINSICS, grasp_from_camera: nominal }),
-        truth: Some(BubbleTruth { imprint: truth, contact }),
+        camera: Some(DepthCamera {
+            depth_reference,
+            intrinsics: INTRINSICS,
+            crop: lab::BUBBLE.crop,
+            grasp_from_camera: nominal,
+        }),
+        truth: Some(DepthTruth { imprint: truth, contact }),
     }
 }
 
 /// Where the camera really is, seen from where the sample says it is; nothing by default.
-fn calibration_error(config: &BubbleConfig, finger: Finger, seed: u64) -> DAffine3 {
+fn calibration_error(config: &BubbleConfig, finger: PadId, seed: u64) -> DAffine3 {
     if config.calibration_m == 0.0 && config.calibration_rad == 0.0 {
         return DAffine3::IDENTITY;
     }

@@ -169,7 +169,7 @@ fn blurred(image: &Grid<f64>) -> Grid<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::sensor::Finger;
+    use crate::domain::rig::lab;
     use crate::domain::sim::{self, SimConfig};
 
     #[test]
@@ -188,7 +188,7 @@ mod tests {
         let (mut right, mut wrong, mut silent) = (0, 0, 0);
         for (i, tool) in tools.iter().enumerate() {
             let touch = sim::simulate(tool, sim::random_grasp(i as u64), i as u64, &SimConfig::default());
-            let difference = &touch.finger(Finger::Right).unwrap().gelslim.as_ref().unwrap().difference;
+            let difference = &touch.pad(lab::RIGHT).unwrap().color().unwrap().difference;
             let square = resample::bilinear_rgb(difference, SIDE, SIDE);
             for turn in Turn::all() {
                 match seen(&turn.apply(&square)) {

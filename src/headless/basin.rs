@@ -18,8 +18,7 @@ use crate::domain::align::basin::{Basin, BasinConfig, Plane};
 use crate::domain::findings::Finding;
 use crate::domain::frames::PlanarPose;
 use crate::domain::inspect::basin_map;
-use crate::domain::pose::{Engine, FingerInput, contact_cloud, register};
-use crate::domain::sensor::Finger;
+use crate::domain::pose::{Engine, FingerInput, Fingers, contact_cloud, register};
 use crate::domain::units::{angle_error, fixed, mm, wrap_angle};
 use crate::work::job::JobCx;
 
@@ -108,20 +107,20 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let name = entry.tool.as_deref();
     let name = name.ok_or_else(|| anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name))?;
     let tool = pose::tool_model(&dataset, name)?;
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let predicted = args.imprint == Imprint::Predicted;
     let imprints = if predicted {
         predictor.imprints(&sample, &JobCx::unwatched())?
     } else {
-        Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
+        pose::measured(&sample)
     };
     let mut notes = Notes::default();
     notes.take(&output, &sample.notes);
     let FingerMasks { masks, made_of, notes: mask_notes } =
         pose::masks(&args.mask, &sample, &tool, &imprints, predicted, &mut predictor)?;
-    let fingers = Finger::BOTH.map(|f| {
-        let camera = sample.finger(f)?.camera()?;
-        Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
+    let fingers = Fingers::new(&sample.rig, |f| {
+        let camera = sample.pad(f)?.camera()?;
+        Some(FingerInput { imprint: imprints[f].as_ref()?, camera, mask: masks[f].as_ref() })
     });
     let cloud = contact_cloud(&fingers)?;
     // What keeps every start from an answer keeps the registration itself from one, and is said once.

@@ -7,8 +7,8 @@ use crate::domain::contact::{ContactMask, LAB_CAD_DISTANCE_M};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::pose::ToolModel;
-use crate::domain::sample::FingerTouch;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, PerPad, Rig};
+use crate::domain::sample::PadTouch;
 use crate::work::mask;
 use crate::work::mask::MaskRecipe;
 
@@ -62,7 +62,7 @@ pub(super) fn contact_mask(
     source: MaskFrom,
     args: &MaskArgs,
     imprint: &DepthMap,
-    touch: &FingerTouch,
+    touch: &PadTouch,
     tool: Option<&ToolModel>,
     truth: Option<PlanarPose>,
     predictor: &mut Predictor,
@@ -78,8 +78,8 @@ pub(super) fn contact_mask(
 
 /// The masks of both fingers, with what is to be said about them.
 pub(super) struct FingerMasks {
-    /// By [`Finger::index`].
-    pub masks: [Option<Mask>; 2],
+    /// Per finger.
+    pub masks: PerPad<Mask>,
     /// What they are made of: the key of the source, `depth` where the model found nothing, `flat` where there is no
     /// contact; of both fingers (right, left) where they differ.
     pub made_of: String,
@@ -89,12 +89,12 @@ pub(super) struct FingerMasks {
 
 impl FingerMasks {
     /// From the masks that `source` gave.
-    pub(super) fn new(source: MaskFrom, found: [Option<ContactMask>; 2]) -> Self {
+    pub(super) fn new(source: MaskFrom, rig: &Rig, found: PerPad<ContactMask>) -> Self {
         let mut keys: Vec<&'static str> = found.iter().flatten().map(|m| m.basis.key(source.key())).collect();
         keys.dedup();
         let made_of = if keys.is_empty() { source.key().to_owned() } else { keys.join(", ") };
-        let note = |f: Finger| Some(format!("{} finger: {}", f.name(), found[f.index()].as_ref()?.basis.note()?));
-        let notes = Finger::BOTH.into_iter().filter_map(note).collect();
+        let note = |(f, found): (PadId, &ContactMask)| Some(format!("{} finger: {}", rig.pad_key(f), found.basis.note()?));
+        let notes = found.entries().filter_map(note).collect();
         Self { masks: found.map(|m| m.map(|m| m.mask)), made_of, notes }
     }
 }

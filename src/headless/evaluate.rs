@@ -1,5 +1,7 @@
 //! `touch2touch evaluate`: the paper's results table of a dataset.
 
+use crate::infer::bundle::{Bundle, Found, default_roots, find};
+use crate::io::dataset::Dataset;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -14,7 +16,6 @@ use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Row, paper_rows};
 use crate::domain::pose::Engine;
-use crate::infer::bundle::{Bundle, Found, default_roots, find};
 use crate::io::atomic;
 use crate::work::evaluate::{Evaluation, MaskBy, Report, Setup, evaluate, rows};
 use crate::work::job::{Cancel, JobCx};
@@ -104,7 +105,7 @@ fn engine() -> impl TypedValueParser<Value = Engine> {
 
 pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
-    let setup = setup(args)?;
+    let setup = setup(args, &dataset)?;
     let output = Arc::new(Output::new(args.common, "evaluating", 0));
     let bar = output.clone();
     let watch = move |p: crate::work::job::Progress| {
@@ -158,19 +159,24 @@ fn text(evaluation: &Evaluation, rows: &[Row]) -> String {
 }
 
 /// The bundles that the arguments name, and for the rest those that are found.
-fn setup(args: &EvaluateArgs) -> anyhow::Result<Setup> {
+fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     let Found { bundles, problems } = find(&default_roots());
     let first = |named: &Option<PathBuf>, fits: fn(&Bundle) -> bool| {
         named.clone().or_else(|| bundles.iter().find(|b| fits(b)).map(|b| b.dir().to_owned()))
     };
     let generators: Vec<PathBuf> = if args.bundles.is_empty() {
-        bundles.iter().filter(|b| b.generator().is_some()).map(|b| b.dir().to_owned()).collect()
+        let fits = |b: &&Bundle| b.ends(&dataset.rig).is_some_and(|ends| ends.is_ok());
+        bundles.iter().filter(fits).map(|b| b.dir().to_owned()).collect()
     } else {
         args.bundles.clone()
     };
     if generators.is_empty() {
         let refused: Vec<String> = problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
-        anyhow::bail!("no generator bundle was found; name one with --bundle{}", refused.concat());
+        anyhow::bail!(
+            "no generator bundle for {} was found; name one with --bundle{}",
+            dataset.rig.name,
+            refused.concat()
+        );
     }
     Ok(Setup {
         bundles: generators,

@@ -1,8 +1,10 @@
 //! `touch2touch generate`: predicted imprints of a whole dataset, beside the measured ones.
 
+use std::convert::Infallible;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde::Serialize;
 
 use super::args::{DatasetArgs, LimitArgs};
@@ -15,15 +17,15 @@ use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
 use crate::domain::findings::Finding;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use crate::domain::rig::{PadId, Rig, Text};
 use crate::domain::sample::{Sample, Scale};
-use crate::domain::sensor::Finger;
 use crate::domain::{metrics, resample};
 use crate::io::dataset::{Dataset, assumed_metres};
 use crate::io::images;
 use crate::io::names::with_ending;
 use crate::work::compare::{self, Comparison};
-use crate::work::imprint::imprint_of;
+use crate::work::imprint::{self, imprint_of};
 use crate::work::job::JobCx;
 
 /// Arguments of `generate`.
@@ -34,8 +36,8 @@ pub(super) struct GenerateArgs {
     /// The folder for the predictions; created if missing.
     #[arg(long)]
     out: PathBuf,
-    /// Which finger's GelSlim image.
-    #[arg(long, value_enum, default_value_t = FingerArg::Right)]
+    /// Which finger's GelSlim image: right, left (or as the data set names it), both.
+    #[arg(long, default_value = "right")]
     finger: FingerArg,
     #[command(flatten)]
     limit: LimitArgs,
@@ -47,30 +49,50 @@ pub(super) struct GenerateArgs {
     common: Common,
 }
 
-/// Which finger's image.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum FingerArg {
-    Right,
-    Left,
-    Both,
+/// Which finger's image: the name of one, or `both`, which means all.
+#[derive(Debug, Clone)]
+pub(super) struct FingerArg(String);
+
+impl FromStr for FingerArg {
+    type Err = Infallible;
+
+    fn from_str(name: &str) -> Result<Self, Infallible> {
+        Ok(Self(name.to_lowercase()))
+    }
 }
 
 impl FingerArg {
-    /// The fingers it stands for.
-    pub(super) fn fingers(self) -> &'static [Finger] {
-        match self {
-            FingerArg::Right => &[Finger::Right],
-            FingerArg::Left => &[Finger::Left],
-            FingerArg::Both => &Finger::BOTH,
+    /// The fingers it stands for. A rig with a single one has no other, however it is called.
+    pub(super) fn fingers(&self, rig: &Rig) -> anyhow::Result<Vec<PadId>> {
+        let all = rig.pad_list();
+        if self.0 == "both" || all.len() == 1 {
+            return Ok(all);
         }
+        let finger = rig.pad_of_key(&self.0).ok_or_else(|| {
+            let names: Vec<_> = all.iter().map(|pad| rig.pad_key(*pad)).collect();
+            anyhow::anyhow!("there is no finger \"{}\"; name one of {} or both", self.0, names.join(", "))
+        })?;
+        Ok(vec![finger])
     }
 }
+
+/// What a prediction is measured in.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Unit {
+    Metres,
+    /// Of 0..255: a color picture.
+    Levels,
+}
+
+/// What PSNR and SSIM of a color picture mean.
+const COLOR_CONVENTION: &str = "difference image of the color sensor on the 0..255 scale, peak and range 255; the split \
+    by footprint, contact and pose need depth and are left out";
 
 /// Figures of one prediction. PSNR and SSIM are those of `convention`.
 #[derive(Debug, Default, Clone, Serialize)]
 struct Pair {
     name: String,
-    finger: &'static str,
+    finger: Text,
     psnr_db: Option<f64>,
     ssim: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -165,9 +187,9 @@ fn convention(scale: Scale) -> &'static str {
 pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let ids = args.limit.spread(dataset.index.pairs.len());
-    let fingers = args.finger.fingers();
+    let fingers = args.finger.fingers(&dataset.rig)?;
     let output = Output::new(args.common, "generating", ids.len());
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let config = predictor.config()?;
     let stems = output_stems(&args.out, &dataset, &ids)?;
     let begun = RunReport::begin(&args.out, "generate.json", ids.len())?;
@@ -175,6 +197,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let mut notes = Notes::default();
     let mut complete = !ids.is_empty();
     let mut scale = Scale::Measured;
+    let mut unit = Unit::Metres;
     for (id, stem) in ids.into_iter().zip(stems) {
         let id = PairId(id as u32);
         let name = dataset.index.pairs[id.0 as usize].name.clone();
@@ -183,25 +206,38 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             scale = sample.scale;
             notes.take(&output, &sample.notes);
             // An image folder has one finger, whichever it was.
-            let present: Vec<Finger> = fingers.iter().copied().filter(|f| sample.finger(*f).is_some()).collect();
-            let fingers = if present.is_empty() { Finger::BOTH.to_vec() } else { present };
+            let present: Vec<PadId> = fingers.iter().copied().filter(|f| sample.pad(*f).is_some()).collect();
+            let fingers = if present.is_empty() { sample.rig.pad_list() } else { present };
             let mut made = Vec::new();
             let mut touches = Vec::new();
             for finger in fingers {
-                let Some(touch) = sample.finger(finger) else { continue };
-                let Some(gelslim) = &touch.gelslim else { anyhow::bail!("no GelSlim image") };
-                touches.push((finger, touch, &gelslim.difference));
+                let Some(touch) = sample.pad(finger) else { continue };
+                let Some(picture) = predictor.condition(touch)? else { return Err(predictor.no_condition()) };
+                touches.push((finger, touch, picture));
             }
-            let differences: Vec<_> = touches.iter().map(|(_, _, difference)| *difference).collect();
-            let predictions = predictor.predict(&differences, &JobCx::unwatched())?;
-            for ((finger, touch, _), predicted) in touches.into_iter().zip(predictions) {
-                let imprint = imprint_of(&predicted, predictor.shift(), &sample, finger)?;
-                let stem = with_finger(&stem, finger);
-                write(&stem, &imprint)?;
+            let pictures: Vec<_> = touches.iter().map(|(_, _, picture)| &**picture).collect();
+            let predictions = predictor.predict(&pictures, &JobCx::unwatched())?;
+            for ((finger, touch, _), predicted) in touches.iter().zip(predictions) {
+                let finger = *finger;
+                let key = sample.rig.pad_key(finger);
+                let stem = with_ending(&stem, &format!("_{key}"));
                 let (seconds, kept) = (predicted.seconds, predicted.kept);
-                let ambiguity = touch.gelslim.as_ref().and_then(|g| ambiguity(&g.difference));
-                let mut pair =
-                    Pair { name: name.clone(), finger: finger.name(), ambiguity, seconds, kept, ..Pair::default() };
+                let ambiguity = touch.color().and_then(|g| ambiguity(&g.difference));
+                let mut pair = Pair { name: name.clone(), finger: key, ambiguity, seconds, kept, ..Pair::default() };
+                if let Some(difference) = imprint::color(&predicted, [0, 0])? {
+                    unit = Unit::Levels;
+                    write_color(&stem, &difference)?;
+                    if let Some(measured) = touch.color() {
+                        let [w, h] = measured.difference.size();
+                        let sized = resample::bilinear_rgb(&difference, w, h);
+                        let (psnr, ssim) = metrics::color(&sized, &measured.difference)?;
+                        (pair.psnr_db, pair.ssim) = (psnr.db(), Some(ssim));
+                    }
+                    made.push(pair);
+                    continue;
+                }
+                let imprint = imprint_of(&predicted, predictor.shift(), &sample, finger)?;
+                write(&stem, &imprint)?;
                 score(&dataset, id, (finger, &sample), &imprint, &mut pair)?;
                 if args.ensemble.seeds > 1 {
                     let found = seeds::predict(&mut predictor, &sample, finger, args.ensemble.seeds)?;
@@ -224,7 +260,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     }
     let report = Report {
         mean: mean(&pairs),
-        convention: convention(scale),
+        convention: if unit == Unit::Levels { COLOR_CONVENTION } else { convention(scale) },
         bundle: predictor.bundle()?.name.clone(),
         runtime: predictor.engine_label()?,
         sampler: config.sampler.key(),
@@ -243,26 +279,26 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
 fn score(
     dataset: &Dataset,
     id: PairId,
-    (finger, sample): (Finger, &Sample),
+    (finger, sample): (PadId, &Sample),
     imprint: &DepthMap,
     pair: &mut Pair,
 ) -> anyhow::Result<()> {
     let scale = sample.scale;
     match scale {
         Scale::Measured => {
-            if let Some(bubble) = sample.finger(finger).and_then(|t| t.bubble.as_ref()) {
-                let seen = metrics::footprint_mask(finger, bubble.imprint.size());
-                take(pair, &compared(imprint, &bubble.imprint, scale, &seen)?);
+            if let Some(bubble) = sample.pad(finger).and_then(|t| t.depth()) {
+                let seen = sample.rig.seen_mask(finger, bubble.imprint.size());
+                take(pair, &compared(imprint, &bubble.imprint, scale, seen.as_ref())?);
             }
         }
         Scale::Assumed => {
             // Compared on the tile's own pixels and in its orientation, so that the lab's prediction is not resampled.
             if let Some(tile) = dataset.bubble_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
-                let ours = resample::bilinear(&imprint.rotated_180(), tile.width(), tile.height());
-                let seen = metrics::footprint_mask(finger, tile.size()).rotated_180();
-                take(pair, &compared(&ours, &tile, scale, &seen)?);
+                let ours = resample::bilinear(&turned(imprint, &sample.rig), tile.width(), tile.height());
+                let seen = sample.rig.seen_mask(finger, tile.size()).map(|seen| turned(&seen, &sample.rig));
+                take(pair, &compared(&ours, &tile, scale, seen.as_ref())?);
                 if let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
-                    let theirs = compared(&vqvae, &tile, scale, &seen)?;
+                    let theirs = compared(&vqvae, &tile, scale, seen.as_ref())?;
                     (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
                 }
             }
@@ -272,7 +308,12 @@ fn score(
 }
 
 /// The figures as the studio computes them.
-fn compared(predicted: &DepthMap, measured: &DepthMap, scale: Scale, seen: &Mask) -> anyhow::Result<Comparison> {
+fn compared(
+    predicted: &DepthMap,
+    measured: &DepthMap,
+    scale: Scale,
+    seen: Option<&Mask>,
+) -> anyhow::Result<Comparison> {
     compare::compare_parts(predicted, measured, scale, seen).map_err(|err| anyhow::anyhow!("{err}"))
 }
 
@@ -282,8 +323,9 @@ fn take(pair: &mut Pair, found: &Comparison) {
     pair.invented = found.split.map(|s| s.invented);
 }
 
-fn with_finger(stem: &Path, finger: Finger) -> PathBuf {
-    with_ending(stem, &format!("_{}", finger.name()))
+/// As a picture shows it: turned as the depth sensor lies to the rig's first one.
+fn turned<T: Copy>(image: &Grid<T>, rig: &Rig) -> Grid<T> {
+    if rig.depth().is_some_and(|sensor| sensor.rotation_deg == 180) { image.rotated_180() } else { image.clone() }
 }
 
 /// Writes `STEM.npy` (metres, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
@@ -292,6 +334,15 @@ fn write(stem: &Path, imprint: &DepthMap) -> anyhow::Result<()> {
     crate::io::npz::write_npy(&with_ending(stem, ".npy"), imprint)?;
     let picture = imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
     images::write_grey16(&with_ending(stem, ".png"), &picture)?;
+    Ok(())
+}
+
+/// Writes `STEM.png`: the difference of a color sensor's images around the middle grey, in its raw orientation;
+/// and `STEM.npy` with the numbers (f32, 3 x height x width).
+fn write_color(stem: &Path, difference: &RgbGrid) -> anyhow::Result<()> {
+    crate::io::npz::write_npy_planes(&with_ending(stem, ".npy"), difference)?;
+    let picture = difference.map(|pixel| pixel.map(|v| v + 128.0));
+    images::write_rgb8(&with_ending(stem, ".png"), &picture)?;
     Ok(())
 }
 

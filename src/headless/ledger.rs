@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::args::DatasetArgs;
 use super::notes::Notes;
+use super::generate::FingerArg;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, ambiguity};
@@ -15,7 +16,7 @@ use crate::domain::findings::Finding;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::metrics::Line;
 use crate::domain::postprocess::{ChainReading, Flag, Histogram, Ledger, Orientation, Stats};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, Text};
 use crate::domain::units::{fixed, mm};
 use crate::io::images;
 use crate::work::ledger::{LedgerResult, of_prediction};
@@ -29,8 +30,8 @@ pub(super) struct LedgerArgs {
     #[arg(long)]
     pair: String,
     /// Which finger (an image folder has only one).
-    #[arg(long, value_enum, default_value_t = OneFinger::Right)]
-    finger: OneFinger,
+    #[arg(long, default_value = "right")]
+    finger: FingerArg,
     /// Read the decoder's range as it is meant instead of twice; leaves no shift to be done.
     #[arg(long, value_enum, conflicts_with = "shift")]
     mapping: Option<MappingArg>,
@@ -42,12 +43,6 @@ pub(super) struct LedgerArgs {
     model: ModelArgs,
     #[command(flatten)]
     common: Common,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum OneFinger {
-    Right,
-    Left,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -95,7 +90,7 @@ struct JointReport {
 #[derive(Debug, Serialize)]
 struct Report {
     pair: String,
-    finger: &'static str,
+    finger: Text,
     bundle: String,
     bundle_hash: String,
     shift: &'static str,
@@ -117,24 +112,26 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let id = super::find_pair(&dataset, &args.pair)?;
     let name = dataset.index.pairs[id.0 as usize].name.clone();
     let sample = dataset.load(id)?;
-    let asked = match args.finger {
-        OneFinger::Right => Finger::Right,
-        OneFinger::Left => Finger::Left,
-    };
     // An image folder has one finger, whichever it was.
-    let there: Vec<Finger> = Finger::BOTH.into_iter().filter(|f| sample.finger(*f).is_some()).collect();
-    let finger = if let [only] = there[..] { only } else { asked };
-    let touch = sample.finger(finger).ok_or_else(|| anyhow::anyhow!("{name}: there is no {} finger", finger.name()))?;
-    let gelslim = touch.gelslim.as_ref().ok_or_else(|| anyhow::anyhow!("{name}: no GelSlim image"))?;
-    let truth = touch.bubble.as_ref().map(|b| &b.imprint);
+    let there: Vec<PadId> = sample.pads.entries().map(|(finger, _)| finger).collect();
+    let asked = args.finger.fingers(&sample.rig)?;
+    let finger = match (&there[..], &asked[..]) {
+        ([only], _) | (_, [only]) => *only,
+        _ => anyhow::bail!("--finger both: the depth chain is that of one finger; name it"),
+    };
+    let key = sample.rig.pad_key(finger);
+    let touch = sample.pad(finger).ok_or_else(|| anyhow::anyhow!("{name}: there is no {key} finger"))?;
+    let truth = touch.depth().map(|b| &b.imprint);
 
     let output = Output::new(args.common, "generating", 1);
     let mut notes = Notes::default();
     notes.take(&output, &sample.notes);
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let config = predictor.config()?;
     let shift = predictor.shift();
-    let made = predictor.predict_one(&gelslim.difference)?;
+    let picture = predictor.condition(touch)?;
+    let picture = picture.ok_or_else(|| predictor.no_condition().context(name.clone()))?;
+    let made = predictor.predict_one(&picture)?;
     let correct = matches!(args.mapping, Some(MappingArg::Correct));
     let shift_name = if correct { "Correct mapping" } else { shift.label() };
     let LedgerResult { ledger: found, readings } = of_prediction(&made, shift, correct, truth)?;
@@ -145,7 +142,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     }
     let report = Report {
         pair: name,
-        finger: finger.name(),
+        finger: key,
         bundle: predictor.bundle()?.name.clone(),
         bundle_hash: made.bundle.to_string(),
         shift: shift_name,
@@ -164,7 +161,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
         }),
         stages: found.stages.iter().map(stage).collect(),
         readings,
-        ambiguity: ambiguity(&gelslim.difference),
+        ambiguity: touch.color().and_then(|color| ambiguity(&color.difference)),
         flags: found.flags,
         notes: notes.into_list(&output),
     };

@@ -14,8 +14,8 @@ use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::PairId;
 use crate::domain::pose::ToolModel;
+use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::io::export_unet::{ExportConfig, PARTS};
 use crate::work::error::TaskError;
 use crate::work::export::{Automatic, ExportSetup, HandMasks, export_masks};
@@ -93,11 +93,11 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let output = Arc::new(Output::new(args.common, "exporting", ids.len()));
     let setup = ExportSetup {
         pairs: Some(ids.into_iter().map(|id| PairId(id as u32)).collect()),
-        split: ExportConfig { seed: args.split_seed, ..ExportConfig::default() },
+        split: ExportConfig { seed: args.split_seed, rig: dataset.rig.clone(), ..ExportConfig::default() },
     };
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
-    let mut automatic = |sample: &Sample, finger: Finger, tool: Option<&str>| {
+    let mut automatic = |sample: &Sample, finger: PadId, tool: Option<&str>| {
         const WHAT: &str = "Contact mask";
         let tool = tool.and_then(|name| {
             let model = tools.entry(name.to_owned()).or_insert_with(|| super::pose::tool_model(&dataset, name).ok());
@@ -107,13 +107,13 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
             MaskFrom::Auto if sample.grasp_from_object.is_some() && tool.is_some() => MaskFrom::Cad,
             other => other,
         };
-        let touch = sample.finger(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;
-        let bubble = touch.bubble.as_ref().ok_or_else(|| TaskError::new(WHAT, "it has no such imprint"))?;
+        let touch = sample.pad(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;
+        let bubble = touch.depth().ok_or_else(|| TaskError::new(WHAT, "it has no such imprint"))?;
         let truth = sample.grasp_from_object;
         let found = contact_mask(source, &args.mask, &bubble.imprint, touch, tool, truth, &mut predictor)
             .map_err(|err| TaskError::new(WHAT, says(&err)))?;
         if let Some(note) = found.basis.note() {
-            output.note(&format!("note: {} finger: {note}", finger.name()));
+            output.note(&format!("note: {} finger: {note}", sample.rig.pad_key(finger)));
         }
         Ok(found.mask)
     };

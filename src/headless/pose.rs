@@ -25,9 +25,9 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::grid::DepthMap;
 use crate::domain::hand::{AcceptedPose, HandPose};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::{self, Engine, FingerInput, ToolModel};
+use crate::domain::pose::{self, Engine, FingerInput, Fingers, ToolModel};
+use crate::domain::rig::PerPad;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
 use crate::io::dataset::Dataset;
 use crate::io::masks::MaskStore;
@@ -157,7 +157,7 @@ struct Case {
     report: Option<AlignReport>,
     /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
     #[serde(skip_serializing_if = "Option::is_none")]
-    ambiguity: Option<[Option<Ambiguity>; 2]>,
+    ambiguity: Option<PerPad<Ambiguity>>,
     /// With `--seeds`, for predicted imprints.
     #[serde(skip_serializing_if = "Option::is_none")]
     fan: Option<PoseFan>,
@@ -228,7 +228,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         None => vec![None; ids.len()],
     };
     let output = Output::new(args.common, "aligning", ids.len());
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
     let mut notes = Notes::default();
     let mut cases = Vec::new();
@@ -328,19 +328,22 @@ fn pose_cases(
     predictor: &mut Predictor,
 ) -> anyhow::Result<Vec<Case>> {
     let predicted = imprint == "predicted";
-    let imprints: [Option<DepthMap>; 2] = if predicted {
+    let imprints: PerPad<DepthMap> = if predicted {
         predictor.imprints(sample, &JobCx::unwatched())?
     } else {
-        Finger::BOTH.map(|f| Some(sample.finger(f)?.bubble.as_ref()?.imprint.clone()))
+        measured(sample)
     };
     let FingerMasks { masks, made_of, notes } = masks(&args.mask, sample, tool, &imprints, predicted, predictor)?;
-    let fingers = Finger::BOTH.map(|f| {
-        let camera = sample.finger(f)?.camera()?;
-        Some(FingerInput { imprint: imprints[f.index()].as_ref()?, camera, mask: masks[f.index()].as_ref() })
+    let fingers = Fingers::new(&sample.rig, |f| {
+        let camera = sample.pad(f)?.camera()?;
+        Some(FingerInput { imprint: imprints[f].as_ref()?, camera, mask: masks[f].as_ref() })
     });
     let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
     // What was measured is as it is; what was predicted may have had nothing to go by.
-    let left_open = predicted.then(|| Finger::BOTH.map(|f| ambiguity(&sample.finger(f)?.gelslim.as_ref()?.difference)));
+    let left_open = predicted.then(|| {
+        let left_open = |f| ambiguity(&sample.pad(f)?.color()?.difference);
+        sample.rig.pads().map(left_open).collect()
+    });
     let several = predicted && args.ensemble.seeds > 1;
     engines
         .iter()
@@ -375,11 +378,16 @@ fn pose_cases(
                 },
                 accepted: accepted.map(|a| Accepted::new(a, truth)),
                 report: result.ok().map(|r| r.report).filter(|_| args.trace),
-                ambiguity: left_open,
+                ambiguity: left_open.clone(),
                 fan,
             })
         })
         .collect()
+}
+
+/// The measured imprints.
+pub(super) fn measured(sample: &Sample) -> PerPad<DepthMap> {
+    sample.rig.pads().map(|f| Some(sample.pad(f)?.depth()?.imprint.clone())).collect()
 }
 
 /// The contact masks and what they are made of.
@@ -387,7 +395,7 @@ pub(super) fn masks(
     args: &MaskArgs,
     sample: &Sample,
     tool: &ToolModel,
-    imprints: &[Option<DepthMap>; 2],
+    imprints: &PerPad<DepthMap>,
     predicted: bool,
     predictor: &mut Predictor,
 ) -> anyhow::Result<FingerMasks> {
@@ -397,13 +405,13 @@ pub(super) fn masks(
         MaskFrom::Auto => MaskFrom::Unet,
         other => other,
     };
-    let mut masks = [None, None];
-    for finger in Finger::BOTH {
-        let (Some(imprint), Some(touch)) = (&imprints[finger.index()], sample.finger(finger)) else { continue };
+    let mut masks = PerPad::default();
+    for finger in sample.rig.pads() {
+        let (Some(imprint), Some(touch)) = (&imprints[finger], sample.pad(finger)) else { continue };
         let truth = sample.grasp_from_object;
-        masks[finger.index()] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
+        masks[finger] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
     }
-    Ok(FingerMasks::new(source, masks))
+    Ok(FingerMasks::new(source, &sample.rig, masks))
 }
 
 fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> Figures {

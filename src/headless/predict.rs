@@ -1,6 +1,8 @@
 //! The options and models that `generate` and `pose` share. Models are loaded when first needed.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
@@ -10,9 +12,10 @@ use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{DepthChain, RefitShift, ShiftMode};
-use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
+use crate::domain::sample::{PadTouch, Sample};
 use crate::infer::engine::{EngineChoice, resolve};
+use crate::domain::rig::{PadId, PerPad, Rig, SensorId};
+use crate::infer::bundle::Ends;
 use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
 use crate::work::error::TaskError;
@@ -152,11 +155,15 @@ pub(super) struct Predictor {
     generator: Option<BundleInfo>,
     mask_model: Option<BundleInfo>,
     refit: Option<RefitShift>,
+    /// The sensors of the data.
+    rig: Arc<Rig>,
+    /// Where the generator starts and ends in them.
+    ends: Option<Ends>,
 }
 
 impl Predictor {
-    /// Nothing is looked for yet.
-    pub(super) fn new(args: &ModelArgs) -> Self {
+    /// For data of these sensors. Nothing is looked for yet.
+    pub(super) fn new(args: &ModelArgs, rig: &Arc<Rig>) -> Self {
         let store = if args.no_cache { None } else { super::cache::store() };
         Self {
             args: args.clone(),
@@ -165,21 +172,41 @@ impl Predictor {
             generator: None,
             mask_model: None,
             refit: None,
+            rig: rig.clone(),
+            ends: None,
         }
     }
 
     fn take(&mut self, kind: BundleKind, named: Option<PathBuf>) -> Result<BundleInfo, TaskError> {
-        self.found.get_or_insert_with(|| bundles::find(&[])).take(kind, named.as_deref())
+        self.found.get_or_insert_with(|| bundles::find(&[])).take(kind, named.as_deref(), &self.rig)
     }
 
     /// The generator's bundle, looked for at the first call.
     pub(super) fn bundle(&mut self) -> anyhow::Result<&BundleInfo> {
         if self.generator.is_none() {
             let bundle = self.take(BundleKind::Generator, self.args.bundle.clone())?;
+            self.ends = bundle.ends(&self.rig).transpose()?;
             self.refit = self.read_refit(&bundle)?;
             self.generator = Some(bundle);
         }
         Ok(self.generator.as_ref().expect("it was just found"))
+    }
+
+    /// The picture of a touch that the generator starts from; `None` where the touch has no such reading.
+    pub(super) fn condition<'a>(&mut self, touch: &'a PadTouch) -> anyhow::Result<Option<Cow<'a, RgbGrid>>> {
+        self.bundle()?;
+        Ok(self.ends.and_then(|ends| touch.picture(ends.input)))
+    }
+
+    /// The sensor that the generator starts from; call it after [`Self::bundle`].
+    pub(super) fn input(&self) -> Option<SensorId> {
+        self.ends.map(|ends| ends.input)
+    }
+
+    /// What to say where no touch has it.
+    pub(super) fn no_condition(&self) -> anyhow::Error {
+        let sensor = self.ends.and_then(|ends| self.rig.sensor(ends.input));
+        anyhow::anyhow!("no {} image", sensor.map_or("GelSlim", |sensor| &sensor.name))
     }
 
     /// The statistics for the refit shift, which must be of this bundle.
@@ -210,7 +237,7 @@ impl Predictor {
     pub(super) fn config(&mut self) -> anyhow::Result<GenerateConfig> {
         let args = self.args.clone();
         let bundle = self.bundle()?;
-        let Some(info) = bundle.generator else { anyhow::bail!("the bundle {} is no generator", bundle.name) };
+        let Some(info) = &bundle.generator else { anyhow::bail!("the bundle {} is no generator", bundle.name) };
         let preset = args.preset.config(info.defaults, info.training_steps);
         let spacing = args.spacing.map(|spacing| match spacing {
             SpacingArg::Trailing => Spacing::Trailing,
@@ -229,7 +256,7 @@ impl Predictor {
         Ok(config)
     }
 
-    /// Predictions of GelSlim difference images, all in one batch, in their order. What was made before is not made
+    /// Predictions of the pictures that the generator starts from, all in one batch, in their order. What was made before is not made
     /// again.
     pub(super) fn predict(&mut self, differences: &[&RgbGrid], cx: &JobCx) -> anyhow::Result<Vec<Prediction>> {
         let config = self.config()?;
@@ -250,7 +277,7 @@ impl Predictor {
         Ok(self.models.predict(&bundle, self.engine(), &config, wanted, cx)?)
     }
 
-    /// The prediction of one GelSlim difference image, as [`Self::predict`].
+    /// The prediction of one picture, as [`Self::predict`].
     pub(super) fn predict_one(&mut self, difference: &RgbGrid) -> anyhow::Result<Prediction> {
         let made = self.predict(&[difference], &JobCx::unwatched())?.pop();
         made.ok_or_else(|| anyhow::anyhow!("the generator gave no prediction"))
@@ -283,16 +310,24 @@ impl Predictor {
         Ok(chain_of(&chains, &bundle.id, mode)?)
     }
 
-    /// Predicted imprints (metres, raw orientation) of the fingers that have a GelSlim image, as large as the bubble
-    /// images.
-    pub(super) fn imprints(&mut self, sample: &Sample, cx: &JobCx) -> anyhow::Result<[Option<DepthMap>; 2]> {
-        let gelslim = |finger| sample.finger(finger).and_then(|t| t.gelslim.as_ref());
-        let fingers: Vec<Finger> = Finger::BOTH.into_iter().filter(|finger| gelslim(*finger).is_some()).collect();
-        let differences: Vec<&RgbGrid> = fingers.iter().filter_map(|f| Some(&gelslim(*f)?.difference)).collect();
-        let made = self.predict(&differences, cx)?;
-        let mut out = [None, None];
-        for (finger, made) in fingers.into_iter().zip(made) {
-            out[finger.index()] = Some(imprint_of(&made, self.shift(), sample, finger)?);
+    /// The touches of a sample that the generator can start from, with the picture that it takes.
+    pub(super) fn conditions<'a>(&mut self, sample: &'a Sample) -> anyhow::Result<Vec<(PadId, Cow<'a, RgbGrid>)>> {
+        let mut found = Vec::new();
+        for (pad, touch) in sample.pads.entries() {
+            found.extend(self.condition(touch)?.map(|picture| (pad, picture)));
+        }
+        Ok(found)
+    }
+
+    /// Predicted imprints (metres, raw orientation) of the fingers that the generator can start from, as large as the
+    /// measured ones.
+    pub(super) fn imprints(&mut self, sample: &Sample, cx: &JobCx) -> anyhow::Result<PerPad<DepthMap>> {
+        let conditions = self.conditions(sample)?;
+        let pictures: Vec<&RgbGrid> = conditions.iter().map(|(_, picture)| &**picture).collect();
+        let made = self.predict(&pictures, cx)?;
+        let mut out: PerPad<DepthMap> = sample.rig.pads().map(|_| None).collect();
+        for ((finger, _), made) in conditions.iter().zip(made) {
+            out[*finger] = Some(imprint_of(&made, self.shift(), sample, *finger)?);
         }
         Ok(out)
     }

@@ -11,10 +11,10 @@ use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
 use super::predict::Predictor;
 use crate::domain::contact::MaskBasis;
 use crate::domain::ensemble::{AngleFan, Spread, seeds};
-use crate::domain::grid::DepthMap;
-use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::pose::{estimate, Engine, FingerInput, Fingers, ToolModel};
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
 use crate::io::{images, names, npz};
 use crate::work::ensemble::{Ensemble, ensemble};
@@ -52,13 +52,13 @@ pub(super) struct FingerSeeds {
 pub(super) fn predict(
     predictor: &mut Predictor,
     sample: &Sample,
-    finger: Finger,
+    finger: PadId,
     count: u16,
 ) -> anyhow::Result<FingerSeeds> {
-    let gelslim = sample.finger(finger).and_then(|t| t.gelslim.as_ref());
-    let difference = &gelslim.ok_or_else(|| anyhow::anyhow!("no GelSlim image"))?.difference;
+    let touch = sample.pad(finger).ok_or_else(|| predictor.no_condition())?;
+    let picture = predictor.condition(touch)?.ok_or_else(|| predictor.no_condition())?;
     let list = seeds(predictor.config()?.seed, count.into());
-    let made: Vec<Arc<Prediction>> = predictor.predict_seeds(difference, &list)?.into_iter().map(Arc::new).collect();
+    let made: Vec<Arc<Prediction>> = predictor.predict_seeds(&picture, &list)?.into_iter().map(Arc::new).collect();
     let shift = predictor.shift();
     let imprint = |made: &Arc<Prediction>| imprint_of(made, shift, sample, finger).map(Arc::new);
     let imprints = made.iter().map(imprint).collect::<Result<Vec<_>, _>>()?;
@@ -161,10 +161,11 @@ pub(super) fn fan(
     args: &MaskArgs,
     count: u16,
 ) -> anyhow::Result<PoseFan> {
-    let mut fingers: [Option<FingerSeeds>; 2] = [None, None];
-    for finger in Finger::BOTH {
-        if sample.finger(finger).is_some_and(|t| t.gelslim.is_some()) {
-            fingers[finger.index()] = Some(predict(predictor, sample, finger, count)?);
+    let mut fingers: PerPad<FingerSeeds> = PerPad::default();
+    for finger in sample.rig.pads() {
+        let Some(touch) = sample.pad(finger) else { continue };
+        if predictor.condition(touch)?.is_some() {
+            fingers[finger] = Some(predict(predictor, sample, finger, count)?);
         }
     }
     let source = match args.mask {
@@ -172,29 +173,29 @@ pub(super) fn fan(
         other => other,
     };
     let mut made_otherwise = BTreeMap::new();
-    let mut angle = |imprints: [Option<&DepthMap>; 2]| -> anyhow::Result<Option<f64>> {
-        let mut masks = [None, None];
-        for finger in Finger::BOTH {
-            let (Some(imprint), Some(touch)) = (imprints[finger.index()], sample.finger(finger)) else { continue };
+    let mut angle = |imprints: PerPad<&DepthMap>| -> anyhow::Result<Option<f64>> {
+        let mut masks: PerPad<Mask> = PerPad::default();
+        for finger in sample.rig.pads() {
+            let (Some(imprint), Some(touch)) = (imprints[finger], sample.pad(finger)) else { continue };
             let truth = sample.grasp_from_object;
             let found = contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?;
             if found.basis != MaskBasis::Source {
-                let made_of = format!("{} finger: {}", finger.name(), found.basis.key(source.key()));
+                let made_of = format!("{} finger: {}", sample.rig.pad_key(finger), found.basis.key(source.key()));
                 *made_otherwise.entry(made_of).or_insert(0) += 1;
             }
-            masks[finger.index()] = Some(found.mask);
+            masks[finger] = Some(found.mask);
         }
-        let inputs = Finger::BOTH.map(|f| {
-            let camera = sample.finger(f)?.camera()?;
-            Some(FingerInput { imprint: imprints[f.index()]?, camera, mask: masks[f.index()].as_ref() })
+        let inputs = Fingers::new(&sample.rig, |f| {
+            let camera = sample.pad(f)?.camera()?;
+            Some(FingerInput { imprint: imprints[f]?, camera, mask: masks[f].as_ref() })
         });
         Ok(estimate(&inputs, tool, engine, false).ok().map(|r| r.object_from_grasp.theta_rad))
     };
     let mut angles = Vec::new();
     for i in 0..usize::from(count) {
-        angles.push(angle(fingers.each_ref().map(|f| Some(&*f.as_ref()?.imprints[i])))?);
+        angles.push(angle(fingers.as_ref().map(|f| Some(&*f?.imprints[i])))?);
     }
-    let of_mean = angle(fingers.each_ref().map(|f| Some(&f.as_ref()?.spread.mean)))?;
+    let of_mean = angle(fingers.as_ref().map(|f| Some(&f?.spread.mean)))?;
     let fan = AngleFan::of(&angles.iter().flatten().copied().collect::<Vec<_>>());
     let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
     let mean = fan.as_ref().and_then(|f| f.mean_rad);

@@ -27,8 +27,8 @@ pub(super) struct StatsArgs {
     /// The file to write; use it with `--shift refit --stats FILE`.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Which finger's touches.
-    #[arg(long, value_enum, default_value_t = FingerArg::Both)]
+    /// Which finger's touches: right, left (or as the data set names it), both.
+    #[arg(long, default_value = "both")]
     finger: FingerArg,
     #[command(flatten)]
     limit: LimitArgs,
@@ -53,12 +53,13 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let ids: Vec<PairId> = args.limit.spread(dataset.index.pairs.len()).into_iter().map(|i| PairId(i as u32)).collect();
     let output = Arc::new(Output::new(args.common, "predicting", ids.len()));
-    let mut predictor = Predictor::new(&args.model);
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let setup = StatisticsSetup {
         pairs: ids,
-        fingers: args.finger.fingers().to_vec(),
+        fingers: args.finger.fingers(&dataset.rig)?,
         config: predictor.config()?,
         bundle: predictor.bundle()?.clone(),
+        input: predictor.input().ok_or_else(|| anyhow::anyhow!("the bundle is not a generator"))?,
         dataset: dataset.title.clone(),
     };
     let chain = predictor.chain(ShiftMode::Raw)?;

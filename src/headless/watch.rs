@@ -20,7 +20,8 @@ use super::pose::{Engines, parse_engines};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult, report};
 use crate::domain::dataset::{PairId, Problem};
-use crate::domain::sample::BubbleCamera;
+use crate::domain::rig::{PerPad, Rig};
+use crate::domain::sample::DepthCamera;
 use crate::io::dataset::{Dataset, cameras_of};
 use crate::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
 use crate::io::names::Outputs;
@@ -100,10 +101,10 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
         existing: args.existing || args.once,
         patience,
         tool_scale: args.unit.tool_scale,
-        rig: rig(args.camera.as_deref())?,
+        cameras: cameras(args.camera.as_deref())?,
     };
     let mut follower = Follower::new(args.dataset.path(), config)?;
-    let mut worker = Worker::new(args, Predictor::new(&args.model), stop.clone())?;
+    let mut worker = Worker::new(args, Predictor::new(&args.model, &Rig::lab()), stop.clone())?;
     let ready = json!({
         "event": "ready", "folder": args.dataset.path(), "recipe": worker.recipe(None)?, "period_ms": PERIOD.as_secs_f64() * 1e3,
         "load_and_warm_up_s": worker.warm_s,
@@ -168,14 +169,14 @@ fn take_signals(stop: Cancel) -> anyhow::Result<()> {
 }
 
 /// The cameras that `--camera` names.
-fn rig(named: Option<&Path>) -> anyhow::Result<Option<[Option<BubbleCamera>; 2]>> {
+fn cameras(named: Option<&Path>) -> anyhow::Result<Option<PerPad<DepthCamera>>> {
     let Some(file) = named else { return Ok(None) };
     let cameras = if file == Path::new("demo") {
-        Dataset::demo().load(PairId(0))?.fingers.map(|touch| touch?.bubble?.camera)
+        Dataset::demo().load(PairId(0))?.pads.map(|touch| touch?.depth()?.camera.clone())
     } else {
         cameras_of(file)?
     };
-    if cameras.iter().all(Option::is_none) {
+    if cameras.is_empty() {
         anyhow::bail!(
             "the file has no camera: K, bubbles_tr_quat, grasp_frame_quat and bubble_depth_ref are needed ({})",
             file.display()

@@ -5,14 +5,14 @@
 //! manifest. A bundle with anything wrong is refused with the whole list. Whether an engine takes the graphs, and what
 //! they ask for, is found out by [`super::trial`].
 //!
-//! # Manifest, format version 1
+//! # Manifest, format version 2
 //!
 //! JSON; unknown keys are refused, except under `provenance`, which is free-form. Every `size` is `[width, height]`.
 //!
 //! ```json
 //! {
 //!   "format": "touch2touch-bundle",
-//!   "format_version": 1,
+//!   "format_version": 2,
 //!   "kind": "generator",
 //!   "name": "Demo generator",
 //!   "files": {
@@ -21,7 +21,7 @@
 //!     "decoder": { "path": "decoder.onnx", "sha256": "…" }
 //!   },
 //!   "input": {
-//!     "sensor": "gelslim", "size": [128, 128], "scale": "0..1",
+//!     "sensor": { "key": "gelslim", "kind": "color", "size": [427, 320] }, "size": [128, 128], "scale": "0..1",
 //!     "mean": [-0.0107, -0.0063, -0.0087], "std": [0.0687, 0.0428, 0.0576],
 //!     "resampling": "bilinear", "rotation_deg": 0
 //!   },
@@ -30,7 +30,7 @@
 //!   "schedule": { "kind": "scaled_linear", "steps": 1000, "beta_start": 0.0015, "beta_end": 0.0155 },
 //!   "prediction": "v",
 //!   "output": {
-//!     "size": [128, 128], "channels": 1, "range_m": [-0.0116, 0.0225], "reduction": "mean",
+//!     "sensor": { "key": "bubble", "kind": "depth", "size": [175, 140] }, "size": [128, 128], "channels": 1, "range_m": [-0.0116, 0.0225], "reduction": "mean",
 //!     "rotation_deg": 180, "imprint_size": [175, 140], "resampling": "bilinear"
 //!   },
 //!   "shift": { "pred_mean": 0.0126, "pred_std": 0.0015, "gt_mean": 0.0027, "gt_std": 0.0033 },
@@ -42,12 +42,12 @@
 //! ```json
 //! {
 //!   "format": "touch2touch-bundle",
-//!   "format_version": 1,
+//!   "format_version": 2,
 //!   "kind": "mask_unet",
 //!   "name": "Demo mask UNet",
 //!   "files": { "mask_unet": { "path": "mask_unet.onnx", "sha256": "…" } },
 //!   "input": {
-//!     "sensor": "bubble", "size": [175, 140], "range_m": [-0.0116, 0.0225], "cast": "saturate", "rotation_deg": 0
+//!     "sensor": { "key": "bubble", "kind": "depth", "size": [175, 140] }, "size": [175, 140], "range_m": [-0.0116, 0.0225], "cast": "saturate", "rotation_deg": 0
 //!   },
 //!   "output": { "classes": 2, "threshold": 0.5 },
 //!   "provenance": {}
@@ -57,15 +57,23 @@
 //! ```json
 //! {
 //!   "format": "touch2touch-bundle",
-//!   "format_version": 1,
+//!   "format_version": 2,
 //!   "kind": "tool_classifier",
 //!   "name": "Demo tool classifier",
 //!   "files": { "tool_classifier": { "path": "tool_classifier.onnx", "sha256": "…" } },
-//!   "input": { "sensor": "bubble", "size": [128, 128], "range_m": [-0.0188, 0.0264], "rotation_deg": 180 },
+//!   "input": {
+//!     "sensor": { "key": "bubble", "kind": "depth", "size": [175, 140] }, "size": [128, 128],
+//!     "range_m": [-0.0188, 0.0264], "rotation_deg": 180
+//!   },
 //!   "output": { "classes": ["pattern_31_rod", "pattern_36"], "features": 96 },
 //!   "provenance": {}
 //! }
 //! ```
+//!
+//! `sensor` declares a sensor as the rig of the data does ([`SensorSpec`]); a bundle is used only where they agree. A
+//! generator that starts from a depth sensor has `"scale": "m"` and one number in `mean` and `std`; one that predicts a
+//! color sensor has, in place of `range_m`, the `range` of the difference on the 0..255 scale, three channels and no
+//! `shift`. Version 1 has `"sensor": "gelslim"` or `"bubble"` in `input` and none in `output`: the lab's sensors.
 //!
 //! A generator whose denoiser was trained with the condition left out now and then may say so, and is then offered with
 //! classifier-free guidance: `"guidance": { "unconditional": "zero_condition", "scale": 2.0 }`. `unconditional` is
@@ -83,7 +91,7 @@
 //!
 //! | role | inputs | output |
 //! | --- | --- | --- |
-//! | `condition_encoder` | `gelslim` \[N, 3, input height, width\] | `condition` \[N, …condition shape\] |
+//! | `condition_encoder` | the input sensor's key, such as `gelslim` \[N, 3 or 1, input height, width\] | `condition` \[N, …condition shape\] |
 //! | `denoiser` | `latent` \[N, …latent shape\], `timestep` int64 or float32 \[N\], `condition` | `prediction` \[N, …latent shape\] |
 //! | `decoder` | `latent` \[N, …latent shape\] | `image` \[N, channels, output height, width\], about -1 to 1 |
 //! | `mask_unet` | `imprint` \[N, 1, input height, width\], 0 to 1 | `logits` \[N, classes, input height, width\] |
@@ -92,6 +100,7 @@
 pub(super) mod contract;
 mod find;
 mod manifest;
+mod sensor;
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -105,10 +114,11 @@ use crate::io::files;
 
 pub use find::{Found, default_roots, find};
 pub use manifest::{
-    BubbleSensor, BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, FileEntry, GelslimSensor,
-    GeneratorInput, GeneratorSpec, GuidanceSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec,
-    ScheduleKind, ScheduleSpec, TensorSpec, TimestepType, Unconditional,
+    BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, FileEntry, GeneratorInput, GeneratorSpec,
+    GuidanceSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind, ScheduleSpec,
+    TensorSpec, TimestepType, Unconditional,
 };
+pub use sensor::{Ends, Misfit, SensorPair, SensorSpec};
 
 /// The manifest's file name.
 pub const MANIFEST: &str = "manifest.json";

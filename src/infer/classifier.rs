@@ -128,12 +128,13 @@ fn prepare(imprint: &DepthMap, input: &ClassifierInput, out: &mut Vec<f32>) {
 mod tests {
     use super::*;
     use crate::domain::grid::Grid;
-    use crate::infer::bundle::BubbleSensor;
+    use crate::domain::rig::lab;
+    use crate::infer::bundle::SensorSpec;
 
     #[test]
     fn the_imprint_is_turned_and_its_range_becomes_one() {
         let input = ClassifierInput {
-            sensor: BubbleSensor::Bubble,
+            sensor: SensorSpec::of(&lab::BUBBLE),
             size: [4, 1],
             range_m: [-0.01, 0.03].into(),
             rotation_deg: 180,

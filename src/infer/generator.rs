@@ -15,7 +15,7 @@ use crate::domain::diffusion::{
     Denoiser, DiffusionError, GenerateConfig, Guided, ModelError, Prediction, Progress, Tensor, sample_watched,
 };
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
-use crate::domain::postprocess::{PostprocessError, RawPrediction, ShiftMode};
+use crate::domain::postprocess::{Picture, PostprocessError, RawPrediction, ShiftMode};
 
 /// Why there is no prediction.
 #[derive(Debug, thiserror::Error)]
@@ -185,6 +185,18 @@ impl Generator {
         self.spec.depth_chain(mode)?.run(raw)
     }
 
+    /// What the user sees of a prediction: depth in metres, or a color sensor's difference, in the sensor's own raw
+    /// orientation.
+    ///
+    /// # Errors
+    /// As [`Generator::depth`].
+    pub fn picture(&self, raw: &RawPrediction, mode: ShiftMode) -> Result<Picture, PostprocessError> {
+        match self.spec.color_chain() {
+            Some(chain) => Ok(Picture::Color(chain.run(raw)?)),
+            None => Ok(Picture::Depth(self.depth(raw, mode)?)),
+        }
+    }
+
     /// Any images from any seeds, all in one batch: each image is encoded once, however many seeds it has, and the
     /// denoiser is called once a step. `config.seed` is not used. Answers in the order of `items`.
     ///
@@ -254,7 +266,8 @@ impl Generator {
         // One at a time: a condition does not depend on what else is in the batch, not even in its last bit.
         let input = Tensor::stack(std::slice::from_ref(&prepared)).expect("there is one");
         let shape: Vec<usize> = std::iter::once(1).chain(self.spec.condition.shape).collect();
-        let condition = self.encoder.run(&[("gelslim", Input::F32(&input))], "condition", &shape)?;
+        let name = self.spec.input.sensor.key.as_str();
+        let condition = self.encoder.run(&[(name, Input::F32(&input))], "condition", &shape)?;
         let condition = condition.item(0).expect("the shape was checked: there is one");
         if self.encoded.len() >= KEPT_CONDITIONS {
             self.encoded.remove(0);
@@ -343,7 +356,8 @@ impl Denoiser for BundleDenoiser<'_> {
     }
 }
 
-/// The difference image as the condition encoder wants it: scaled, resized, normalised, turned; `[3, height, width]`.
+/// The picture ([`crate::domain::sample::PadTouch::picture`]) as the condition encoder wants it: scaled, resized,
+/// normalised, turned; `[channels, height, width]`.
 ///
 /// # Errors
 /// [`GenerateError::BadImage`] for an image without pixels or with values that are not numbers.
@@ -354,7 +368,7 @@ pub fn prepare(difference: &RgbGrid, input: &GeneratorInput) -> Result<Tensor, G
     }
     let scale = match input.scale {
         InputScale::Unit => 1.0 / 255.0,
-        InputScale::Byte => 1.0,
+        InputScale::Byte | InputScale::Metres => 1.0,
     };
     let [width, height] = input.size;
     let resized = input.resampling.resize_rgb(difference, width, height);
@@ -363,23 +377,25 @@ pub fn prepare(difference: &RgbGrid, input: &GeneratorInput) -> Result<Tensor, G
         let normalise = move |p: &[f32; 3]| ((f64::from(p[c]) * scale - input.mean[c]) / input.std[c]) as f32;
         turned.as_slice().iter().map(normalise).collect::<Vec<f32>>()
     };
-    let data = (0..3).flat_map(plane).collect();
-    Ok(Tensor::new(vec![3, height, width], data).expect("three planes of this size"))
+    let channels = input.channels();
+    let data = (0..channels).flat_map(plane).collect();
+    Ok(Tensor::new(vec![channels, height, width], data).expect("the planes have this size"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::domain::resample::Resampling;
-    use crate::infer::bundle::GelslimSensor;
+    use crate::domain::rig::lab;
+    use crate::infer::bundle::SensorSpec;
 
     fn input(scale: InputScale, rotation_deg: u32) -> GeneratorInput {
         GeneratorInput {
-            sensor: GelslimSensor::Gelslim,
+            sensor: SensorSpec::of(&lab::GELSLIM),
             size: [2, 2],
             scale,
-            mean: [0.1, 0.0, -0.1],
-            std: [0.5, 1.0, 2.0],
+            mean: vec![0.1, 0.0, -0.1],
+            std: vec![0.5, 1.0, 2.0],
             resampling: Resampling::Bilinear,
             rotation_deg,
         }

@@ -139,11 +139,12 @@ fn prepare(imprint: &DepthMap, input: &MaskInput) -> Tensor {
 mod tests {
     use super::*;
     use crate::domain::contact::{ByteCast, lab_unet_input};
-    use crate::infer::bundle::BubbleSensor;
+    use crate::domain::rig::lab;
+    use crate::infer::bundle::SensorSpec;
 
     fn input(cast: Cast) -> MaskInput {
         MaskInput {
-            sensor: BubbleSensor::Bubble,
+            sensor: SensorSpec::of(&lab::BUBBLE),
             size: [3, 1],
             range_m: [-0.0116, 0.0225].into(),
             cast,

@@ -151,7 +151,7 @@ fn on_zeros(bundle: &Bundle, engine: EngineKind, at: &mut dyn FnMut(&str)) -> Re
         let Some((inputs, outputs)) = promised(*role, bundle.spec()) else { continue };
         let batch_of_one = |shape: &[usize]| -> Vec<usize> { [&[1], shape].concat() };
         let zeros: Vec<(&str, Tensor)> =
-            inputs.iter().map(|p| (p.name, Tensor::filled(batch_of_one(&p.shape), 0.0))).collect();
+            inputs.iter().map(|p| (&*p.name, Tensor::filled(batch_of_one(&p.shape), 0.0))).collect();
         let inputs: Vec<(&str, Input<'_>)> = zeros
             .iter()
             .map(|(name, tensor)| match *name == "timestep" && whole_steps {
@@ -160,7 +160,7 @@ fn on_zeros(bundle: &Bundle, engine: EngineKind, at: &mut dyn FnMut(&str)) -> Re
             })
             .collect();
         for output in outputs {
-            match graph.run(&inputs, output.name, &batch_of_one(&output.shape)) {
+            match graph.run(&inputs, &output.name, &batch_of_one(&output.shape)) {
                 // Zeros are no touch: what comes out of them need not be numbers.
                 Ok(_) | Err(ModelError::NonFinite { .. }) => {}
                 Err(err) => return Err(err.to_string()),

@@ -25,7 +25,8 @@ use super::stl::{self, MeshError};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::mesh::TriMesh;
-use crate::domain::sample::BubbleCamera;
+use crate::domain::rig::lab;
+use crate::domain::sample::DepthCamera;
 use crate::domain::sensor::Intrinsics;
 
 pub use simulated::{simulated, simulated_meshes, simulated_tools, stratum};
@@ -42,13 +43,13 @@ pub enum Stratum {
     Degenerate = 2,
 }
 
-/// One grasp of both fingers with its truth. Fingers are indexed by [`crate::domain::sensor::Finger::index`].
+/// One grasp of both fingers with its truth. Fingers are indexed as in the lab's rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
     /// Reference minus depth, metres; NaN, and where the camera said 0 the reference itself (which lifts to depth 0).
     pub imprints: [DepthMap; 2],
     /// Nominal cameras.
-    pub cameras: [BubbleCamera; 2],
+    pub cameras: [DepthCamera; 2],
     /// Contact, spoilt like a learned mask.
     pub masks: [Mask; 2],
     /// Contact as it is.
@@ -239,9 +240,10 @@ pub fn read(file: &Path) -> Result<Case, CaseError> {
     let camera = |f: usize| {
         let (k, t) = (&k[9 * f..], &t[16 * f..]);
         let column = |c: usize| DVec3::new(t[c], t[4 + c], t[8 + c]);
-        BubbleCamera {
+        DepthCamera {
             depth_reference: reference[f].map(|&z| z as f32),
             intrinsics: Intrinsics { fx: k[0], fy: k[4], cx: k[2], cy: k[5] },
+            crop: lab::BUBBLE.crop,
             grasp_from_camera: DAffine3::from_mat3_translation(
                 DMat3::from_cols(column(0), column(1), column(2)),
                 column(3),
@@ -307,9 +309,10 @@ mod tests {
     use super::*;
 
     fn case() -> Case {
-        let camera = BubbleCamera {
+        let camera = DepthCamera {
             depth_reference: DepthMap::from_fn(6, 4, |x, y| 0.09 + 1e-3 * (x + y) as f32),
             intrinsics: Intrinsics { fx: 212.0, fy: 211.0, cx: 112.3, cy: 86.1 },
+            crop: lab::BUBBLE.crop,
             grasp_from_camera: DAffine3::from_mat3_translation(
                 DMat3::from_rotation_y(0.96),
                 DVec3::new(-0.0764, 0.001, -0.0541),

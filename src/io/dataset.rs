@@ -21,7 +21,8 @@ use std::sync::{Arc, OnceLock};
 use crate::domain::dataset::{Index, PairEntry, PairId, Problem};
 use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::mesh::TriMesh;
-use crate::domain::sample::{BubbleCamera, Sample};
+use crate::domain::rig::{PerPad, Rig};
+use crate::domain::sample::{DepthCamera, Sample};
 use crate::domain::upright::Turn;
 
 use super::stl::MeshError;
@@ -29,7 +30,7 @@ use super::stl::MeshError;
 pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
 pub use grow::{Growth, OUTPUT_MARK, RIG_FILE, cameras_of, is_output};
-pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, assumed_metres};
+pub use pictures::{assumed_metres, ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON};
 pub use tool_scale::{ToolFile, ToolScale, UNIT_FILE, read_in_metres, read_tool};
 
 /// Which kind of source a dataset is.
@@ -50,7 +51,7 @@ pub struct Loaded {
     /// that disagree, numbers that cannot be those of a touch.
     pub sample: Sample,
     /// Pixels of each finger's imprint that are no measurement; they are NaN in the sample.
-    pub invalid: [InvalidPixels; 2],
+    pub invalid: PerPad<InvalidPixels>,
 }
 
 /// A larger share of an imprint's pixels without measurement than this is worth a note of its own, because every depth
@@ -97,9 +98,11 @@ pub struct Dataset {
     pub problems: Vec<Problem>,
     /// What the numbers of the CAD files mean; without it, what [`UNIT_FILE`] beside them says, else metres.
     pub tool_scale: Option<ToolScale>,
+    /// The sensors that its touches were felt with.
+    pub rig: Arc<Rig>,
     source: Source,
-    /// The bubbles' cameras of the rig, for touches that come without a bubble; read when first needed.
-    rig: OnceLock<[Option<Arc<BubbleCamera>>; 2]>,
+    /// The depth cameras of the rig, for touches that come without a depth picture; read when first needed.
+    cameras: OnceLock<PerPad<Arc<DepthCamera>>>,
 }
 
 #[derive(Clone, Debug)]
@@ -116,6 +119,7 @@ struct Scan {
     problems: Vec<Problem>,
     source: Source,
     kind: SourceKind,
+    rig: Arc<Rig>,
 }
 
 impl Dataset {
@@ -154,8 +158,9 @@ impl Dataset {
             index: Index { pairs: scan.pairs },
             problems,
             tool_scale: None,
+            rig: scan.rig,
             source: scan.source,
-            rig: OnceLock::new(),
+            cameras: OnceLock::new(),
         }
     }
 
@@ -173,8 +178,9 @@ impl Dataset {
             index: Index { pairs: set.pairs() },
             problems: Vec::new(),
             tool_scale: None,
+            rig: Rig::lab(),
             source: Source::BuiltIn(set),
-            rig: OnceLock::new(),
+            cameras: OnceLock::new(),
         }
     }
 
@@ -296,7 +302,7 @@ impl Dataset {
     /// # Errors
     /// As [`Dataset::load`].
     pub fn vqvae_imprint(&self, id: PairId, laid: Turn) -> Result<Option<DepthMap>, LoadError> {
-        Ok(self.vqvae_tile(id, laid)?.map(|tile| pictures::imprint_from_tile(&tile)))
+        Ok(self.vqvae_tile(id, laid)?.map(|tile| pictures::imprint_from_tile(&tile, &self.rig)))
     }
 }
 

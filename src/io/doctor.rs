@@ -142,8 +142,9 @@ fn look_at(dataset: &Dataset, id: PairId) -> Look {
         Err(err) => return Look { problems: vec![err.to_problem()], ..Look::default() },
     };
     let (mut few_invalid, mut pixels) = (0, 0);
-    for (touch, invalid) in sample.fingers.iter().zip(invalid) {
-        let Some(bubble) = touch.as_ref().and_then(|t| t.bubble.as_ref()) else { continue };
+    for (pad, touch) in sample.pads.entries() {
+        let Some(bubble) = touch.depth() else { continue };
+        let invalid = invalid[pad].unwrap_or_default();
         pixels += bubble.imprint.len();
         if !invalid.are_many(bubble.imprint.len()) {
             few_invalid += invalid.total();

@@ -13,6 +13,7 @@ mod staging;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use sha2::Digest as _;
@@ -22,7 +23,7 @@ use super::images::{self, PictureError};
 use super::masks::MaskStore;
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Grid, Mask};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, Rig};
 
 pub use check::{CheckReport, check_folder};
 use staging::Staging;
@@ -120,7 +121,7 @@ pub struct ExportEntry {
     /// The tool, where known: the loader filters by it as a part of the stem.
     pub tool: Option<String>,
     /// The finger.
-    pub finger: Finger,
+    pub finger: PadId,
 }
 
 /// How to divide.
@@ -134,11 +135,13 @@ pub struct ExportConfig {
     pub test: f64,
     /// Tools whose pairs all go to test (unseen tools).
     pub test_tools: Vec<String>,
+    /// The names of the pads.
+    pub rig: Arc<Rig>,
 }
 
 impl Default for ExportConfig {
     fn default() -> Self {
-        Self { seed: 0, val: 0.1, test: 0.1, test_tools: Vec::new() }
+        Self { seed: 0, val: 0.1, test: 0.1, test_tools: Vec::new(), rig: Rig::lab() }
     }
 }
 
@@ -179,14 +182,14 @@ pub fn check_stored<'a>(
 ) -> Result<(), ExportError> {
     let failure = |entry: &ExportEntry| {
         let err = store.load(&entry.pair, entry.finger).err()?;
-        Some((place(entry), format!("{err}; {}", err.hint())))
+        Some((place(entry, store.rig()), format!("{err}; {}", err.hint())))
     };
     let failures: Vec<_> = entries.into_iter().filter_map(failure).collect();
     if failures.is_empty() { Ok(()) } else { Err(ExportError::Sources { failures }) }
 }
 
-fn place(entry: &ExportEntry) -> String {
-    format!("{}, {} finger", entry.pair, entry.finger.name())
+fn place(entry: &ExportEntry, rig: &Rig) -> String {
+    format!("{}, {} finger", entry.pair, rig.pad_key(entry.finger))
 }
 
 /// Why an imprint or a mask was not fetched.
@@ -223,7 +226,7 @@ pub fn export(
     let folder = std::path::absolute(folder).map_err(|s| io(folder, "find the folder", s))?;
     refuse_foreign(&folder)?;
     let parts = split::parts(entries, config)?;
-    let stems = split::stems(entries);
+    let stems = split::stems(entries, &config.rig);
     let parent = folder.parent().unwrap_or(&folder).to_owned();
     std::fs::create_dir_all(&parent).map_err(|s| io(&parent, "make the folder", s))?;
     staging::sweep(&parent);
@@ -236,7 +239,7 @@ pub fn export(
         }
     }
     let mut report = ExportReport::default();
-    let source = |entry: &ExportEntry| (entry.pair.clone(), entry.finger.name().to_owned());
+    let source = |entry: &ExportEntry| (entry.pair.clone(), config.rig.pad_key(entry.finger).into_owned());
     let mut manifest = Manifest {
         format: FORMAT.into(),
         version: 1,
@@ -250,7 +253,7 @@ pub fn export(
         let (imprint, mask) = match load(i) {
             Ok(content) => content,
             Err(LoadFailure::Bad(reason)) => {
-                failures.push((place(&entries[i]), reason));
+                failures.push((place(&entries[i], &config.rig), reason));
                 continue;
             }
             Err(LoadFailure::Stop) => return Err(ExportError::Stopped),

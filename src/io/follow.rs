@@ -12,7 +12,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use crate::domain::dataset::{PairId, Problem};
-use crate::domain::sample::BubbleCamera;
+use crate::domain::rig::PerPad;
+use crate::domain::sample::DepthCamera;
 use crate::io::dataset::{Dataset, LoadError, Loaded, OpenError, ToolScale};
 use crate::io::pt::PtError;
 
@@ -126,12 +127,12 @@ pub struct FollowConfig {
     /// Unit of the CAD models, as in [`Dataset::tool_scale`].
     pub tool_scale: Option<ToolScale>,
     /// Cameras for touches without a bubble, by finger; without them those that the dataset finds itself.
-    pub rig: Option<[Option<BubbleCamera>; 2]>,
+    pub cameras: Option<PerPad<DepthCamera>>,
 }
 
 impl Default for FollowConfig {
     fn default() -> Self {
-        Self { existing: false, patience: PATIENCE, tool_scale: None, rig: None }
+        Self { existing: false, patience: PATIENCE, tool_scale: None, cameras: None }
     }
 }
 
@@ -272,8 +273,8 @@ impl Follower {
                 self.troubles = dataset.left_out();
                 if self.dataset.is_none() {
                     dataset.tool_scale = self.config.tool_scale;
-                    if let Some(rig) = self.config.rig.clone() {
-                        dataset.set_rig_cameras(rig);
+                    if let Some(cameras) = self.config.cameras.clone() {
+                        dataset.set_rig_cameras(cameras);
                     }
                 }
                 self.dataset = Some(Arc::new(dataset));

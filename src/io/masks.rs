@@ -9,6 +9,7 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +19,7 @@ use crate::domain::dataset::Problem;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{decode_runs, encode_runs};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, Rig};
 
 /// Name of the folder beside a dataset.
 pub const FOLDER: &str = "touch2touch_masks";
@@ -166,6 +167,8 @@ pub struct MaskStore {
     folder: PathBuf,
     /// A folder that is only read: labels beside a dataset that cannot be written.
     also_read: Option<PathBuf>,
+    /// The names of the pads.
+    rig: Arc<Rig>,
 }
 
 impl MaskStore {
@@ -183,10 +186,10 @@ impl MaskStore {
             None => names::label(&dataset.title),
         };
         let user = folders::data().map(|folder| folder.join("masks").join(key));
-        Self::choose(dataset.root.as_deref(), user)
+        Ok(Self { rig: dataset.rig.clone(), ..Self::choose(dataset.root.as_deref(), user)? })
     }
 
-    /// [`MaskStore::for_dataset`] with the two places given.
+    /// [`MaskStore::for_dataset`] with the two places given, for the lab's rig.
     ///
     /// # Errors
     /// As there.
@@ -197,22 +200,22 @@ impl MaskStore {
         {
             // Labels made while the dataset was read-only stay visible.
             let also_read = user_folder.filter(|folder| folder.is_dir());
-            return Ok(Self { folder: beside.clone(), also_read });
+            return Ok(Self { folder: beside.clone(), also_read, rig: Rig::lab() });
         }
         let mut tried: Vec<String> = beside.iter().map(|p| p.display().to_string()).collect();
         if let Some(user) = user_folder {
             let there = user.ancestors().find(|folder| folder.is_dir());
             if there.is_some_and(is_writable) {
-                return Ok(Self { folder: user, also_read: beside.filter(|folder| folder.is_dir()) });
+                return Ok(Self { folder: user, also_read: beside.filter(|folder| folder.is_dir()), rig: Rig::lab() });
             }
             tried.push(user.display().to_string());
         }
         Err(StoreError::NoFolder { tried: tried.join(", ") })
     }
 
-    /// A store in a given folder.
+    /// A store in a given folder, for the lab's rig.
     pub fn in_folder(folder: PathBuf) -> Self {
-        Self { folder, also_read: None }
+        Self { folder, also_read: None, rig: Rig::lab() }
     }
 
     /// Where files are written.
@@ -220,18 +223,27 @@ impl MaskStore {
         &self.folder
     }
 
+    /// The sensors whose pads the masks are of.
+    pub fn rig(&self) -> &Rig {
+        &self.rig
+    }
+
+    fn mask_name(&self, pair: &str, finger: PadId) -> String {
+        format!("{}.{}{MASK_SUFFIX}", names::label(pair), self.rig.pad_key(finger))
+    }
+
     /// The file of a mask, whether it exists or not.
-    pub fn mask_file(&self, pair: &str, finger: Finger) -> PathBuf {
-        self.folder.join(mask_name(pair, finger))
+    pub fn mask_file(&self, pair: &str, finger: PadId) -> PathBuf {
+        self.folder.join(self.mask_name(pair, finger))
     }
 
     /// Reads a mask; `None` if none was saved.
     ///
     /// # Errors
     /// [`StoreError::Damaged`]: then the pair must not be edited.
-    pub fn load(&self, pair: &str, finger: Finger) -> Result<Option<StoredMask>, StoreError> {
-        match self.find(&mask_name(pair, finger))? {
-            Some((file, bytes)) => parse_mask(&file, &bytes, pair, finger).map(Some),
+    pub fn load(&self, pair: &str, finger: PadId) -> Result<Option<StoredMask>, StoreError> {
+        match self.find(&self.mask_name(pair, finger))? {
+            Some((file, bytes)) => parse_mask(&file, &bytes, pair, &self.rig.pad_key(finger)).map(Some),
             None => Ok(None),
         }
     }
@@ -241,7 +253,7 @@ impl MaskStore {
     /// # Errors
     /// [`StoreError::Damaged`] if the file that is there cannot be understood: it is not overwritten.
     /// [`StoreError::Io`] if the disk refuses; the previous file is then unchanged.
-    pub fn save(&self, pair: &str, finger: Finger, mask: Option<&StoredMask>) -> Result<(), StoreError> {
+    pub fn save(&self, pair: &str, finger: PadId, mask: Option<&StoredMask>) -> Result<(), StoreError> {
         self.load(pair, finger)?;
         let file = self.mask_file(pair, finger);
         let Some(stored) = mask else {
@@ -256,7 +268,7 @@ impl MaskStore {
             format: FORMAT.into(),
             version: VERSION,
             pair: pair.into(),
-            finger: finger.name().into(),
+            finger: self.rig.pad_key(finger).into(),
             width: stored.mask.width(),
             height: stored.mask.height(),
             base: stored.base.clone(),
@@ -314,13 +326,13 @@ impl MaskStore {
     }
 
     /// All saved masks as pair name and finger, sorted; their content is not read.
-    pub fn masks(&self) -> Vec<(String, Finger)> {
+    pub fn masks(&self) -> Vec<(String, PadId)> {
         let mut masks = Vec::new();
         for file in self.files_ending(MASK_SUFFIX) {
             let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
             let stem = name.strip_suffix(MASK_SUFFIX).unwrap_or(&name);
-            for finger in Finger::BOTH {
-                if let Some(pair) = stem.strip_suffix(finger.name()).and_then(|s| s.strip_suffix('.')) {
+            for finger in self.rig.pads() {
+                if let Some(pair) = stem.strip_suffix(&*self.rig.pad_key(finger)).and_then(|s| s.strip_suffix('.')) {
                     // A name too long to be its own file name is in the file.
                     let pair = names::pair_of_label(pair).or_else(|| {
                         let content: MaskFile = serde_json::from_slice(&read(&file).ok()?).ok()?;
@@ -405,10 +417,6 @@ impl MaskStore {
     }
 }
 
-fn mask_name(pair: &str, finger: Finger) -> String {
-    format!("{}.{}{MASK_SUFFIX}", names::label(pair), finger.name())
-}
-
 fn review_name(pair: &str) -> String {
     format!("{}{REVIEW_SUFFIX}", names::label(pair))
 }
@@ -421,11 +429,11 @@ fn read(file: &Path) -> Result<Vec<u8>, StoreError> {
     })
 }
 
-fn parse_mask(file: &Path, bytes: &[u8], pair: &str, finger: Finger) -> Result<StoredMask, StoreError> {
+fn parse_mask(file: &Path, bytes: &[u8], pair: &str, finger: &str) -> Result<StoredMask, StoreError> {
     let damaged = |reason: String| StoreError::Damaged { file: file.to_owned(), reason };
     let content: MaskFile = serde_json::from_slice(bytes).map_err(|err| damaged(err.to_string()))?;
     check_format(file, &content.format, FORMAT, content.version, VERSION)?;
-    if content.pair != pair || content.finger != finger.name() {
+    if content.pair != pair || content.finger != finger {
         return Err(damaged(format!("it belongs to the {} finger of {}", content.finger, content.pair)));
     }
     let mask = decode_runs(content.width, content.height, &content.runs).map_err(|err| damaged(err.to_string()))?;

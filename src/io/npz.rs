@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use super::pt::{Tensor, Values};
 use super::{atomic, files};
-use crate::domain::grid::Grid;
+use crate::domain::grid::{Grid, RgbGrid};
 
 /// Why an `.npz` file cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -46,7 +46,20 @@ pub enum NpzError {
 /// # Errors
 /// [`NpzError::Io`] if the file cannot be written.
 pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
-    let bytes = npy::bytes(&[image.height(), image.width()], &Values::F32(image.as_slice().to_vec()));
+    write_values(file, &[image.height(), image.width()], image.as_slice().to_vec())
+}
+
+/// Writes the planes of a color picture as `.npy`: f32, 3 x height x width.
+///
+/// # Errors
+/// [`NpzError::Io`] if the file cannot be written.
+pub fn write_npy_planes(file: &Path, picture: &RgbGrid) -> Result<(), NpzError> {
+    let values = (0..3).flat_map(|c| picture.as_slice().iter().map(move |pixel| pixel[c])).collect();
+    write_values(file, &[3, picture.height(), picture.width()], values)
+}
+
+fn write_values(file: &Path, shape: &[usize], values: Vec<f32>) -> Result<(), NpzError> {
+    let bytes = npy::bytes(shape, &Values::F32(values));
     atomic::write_bytes(file, &bytes).map_err(|source| NpzError::Io { file: file.to_owned(), source })
 }
 

@@ -14,8 +14,8 @@ use super::stl::{self, MeshError};
 use crate::domain::frames::{PlanarPose, xyz_quat_from_affine};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::mesh::TriMesh;
+use crate::domain::rig::lab;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::{Finger, bubble, gelslim};
 
 pub use manifest::{MANIFEST, Writing, unfinished};
 
@@ -179,9 +179,9 @@ fn pair_items(sample: &Sample) -> Result<[Items; 2], WriteError> {
 
     let (mut imprint, mut reference, mut contact, mut clean) = (vec![], vec![], vec![], vec![]);
     let (mut k, mut base_from_cameras, mut raw, mut untouched) = (vec![], vec![], vec![], vec![]);
-    for finger in Finger::BOTH {
-        let touch = sample.finger(finger).ok_or(incomplete("second finger"))?;
-        let bubble_touch = touch.bubble.as_ref().ok_or(incomplete("bubble touch"))?;
+    for finger in lab::PADS {
+        let touch = sample.pad(finger).ok_or(incomplete("second finger"))?;
+        let bubble_touch = touch.depth().ok_or(incomplete("bubble touch"))?;
         let camera = bubble_touch.camera.as_ref().ok_or(incomplete("bubble camera"))?;
         push_depth(&mut imprint, &bubble_touch.imprint)?;
         push_depth(&mut reference, &camera.depth_reference)?;
@@ -192,7 +192,7 @@ fn pair_items(sample: &Sample) -> Result<[Items; 2], WriteError> {
         let i = camera.intrinsics;
         k.extend([i.fx, 0.0, i.cx, 0.0, i.fy, i.cy, 0.0, 0.0, 1.0].map(|v| v as f32));
         base_from_cameras.push(base_from_grasp * camera.grasp_from_camera);
-        let images = touch.gelslim.as_ref().and_then(|g| g.images.as_ref()).ok_or(incomplete("GelSlim images"))?;
+        let images = touch.color().and_then(|g| g.images.as_ref()).ok_or(incomplete("GelSlim images"))?;
         push_planes(&mut raw, &images.raw)?;
         push_planes(&mut untouched, &images.reference)?;
     }
@@ -205,7 +205,7 @@ fn pair_items(sample: &Sample) -> Result<[Items; 2], WriteError> {
         ("tool_tr_quat", Tensor::f32(&[1, 7], frames(&[base_from_grasp * grasp_from_object.to_affine()])).into()),
         ("finger_tr_quat", Tensor::f32(&[2, 1, 7], frames(&base_from_cameras)).into()),
     ];
-    let depth_shape = [2, 1, bubble::HEIGHT, bubble::WIDTH];
+    let depth_shape = [2, 1, lab::BUBBLE.height, lab::BUBBLE.width];
     let mut bubble_items: Items = vec![
         ("bubble_imprint", Tensor::f32(&depth_shape, imprint).into()),
         ("bubble_depth_ref", Tensor::f32(&depth_shape, reference).into()),
@@ -218,7 +218,7 @@ fn pair_items(sample: &Sample) -> Result<[Items; 2], WriteError> {
         bubble_items.push(("imprint_clean", Tensor::f32(&depth_shape, clean).into()));
     }
     bubble_items.extend(pose.iter().cloned());
-    let image_shape = [2, 3, gelslim::HEIGHT, gelslim::WIDTH];
+    let image_shape = [2, 3, lab::GELSLIM.height, lab::GELSLIM.width];
     let mut gelslim_items: Items = vec![
         ("gelslim", Tensor::f32(&image_shape, raw).into()),
         ("gelslim_ref", Tensor::f32(&image_shape, untouched).into()),
@@ -229,7 +229,7 @@ fn pair_items(sample: &Sample) -> Result<[Items; 2], WriteError> {
 }
 
 fn push_depth(out: &mut Vec<f32>, map: &DepthMap) -> Result<(), WriteError> {
-    if map.size() != [bubble::WIDTH, bubble::HEIGHT] {
+    if map.size() != [lab::BUBBLE.width, lab::BUBBLE.height] {
         return Err(WriteError::Incomplete { missing: "bubble image of 175 x 140 pixels" });
     }
     out.extend(map.as_slice());
@@ -237,7 +237,7 @@ fn push_depth(out: &mut Vec<f32>, map: &DepthMap) -> Result<(), WriteError> {
 }
 
 fn push_planes(out: &mut Vec<f32>, picture: &RgbGrid) -> Result<(), WriteError> {
-    if picture.size() != [gelslim::WIDTH, gelslim::HEIGHT] {
+    if picture.size() != [lab::GELSLIM.width, lab::GELSLIM.height] {
         return Err(WriteError::Incomplete { missing: "GelSlim image of 427 x 320 pixels" });
     }
     for channel in 0..3 {

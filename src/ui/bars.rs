@@ -11,7 +11,6 @@ use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::library::Place;
 use crate::app::settings::{Theme, Workspace};
-use crate::domain::sensor::Finger;
 
 /// The bar at the top.
 pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -146,15 +145,12 @@ pub(super) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
-    for finger in Finger::BOTH {
+    for finger in cx.state.rig().pads() {
         let on = cx.state.selection.finger == finger;
-        let name = match finger {
-            Finger::Right => "Right",
-            Finger::Left => "Left",
-        };
-        let button = ui.add(egui::Button::selectable(on, RichText::new(name).size(12.0)).min_size(vec2(44.0, 20.0)));
+        let name = cx.state.rig().pad_name(finger).to_owned();
+        let button = ui.add(egui::Button::selectable(on, RichText::new(&name).size(12.0)).min_size(vec2(44.0, 20.0)));
         let button = button.accessible_name(format!("{name} finger"));
-        if button.on_hover_text(format!("Show the {} finger (U switches)", finger.name())).clicked() {
+        if button.on_hover_text(format!("Show the {} finger (U switches)", cx.state.finger_name(finger))).clicked() {
             cx.push(Command::SelectFinger(finger));
         }
     }

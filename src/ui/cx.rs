@@ -20,7 +20,7 @@ use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource, PairKey};
 use crate::app::state::State;
 use crate::domain::mesh::TriMesh;
 use crate::domain::postprocess::Stats;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, PerPad};
 
 /// What a pane may use while it is drawn.
 pub(super) struct Cx<'a> {
@@ -69,7 +69,7 @@ pub(super) struct Painting {
     /// The pane.
     pub pane: Pane,
     /// The finger.
-    pub finger: Finger,
+    pub finger: PadId,
 }
 
 /// Figures of a pair as they were when it was last on screen, for the table.
@@ -90,7 +90,7 @@ pub(super) struct SceneCloud {
     /// Counts up with every new cloud.
     pub revision: u64,
     /// Per finger: the membrane and the contact.
-    pub fingers: [Option<[Arc<[DVec3]>; 2]>; 2],
+    pub fingers: PerPad<[Arc<[DVec3]>; 2]>,
 }
 
 /// A CAD model as the renderer takes it.

@@ -11,7 +11,6 @@ use crate::app::command::Command;
 use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::domain::diffusion::GUIDANCE;
-use crate::domain::sensor::Finger;
 use crate::work::bundles::{BundleInfo, BundleKind};
 
 /// Width of the captions at the left.
@@ -58,8 +57,15 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
         let response = combo.show_ui(ui, |ui| {
             for bundle in bundles {
                 let chosen = bundle.name == current;
-                let option = ui.selectable_label(chosen, &bundle.name);
-                if option.on_hover_text(bundle.folder.display().to_string()).clicked() {
+                // One for other sensors stays in the list, and says why it cannot be used.
+                let misfit = bundle.ends(&cx.state.rig()).and_then(Result::err);
+                let label = egui::Button::selectable(chosen, egui::RichText::new(&bundle.name));
+                let option = ui.add_enabled(misfit.is_none(), label);
+                let option = match misfit {
+                    Some(misfit) => option.on_disabled_hover_text(misfit.to_string()),
+                    None => option.on_hover_text(bundle.folder.display().to_string()),
+                };
+                if option.clicked() {
                     new.bundle = Some(bundle.name.clone());
                 }
             }
@@ -262,7 +268,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
     let finger = cx.state.selection.finger;
     let Some(touch) = cx.state.touch_key(finger) else { return };
     let made: Vec<PredictionKey> = cx.state.results.made.get(&touch).cloned().unwrap_or_default();
-    ui.label(section(&format!("Results, {} finger", finger.name()), cx.p));
+    ui.label(section(&format!("Results, {} finger", cx.state.finger_name(finger)), cx.p));
     if made.is_empty() {
         ui.label(caption("None yet for this touch.", cx.p));
         return;
@@ -319,7 +325,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// Shows a prediction, and that of the other finger made with the same settings, if there is one.
 fn choose(cx: &mut Cx<'_>, recipe: &PredictionKey) {
     cx.push(Command::Choose(recipe.clone()));
-    for finger in Finger::BOTH {
+    for finger in cx.state.rig().pads() {
         let Some(touch) = cx.state.touch_key(finger) else { continue };
         let other = PredictionKey { touch, ..recipe.clone() };
         if other != *recipe && cx.state.results.predictions.contains(&other) {

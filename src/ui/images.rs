@@ -17,8 +17,8 @@ use crate::app::settings::{ColourMap, ColourRange, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::grid::{DepthMap, RgbGrid};
+use crate::domain::rig::{PadId, Rig, Sensor, SensorKind};
 use crate::domain::sample::Scale;
-use crate::domain::sensor::{Finger, gelslim_footprint_in_bubble};
 use crate::domain::units;
 use crate::domain::upright::Turn;
 use crate::work::error::TaskError;
@@ -58,19 +58,40 @@ fn source_note(state: &State) -> String {
         .join(" · ")
 }
 
-/// Where a bubble pixel appears in the GelSlim image of `size` pixels: the GelSlim sees the dashed rectangle,
-/// rotated by 180 degrees.
-fn gel_from_bubble(finger: Finger, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
-    let [cx, cy, w, h] = gelslim_footprint_in_bubble(finger).map(|v| v as f32);
-    let share = [(px[0] - cx) / w + 0.5, (px[1] - cy) / h + 0.5];
-    [(1.0 - share[0]) * size[0] as f32 - 0.5, (1.0 - share[1]) * size[1] as f32 - 0.5]
+/// Which part of a depth picture the color sensor sees (the dashed rectangle), and whether it sees it turned by 180
+/// degrees.
+#[derive(Clone, Copy)]
+struct Link {
+    window: [f64; 4],
+    turned: bool,
 }
 
-/// The opposite of [`gel_from_bubble`].
-fn bubble_from_gel(finger: Finger, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
-    let [cx, cy, w, h] = gelslim_footprint_in_bubble(finger).map(|v| v as f32);
-    let share = [1.0 - (px[0] + 0.5) / size[0].max(1) as f32, 1.0 - (px[1] + 0.5) / size[1].max(1) as f32];
-    [(share[0] - 0.5) * w + cx, (share[1] - 0.5) * h + cy]
+impl Link {
+    /// What the rig says; `None` where it does not.
+    fn of(rig: &Rig, finger: PadId) -> Option<Self> {
+        Some(Self { window: rig.color_window(finger)?.rectangle(), turned: rig.turned() })
+    }
+
+    /// Where a depth pixel appears in the color picture of `size` pixels.
+    fn color_from_depth(self, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
+        let [cx, cy, w, h] = self.window.map(|v| v as f32);
+        let share = [(px[0] - cx) / w + 0.5, (px[1] - cy) / h + 0.5].map(|s| if self.turned { 1.0 - s } else { s });
+        [share[0] * size[0] as f32 - 0.5, share[1] * size[1] as f32 - 0.5]
+    }
+
+    /// The opposite of [`Link::color_from_depth`].
+    fn depth_from_color(self, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
+        let [cx, cy, w, h] = self.window.map(|v| v as f32);
+        let share = [(px[0] + 0.5) / size[0].max(1) as f32, (px[1] + 0.5) / size[1].max(1) as f32];
+        let share = share.map(|s| if self.turned { 1.0 - s } else { s });
+        [(share[0] - 0.5) * w + cx, (share[1] - 0.5) * h + cy]
+    }
+}
+
+/// The stored size of a kind of picture, for a place where there is none yet.
+fn usual_size(cx: &Cx<'_>, kind: SensorKind) -> [usize; 2] {
+    let rig = cx.state.rig();
+    rig.first(kind).and_then(|id| rig.sensor(id)).map_or([4, 3], Sensor::size)
 }
 
 /// The pane of one kind of image, for every finger on screen.
@@ -80,8 +101,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
     ui.advance_cursor_after_rect(full);
     let bottom = if bar { full.bottom() - colorbar::HEIGHT } else { full.bottom() };
     let area = Rect::from_min_max(full.min, pos2(full.right(), bottom.max(full.top() + 16.0)));
-    // In the order right, left, whichever is active: images must not swap places when the finger is switched.
-    let fingers: Vec<Finger> = Finger::BOTH.into_iter().filter(|f| cx.state.selection.fingers().contains(f)).collect();
+    // In the order of the rig, whichever is active: images must not swap places when the finger is switched.
+    let shown = cx.state.fingers();
+    let fingers: Vec<PadId> = cx.state.rig().pads().filter(|f| shown.contains(f)).collect();
     let beside = area.width() >= area.height();
     let n = fingers.len() as f32;
     let mut histogram = None;
@@ -158,7 +180,7 @@ fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histog
 }
 
 /// One picture. Returns its histogram, where it has values.
-fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger) -> Option<Histogram> {
+fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId) -> Option<Histogram> {
     let state = cx.state;
     match pane {
         Pane::GelRaw | Pane::GelReference | Pane::GelDifference => {
@@ -177,7 +199,13 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger) -> Opt
         Pane::Measured => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Measured, finger)),
         Pane::Predicted => match state.preview(finger) {
             Some(preview) => preview_image(cx, ui, finger, preview),
-            None => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
+            None => match state.predicted_color(finger) {
+                Some(picture) => {
+                    gel_image(cx, ui, pane, finger, picture);
+                    None
+                }
+                None => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
+            },
         },
         _ => {
             let error = state.comparison(finger).and_then(Absent::NoPrediction, |c| Some(&c.error));
@@ -187,7 +215,7 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger) -> Opt
 }
 
 /// What stands where there is no picture: the one before, dimmed, while the next is on its way; else a sentence.
-fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, Finger), lookup: Lookup<'_, T>, size: [usize; 2]) {
+fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, PadId), lookup: Lookup<'_, T>, size: [usize; 2]) {
     match lookup {
         Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
             let rect = ui.available_rect_before_wrap();
@@ -195,8 +223,9 @@ fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, Finger), lo
             if let Some(picture) = cx.local.textures.last(slot) {
                 let gel = matches!(slot.0, Pane::GelRaw | Pane::GelReference | Pane::GelDifference);
                 let view = if gel { cx.local.gel_view } else { cx.local.bubble_view };
-                let map = CanvasMap::new(rect, size, view, gel);
-                let uv = if gel {
+                let turned = gel && cx.state.rig().turned();
+                let map = CanvasMap::new(rect, size, view, turned);
+                let uv = if turned {
                     Rect::from_min_max(pos2(1.0, 1.0), pos2(0.0, 0.0))
                 } else {
                     Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0))
@@ -271,25 +300,27 @@ pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     }
 }
 
-fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger, lookup: Lookup<'_, RgbGrid>) {
+fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lookup<'_, RgbGrid>) {
     let Some(image) = lookup.shown() else {
-        return placeholder(cx, ui, (pane, finger), lookup, [427, 320]);
+        let size = usual_size(cx, SensorKind::Color);
+        return placeholder(cx, ui, (pane, finger), lookup, size);
     };
     let Some(touch) = cx.state.touch_key(finger) else { return };
     let mut view = cx.local.gel_view;
-    let label = format!("{} {}", super::pane::title(pane), finger.name());
+    let label = format!("{} {}", super::pane::title(pane), cx.state.finger_name(finger));
     let canvas = ImageCanvas {
         label: &label,
         size: image.size(),
-        rotated: true,
+        rotated: cx.state.rig().turned(),
         primary: Primary::Pan,
         background: cx.p.canvas,
     };
     let output = canvas.show(ui, &mut view);
     cx.local.gel_view = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), (touch, pane), squares, || {
-        let picture = if pane == Pane::GelDifference {
+    let recipe = cx.state.chosen(finger).filter(|_| pane == Pane::Predicted);
+    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), (touch, pane, recipe), squares, || {
+        let picture = if matches!(pane, Pane::GelDifference | Pane::Predicted) {
             rgb_image(image, difference_gain(image), 128.0)
         } else {
             rgb_image(image, 1.0, 0.0)
@@ -303,16 +334,20 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: Finger, lookup: L
             cx.local.readout = Some(format!(
                 "{} {} ({x}, {y})   R {:.1}  G {:.1}  B {:.1} of 255",
                 super::pane::title(pane),
-                finger.name(),
+                cx.state.finger_name(finger),
                 v[0],
                 v[1],
                 v[2]
             ));
         }
-        hover(cx, finger, bubble_from_gel(finger, px, image.size()));
+        if let Some(link) = Link::of(&cx.state.rig(), finger) {
+            hover(cx, finger, link.depth_from_color(px, image.size()));
+        }
     }
-    if let Some(at) = cx.state.selection.hover.filter(|h| h.finger == finger) {
-        let px = gel_from_bubble(finger, at.at_px, image.size());
+    if let Some(at) = cx.state.selection.hover.filter(|h| h.finger == finger)
+        && let Some(link) = Link::of(&cx.state.rig(), finger)
+    {
+        let px = link.color_from_depth(at.at_px, image.size());
         if output.map.contains(px) {
             output.crosshair(px, Color32::WHITE);
         }
@@ -328,8 +363,8 @@ impl Palette {
 }
 
 /// `right` where the pane could be either finger's.
-fn finger_text(state: &State, finger: Finger) -> String {
-    let mut text = format!("{} finger", finger.name());
+fn finger_text(state: &State, finger: PadId) -> String {
+    let mut text = format!("{} finger", state.finger_name(finger));
     if let Some(first) = text.get_mut(0..1) {
         first.make_ascii_uppercase();
     }
@@ -340,7 +375,7 @@ fn finger_text(state: &State, finger: Finger) -> String {
 }
 
 /// Tells the other panes where the pointer is.
-fn hover(cx: &mut Cx<'_>, finger: Finger, at_px: [f32; 2]) {
+fn hover(cx: &mut Cx<'_>, finger: PadId, at_px: [f32; 2]) {
     cx.local.hover_claimed = true;
     let hover = Some(Hover { finger, at_px });
     if cx.state.selection.hover != hover {
@@ -352,11 +387,12 @@ fn depth_pane(
     cx: &mut Cx<'_>,
     ui: &mut Ui,
     pane: Pane,
-    finger: Finger,
+    finger: PadId,
     lookup: Lookup<'_, DepthMap>,
 ) -> Option<Histogram> {
     let Some(depth) = lookup.shown() else {
-        placeholder(cx, ui, (pane, finger), lookup, [175, 140]);
+        let size = usual_size(cx, SensorKind::Depth);
+        placeholder(cx, ui, (pane, finger), lookup, size);
         return None;
     };
     let stale = matches!(lookup, Lookup::Stale(_));
@@ -372,7 +408,7 @@ fn depth_pane(
         && cx.state.document.is_editable(cx.state.pair_name());
     let primary = if paintable { Primary::Caller } else { Primary::Pan };
     let mut view = cx.local.bubble_view;
-    let label = format!("{} {}", super::pane::title(pane), finger.name());
+    let label = format!("{} {}", super::pane::title(pane), cx.state.finger_name(finger));
     let canvas = ImageCanvas { label: &label, size: depth.size(), rotated: false, primary, background: cx.p.canvas };
     let output = canvas.show(ui, &mut view);
     cx.local.bubble_view = view;
@@ -390,8 +426,8 @@ fn depth_pane(
     if pane != Pane::Error {
         paint_mask(cx, ui, &output, source, finger);
     }
-    if cx.state.settings.footprint_visible {
-        output.dashed_rect(gelslim_footprint_in_bubble(finger), Color32::from_gray(235));
+    if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
+        output.dashed_rect(link.window, Color32::from_gray(235));
     }
     if let Some(px) = output.hovered {
         readout(cx, &output, pane, finger, depth, px);
@@ -418,10 +454,10 @@ fn depth_pane(
 }
 
 /// A prediction on its way, in the colours and the place of the result: nothing can be painted or measured on it.
-fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger, preview: &Arc<Preview>) -> Option<Histogram> {
+fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Preview>) -> Option<Histogram> {
     let pane = Pane::Predicted;
     let mut view = cx.local.bubble_view;
-    let label = format!("{} {}, preview", super::pane::title(pane), finger.name());
+    let label = format!("{} {}, preview", super::pane::title(pane), cx.state.finger_name(finger));
     let canvas = ImageCanvas {
         label: &label,
         size: preview.picture.depth.size(),
@@ -439,8 +475,8 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger, preview: &Arc<Pre
     });
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
     output.paint(texture, Color32::WHITE);
-    if cx.state.settings.footprint_visible {
-        output.dashed_rect(gelslim_footprint_in_bubble(finger), Color32::from_gray(235));
+    if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
+        output.dashed_rect(link.window, Color32::from_gray(235));
     }
     if let Some(px) = output.hovered {
         readout(cx, &output, pane, finger, &preview.picture.depth, px);
@@ -452,7 +488,7 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger, preview: &Arc<Pre
     histogram
 }
 
-fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
+fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     let text = finger_text(cx.state, finger);
     // The error's own figures stand in the other corner: one line has no room for more than the scale.
     let note = if pane == Pane::Error { scale_note(cx.state).to_owned() } else { source_note(cx.state) };
@@ -485,21 +521,25 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger) {
 }
 
 /// The value under the pointer, in millimetres and in the unit that is stored.
-fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: Finger, depth: &DepthMap, px: [f32; 2]) {
+fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, depth: &DepthMap, px: [f32; 2]) {
     let Some((x, y)) = output.map.pixel(px) else { return };
     let Some(v) = depth.get(x, y).copied() else { return };
     let name = super::pane::title(pane);
     let note = scale_note(cx.state);
     let note = if note.is_empty() { String::new() } else { format!(" ({note})") };
     cx.local.readout = Some(if v.is_finite() {
-        format!("{name} {} ({x}, {y})   {}{note}   {v:.6} m", finger.name(), units::text_mm(f64::from(v)))
+        format!(
+            "{name} {} ({x}, {y})   {}{note}   {v:.6} m",
+            cx.state.finger_name(finger),
+            units::text_mm(f64::from(v))
+        )
     } else {
-        format!("{name} {} ({x}, {y})   no measurement", finger.name())
+        format!("{name} {} ({x}, {y})   no measurement", cx.state.finger_name(finger))
     });
 }
 
 /// The mask in force as a veil with an outline, or the outline alone.
-fn paint_mask(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: ImprintSource, finger: Finger) {
+fn paint_mask(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: ImprintSource, finger: PadId) {
     let settings = &cx.state.settings;
     if !settings.mask_visible || ui.input(|i| i.key_down(eframe::egui::Key::X)) && !ui.ctx().egui_wants_keyboard_input()
     {
@@ -523,7 +563,7 @@ fn paint_mask(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: ImprintSo
 
 /// Walks every pointer event of the frame: at a low frame rate one frame holds many moves, and a stroke must follow
 /// all of them.
-fn paint_stroke(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, pane: Pane, source: ImprintSource, finger: Finger) {
+fn paint_stroke(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, pane: Pane, source: ImprintSource, finger: PadId) {
     use eframe::egui::Event;
     let here = Painting { pane, finger };
     let tool = cx.state.settings.mask.tool;
@@ -582,14 +622,16 @@ mod tests {
 
     #[test]
     fn the_cross_hair_finds_its_way_between_the_sensors() {
-        for finger in Finger::BOTH {
-            let [cx, cy, w, h] = gelslim_footprint_in_bubble(finger).map(|v| v as f32);
-            let middle = gel_from_bubble(finger, [cx, cy], [427, 320]);
+        let rig = Rig::lab();
+        for finger in rig.pads() {
+            let link = Link::of(&rig, finger).unwrap();
+            let [cx, cy, w, h] = link.window.map(|v| v as f32);
+            let middle = link.color_from_depth([cx, cy], [427, 320]);
             assert!((middle[0] - 213.0).abs() < 1e-3 && (middle[1] - 159.5).abs() < 1e-3);
             // The GelSlim is rotated: its first pixel is the last corner of the rectangle.
-            let corner = gel_from_bubble(finger, [cx + w * 0.5, cy + h * 0.5], [427, 320]);
+            let corner = link.color_from_depth([cx + w * 0.5, cy + h * 0.5], [427, 320]);
             assert!(corner[0].abs() < 0.51 && corner[1].abs() < 0.51, "{corner:?}");
-            let back = bubble_from_gel(finger, gel_from_bubble(finger, [50.0, 60.0], [427, 320]), [427, 320]);
+            let back = link.depth_from_color(link.color_from_depth([50.0, 60.0], [427, 320]), [427, 320]);
             assert!((back[0] - 50.0).abs() < 1e-3 && (back[1] - 60.0).abs() < 1e-3);
         }
     }

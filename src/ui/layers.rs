@@ -17,7 +17,6 @@ use crate::app::workbench::{Layer, WorkbenchCommand};
 use crate::domain::align::Observability;
 use crate::domain::align::reason::Reason;
 use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::sensor::Finger;
 use crate::domain::units;
 use crate::work::layers::LayerResult;
 
@@ -187,19 +186,21 @@ fn row(ui: &mut Ui, swatch: Option<Color32>, name: (&str, Color32), numbers: &[(
 fn reasons(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
     ui.add_space(2.0);
     ui.label(section("What became of the pixels", cx.p));
-    let heads = ["right", "left"].map(|h| (h.to_owned(), cx.p.weak));
+    let rig = cx.state.rig();
+    let heads: Vec<_> = rig.pads().map(|finger| (rig.pad_key(finger).into_owned(), cx.p.weak)).collect();
     ui.spacing_mut().item_spacing.y = 0.0;
     row(ui, None, ("", cx.p.weak), &heads, 56.0);
     // What did not happen is said in one line.
-    let happened = |reason: &Reason| layers.counts.iter().any(|counts| counts[*reason as usize] > 0);
+    let happened = |reason: &Reason| layers.counts.iter().flatten().any(|counts| counts[*reason as usize] > 0);
     for reason in Reason::iter().filter(happened) {
         let [r, g, b] = reason_rgb(reason);
-        let numbers = Finger::BOTH.map(|finger| {
-            let count = layers.counts[finger.index()][reason as usize];
-            let there = layers.reasons[finger.index()].is_some();
+        let numbers = rig.pads().map(|finger| {
+            let count = layers.counts.get(finger).map_or(0, |counts| counts[reason as usize]);
+            let there = layers.reasons[finger].is_some();
             let color = if count > 0 { cx.p.strong } else { cx.p.weak };
             (if there { count.to_string() } else { "–".to_owned() }, color)
         });
+        let numbers: Vec<_> = numbers.collect();
         let response = ui.scope(|ui| {
             row(ui, Some(Color32::from_rgb(r, g, b)), (&reason.to_string(), cx.p.text), &numbers, 56.0);
         });

@@ -20,7 +20,7 @@ use crate::app::keys::{ImprintSource, ShiftMode, shift_tooltip};
 use crate::app::state::Lookup;
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::postprocess::{ChainReading, Flag, Severity, Stage, StageRecord};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::PadId;
 use crate::domain::units::{fixed, mm};
 use crate::work::ledger::LedgerResult;
 
@@ -80,12 +80,13 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// Which finger it is about, and the mapping.
-fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: Finger) {
+fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
     ui.horizontal(|ui| {
-        for of in Finger::BOTH {
-            let text = RichText::new(of.name()).size(SMALL);
+        for of in cx.state.rig().pads() {
+            let name = cx.state.finger_name(of);
+            let text = RichText::new(&*name).size(SMALL);
             let button = ui.add(egui::Button::selectable(of == finger, text).min_size(vec2(0.0, 20.0)));
-            let button = button.accessible_name(format!("Depth chain of the {} finger", of.name()));
+            let button = button.accessible_name(format!("Depth chain of the {name} finger"));
             if button.on_hover_text("The finger that the chain is of").clicked() {
                 cx.push(Command::SelectFinger(of));
             }
@@ -154,7 +155,7 @@ fn flags(cx: &Cx<'_>, ui: &mut Ui, flags: &[Flag]) {
     }
 }
 
-fn stages(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: Finger) {
+fn stages(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
     ui.add_space(2.0);
     ui.label(section("Stages", cx.p)).on_hover_text(
         "From the decoder (no unit, -1 to 1) to metres. Pictures and histograms span each stage's own values",
@@ -164,7 +165,7 @@ fn stages(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: Finger) {
     }
 }
 
-fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: Finger) {
+fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: PadId) {
     let width = ui.available_width();
     let (rect, response) = ui.allocate_exact_size(vec2(width, THUMB.y + 4.0), Sense::hover());
     let metres = record.stage.is_metres();
@@ -232,7 +233,7 @@ fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: Finger) {
     response.on_hover_text(tip);
 }
 
-fn against(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: Finger) {
+fn against(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
     ui.add_space(2.0);
     ui.label(section("Prediction against truth", cx.p)).on_hover_text(
         "How many pixels have which measured and which predicted depth; brighter is more. Dashed: equal. Solid: the \

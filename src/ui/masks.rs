@@ -12,7 +12,6 @@ use crate::app::document::Review;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::{BRUSH_RADIUS_PX, MaskSettings, MaskSource, MaskTool};
 use crate::app::state::Lookup;
-use crate::domain::sensor::{Finger, bubble};
 
 /// The pane.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -57,7 +56,7 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
         if response.changed() || response.double_clicked() {
             cx.push(Command::SetBrushRadius(radius));
         }
-        let mm = f64::from(radius) / bubble::PX_PER_M * 1e3;
+        let mm = f64::from(radius) / cx.state.rig().depth().map_or(f64::NAN, |sensor| sensor.px_per_m) * 1e3;
         ui.label(caption(format!("{mm:.2} mm"), cx.p));
         response
             .on_hover_text("Radius of brush and eraser, image pixels ([ and ], or Shift + wheel). Double-click resets");
@@ -121,7 +120,7 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
     if new != *settings {
         cx.push(Command::SetMask(new));
     }
-    for finger in Finger::BOTH.into_iter().filter(|f| cx.state.selection.fingers().contains(f)) {
+    for finger in cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f)) {
         let text = match cx.state.mask_in_force(ImprintSource::Measured, finger) {
             Ok(mask) => mask.label,
             Err(Lookup::Failed(err)) => err.why.clone(),
@@ -130,7 +129,9 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
         };
         let by_hand = cx.state.document.hand_mask(cx.state.pair_name(), finger).is_some();
         let color = if by_hand { cx.p.strong } else { cx.p.weak };
-        let label = egui::Label::new(RichText::new(format!("{}: {text}", finger.name())).size(SMALL).color(color));
+        let label = egui::Label::new(
+            RichText::new(format!("{}: {text}", cx.state.finger_name(finger))).size(SMALL).color(color),
+        );
         ui.add(label.truncate()).on_hover_text("The mask in force on the measured imprint of this finger");
     }
 }
@@ -138,7 +139,7 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(2.0);
     let finger = cx.state.selection.finger;
-    ui.label(section(&format!("Correct, {} finger", finger.name()), cx.p));
+    ui.label(section(&format!("Correct, {} finger", cx.state.finger_name(finger)), cx.p));
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         cx.action_button(ui, Action::AdoptAutomatic, "Take automatic");
@@ -148,7 +149,7 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let fingers = cx.state.selection.fingers();
+        let fingers = cx.state.fingers();
         let name = cx.state.pair_name();
         let undo = cx.state.history.next_undo(name, &fingers).map(|g| g.name);
         let redo = cx.state.history.next_redo(name, &fingers).map(|g| g.name);

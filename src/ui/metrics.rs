@@ -15,7 +15,6 @@ use crate::app::state::{Absent, Lookup};
 use crate::domain::hand::{HandPose, PoseDifference};
 use crate::domain::postprocess::{Severity, Stage, Stats};
 use crate::domain::sample::Scale;
-use crate::domain::sensor::Finger;
 use crate::domain::units;
 use crate::work::compare::Comparison;
 use strum::IntoEnumIterator as _;
@@ -139,7 +138,7 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
         "PSNR and SSIM of the imprints in metres with the lab's peak of 22.5 mm as range; where the source lost its \
          scale, both images are scaled to 0..1 one by one (min-max)",
     );
-    let fingers = Finger::BOTH.into_iter().filter(|f| cx.state.selection.fingers().contains(f));
+    let fingers = cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f));
     for finger in fingers {
         match cx.state.comparison(finger) {
             Lookup::Ready(c) | Lookup::Stale(c) => {
@@ -148,7 +147,7 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
                     None => "not defined".to_owned(),
                 };
                 if cx.state.selection.both_fingers {
-                    ui.label(caption(format!("{} finger", finger.name()), cx.p));
+                    ui.label(caption(format!("{} finger", cx.state.finger_name(finger)), cx.p));
                 }
                 let (psnr, ssim) = match c.scale {
                     Scale::Measured => ("PSNR (peak 22.5 mm)", "SSIM (range 22.5 mm)"),
@@ -255,7 +254,7 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
         return;
     }
     ui.add_space(4.0);
-    ui.label(section(&format!("Ledger, {} finger", finger.name()), cx.p))
+    ui.label(section(&format!("Ledger, {} finger", cx.state.finger_name(finger)), cx.p))
         .on_hover_text("What each stage of the depth chain left behind: smallest, mean, deviation, largest");
     if let Some(found) = cx.state.ledger(finger).shown() {
         let serious = found.ledger.flags.iter().filter(|f| f.severity < Severity::Info).count();

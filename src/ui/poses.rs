@@ -2,7 +2,6 @@
 //! and joint.
 
 use eframe::egui::{Align2, Color32, FontId, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
-use strum::IntoEnumIterator as _;
 
 use super::cx::{Cx, side_color};
 use super::scene::error_color;
@@ -30,10 +29,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
             ];
             let heads = columns.map(|(name, color)| ([name.to_owned(), String::new()], color));
             row(ui, ("Off the truth", cx.p.weak), &heads, 18.0);
-            for of in PoseOf::iter() {
+            for of in PoseOf::all(&cx.state.rig()) {
+                let name = of.name(&cx.state.rig());
                 let cells = cells(cx, of);
                 ui.painter().hline(ui.max_rect().x_range(), ui.cursor().top(), (1.0, cx.p.line));
-                row(ui, (of.name(), cx.p.text), &cells, ROW);
+                row(ui, (name.as_str(), cx.p.text), &cells, ROW);
             }
             ui.add_space(6.0);
             let text = match cx.state.truth() {

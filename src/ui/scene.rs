@@ -19,7 +19,7 @@ use crate::app::command::{CameraPreset, Command, Hover};
 use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
 use crate::app::workbench::WorkbenchCommand;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::PadId;
 use crate::domain::units;
 use crate::gpu::pick::nearest_point;
 use crate::gpu::view::{Camera, Preset};
@@ -125,10 +125,9 @@ fn other_side(source: ImprintSource) -> ImprintSource {
 }
 
 /// The point of a cloud that is meant by a position in the picture, physical pixels: finger and index.
-fn nearest(clouds: &Clouds, camera: &Camera, size: [u32; 2], pointer: glam::DVec2) -> Option<(Finger, usize)> {
-    let mut best: Option<(Finger, usize, f64, f64)> = None;
-    for finger in Finger::BOTH {
-        let Some(cloud) = clouds.finger(finger) else { continue };
+fn nearest(clouds: &Clouds, camera: &Camera, size: [u32; 2], pointer: glam::DVec2) -> Option<(PadId, usize)> {
+    let mut best: Option<(PadId, usize, f64, f64)> = None;
+    for (finger, cloud) in clouds.fingers.entries() {
         let hit = nearest_point(&cloud.points, &DAffine3::IDENTITY, camera, size, pointer, PICK_PX);
         if let Some(hit) = hit {
             let better = best.is_none_or(|(_, _, px, depth)| {
@@ -169,7 +168,7 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, c
     }
     cx.local.readout = Some(format!(
         "3D {} ({}, {})   x {:.2}  y {:.2}  z {:.2} mm in the grasp frame",
-        finger.name(),
+        cx.state.finger_name(finger),
         pixel[0],
         pixel[1],
         units::mm(point.x),

@@ -12,7 +12,7 @@ use crate::app::command::Command;
 use crate::app::document::Review;
 use crate::app::keys::ImprintSource;
 use crate::domain::dataset::PairId;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::PadId;
 
 /// Height of a row, points.
 const ROW: f32 = 24.0;
@@ -33,7 +33,7 @@ struct Row {
     pair: PairId,
     name: String,
     tool: String,
-    finger: Option<Finger>,
+    finger: Option<PadId>,
     review: Review,
     numbers: [Option<f64>; 5],
     /// Whether the poses were set by hand.
@@ -77,7 +77,7 @@ fn rows(cx: &Cx<'_>) -> Vec<Row> {
     let Some(open) = &state.library.open else { return Vec::new() };
     let mut out = Vec::new();
     let mut with_prediction = std::collections::BTreeSet::new();
-    let row = |pair: PairId, finger: Option<Finger>, image: [Option<f64>; 3]| {
+    let row = |pair: PairId, finger: Option<PadId>, image: [Option<f64>; 3]| {
         let entry = state.library.entry(pair)?;
         let seen = cx.local.seen.get(&open.key(pair)).copied().unwrap_or_default();
         let angle = |source: ImprintSource| seen.error_rad[source as usize].map(f64::to_degrees);
@@ -206,7 +206,7 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: &Row) {
         Color32::TRANSPARENT
     };
     ui.painter().rect_filled(rect, 3.0, fill);
-    let finger = row.finger.map_or("both", Finger::name);
+    let finger = row.finger.map_or("both".into(), |finger| cx.state.finger_name(finger));
     for (i, (x, w)) in columns(rect.left(), rect.width()).into_iter().enumerate() {
         let cell = egui::Rect::from_min_size(pos2(x, rect.top()), vec2(w, ROW));
         let painter = ui.painter_at(cell);
@@ -222,7 +222,7 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: &Row) {
         match i {
             0 => text(&row.name, p.strong),
             1 => text(&row.tool, p.text),
-            2 => text(finger, p.text),
+            2 => text(&finger, p.text),
             i => {
                 let v = row.numbers[i - 3];
                 let decimals = [1, 3, 2, 1, 1][i - 3];

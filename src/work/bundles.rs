@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::error::TaskError;
 use crate::domain::dataset::Problem;
 use crate::domain::diffusion::GenerateConfig;
-use crate::infer::bundle::{self, Bundle, BundleSpec};
+use crate::domain::rig::Rig;
+use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, SensorPair};
 use crate::infer::generator::GenerateError;
 
 /// A model bundle that was found.
@@ -25,7 +26,7 @@ pub struct BundleInfo {
 }
 
 /// The choices that a generator's bundle leaves.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GeneratorInfo {
     /// What it recommends.
     pub defaults: GenerateConfig,
@@ -33,12 +34,14 @@ pub struct GeneratorInfo {
     pub training_steps: usize,
     /// Whether it was trained for guidance.
     pub guided: bool,
+    /// The sensors between which it predicts.
+    pub sensors: SensorPair,
 }
 
 /// What a bundle does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BundleKind {
-    /// GelSlim image to Soft Bubble imprint.
+    /// What one sensor felt to what another would have felt.
     Generator,
     /// Imprint to contact mask.
     Mask,
@@ -73,14 +76,28 @@ impl BundleInfo {
                 defaults: spec.defaults,
                 training_steps: spec.schedule.training_steps(),
                 guided: spec.guidance.is_some(),
+                sensors: spec.sensors(),
             }),
         }
+    }
+
+    /// Where the bundle, if it is a generator, starts and ends in `rig`; `None` for another kind of bundle.
+    ///
+    /// # Errors
+    /// [`Misfit`].
+    pub fn ends(&self, rig: &Rig) -> Option<Result<Ends, Misfit>> {
+        Some(self.generator.as_ref()?.sensors.ends(&self.name, rig))
+    }
+
+    /// Whether it can be used with the sensors of `rig`.
+    pub fn fits(&self, rig: &Rig) -> bool {
+        self.ends(rig).is_none_or(|ends| ends.is_ok())
     }
 
     /// # Errors
     /// If `scale` guides and the generator was not trained for guidance.
     pub fn check_guidance(&self, scale: f64) -> Result<(), GenerateError> {
-        match self.generator {
+        match &self.generator {
             Some(generator) if !generator.guided && scale != 1.0 => {
                 Err(GenerateError::NoGuidance { bundle: self.name.clone(), scale })
             }
@@ -120,11 +137,11 @@ pub fn find(folders: &[PathBuf]) -> FoundBundles {
 }
 
 impl FoundBundles {
-    /// The bundle in the named folder, else the first found of its kind.
+    /// The bundle in the named folder, else the first found of its kind that fits the sensors of `rig`.
     ///
     /// # Errors
     /// If the named one cannot be opened or is of another kind, or none was found; then with what was refused, and why.
-    pub fn take(&self, kind: BundleKind, named: Option<&Path>) -> Result<BundleInfo, TaskError> {
+    pub fn take(&self, kind: BundleKind, named: Option<&Path>, rig: &Rig) -> Result<BundleInfo, TaskError> {
         let what = format!("Look for a {}", kind.name());
         if let Some(folder) = named {
             let bundle = Bundle::open(folder).map_err(|err| TaskError::from_error(&what, &err))?;
@@ -135,10 +152,15 @@ impl FoundBundles {
             }
             return Ok(info);
         }
-        self.bundles.iter().find(|bundle| bundle.kind == kind).cloned().ok_or_else(|| {
+        self.bundles.iter().find(|bundle| bundle.kind == kind && bundle.fits(rig)).cloned().ok_or_else(|| {
             let refused: Vec<String> =
                 self.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
-            let why = format!("no {} bundle was found{}", kind.name(), refused.concat());
+            let why = match kind {
+                BundleKind::Generator => {
+                    format!("no generator bundle for {} was found{}", rig.name, refused.concat())
+                }
+                _ => format!("no {} bundle was found{}", kind.name(), refused.concat()),
+            };
             TaskError::new(what, why).with_hint("Name one with an option, or put it into a folder of bundles.")
         })
     }

@@ -5,14 +5,14 @@ use glam::DVec3;
 use super::error::TaskError;
 use crate::domain::cloud;
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::sample::{BubbleCamera, Sample};
-use crate::domain::sensor::Finger;
+use crate::domain::sample::{DepthCamera, Sample};
+use crate::domain::rig::{PadId, PerPad};
 
 /// The surface points of both fingers in the grasp frame.
 #[derive(Clone, Debug, Default)]
 pub struct Clouds {
-    /// By [`Finger::index`].
-    pub fingers: [Option<FingerCloud>; 2],
+    /// Per finger.
+    pub fingers: PerPad<FingerCloud>,
 }
 
 /// The surface points of one finger, one per pixel with a measurement, row by row.
@@ -28,8 +28,8 @@ pub struct FingerCloud {
 
 impl Clouds {
     /// The cloud of one finger.
-    pub fn finger(&self, finger: Finger) -> Option<&FingerCloud> {
-        self.fingers[finger.index()].as_ref()
+    pub fn finger(&self, finger: PadId) -> Option<&FingerCloud> {
+        self.fingers[finger].as_ref()
     }
 
     /// The contact points of both fingers, right first: what is registered.
@@ -57,7 +57,7 @@ impl FingerCloud {
 ///
 /// # Errors
 /// If the sizes differ or the camera's numbers cannot be right.
-pub fn finger_cloud(imprint: &DepthMap, camera: &BubbleCamera, mask: Option<&Mask>) -> Result<FingerCloud, TaskError> {
+pub fn finger_cloud(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Result<FingerCloud, TaskError> {
     let lifted = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error("Point cloud", &err))?;
     if let Some(mask) = mask.filter(|mask| mask.size() != imprint.size()) {
         let why = format!("the mask has {:?} pixels, the imprint {:?}", mask.size(), imprint.size());
@@ -71,17 +71,17 @@ pub fn finger_cloud(imprint: &DepthMap, camera: &BubbleCamera, mask: Option<&Mas
     Ok(FingerCloud { points: lifted.points, pixels: lifted.pixels, contact })
 }
 
-/// The surface points of both fingers of a sample: `parts` holds imprint and mask by [`Finger::index`]; a finger
-/// without a camera is left out.
+/// The surface points of both fingers of a sample: `parts` holds imprint and mask; a finger without a
+/// camera is left out.
 ///
 /// # Errors
 /// As [`finger_cloud`].
-pub fn clouds(sample: &Sample, parts: [Option<(&DepthMap, Option<&Mask>)>; 2]) -> Result<Clouds, TaskError> {
+pub fn clouds(sample: &Sample, parts: &PerPad<(&DepthMap, Option<&Mask>)>) -> Result<Clouds, TaskError> {
     let mut clouds = Clouds::default();
-    for finger in Finger::BOTH {
-        let camera = sample.finger(finger).and_then(|t| t.camera());
-        if let (Some((imprint, mask)), Some(camera)) = (parts[finger.index()], camera) {
-            clouds.fingers[finger.index()] = Some(finger_cloud(imprint, camera, mask)?);
+    for finger in sample.rig.pads() {
+        let camera = sample.pad(finger).and_then(|t| t.camera());
+        if let (Some((imprint, mask)), Some(camera)) = (parts[finger], camera) {
+            clouds.fingers[finger] = Some(finger_cloud(imprint, camera, mask)?);
         }
     }
     Ok(clouds)
@@ -100,7 +100,7 @@ mod tests {
         };
         assert_eq!(cloud.at_pixel(3, 2), Some(2));
         assert_eq!(cloud.at_pixel(2, 2), None);
-        let clouds = Clouds { fingers: [None, Some(cloud)] };
+        let clouds = Clouds { fingers: [None, Some(cloud)].into() };
         assert_eq!(clouds.contact_points().len(), 2);
     }
 }

@@ -70,10 +70,11 @@ pub fn compare_parts(
     predicted: &DepthMap,
     measured: &DepthMap,
     scale: Scale,
-    seen: &Mask,
+    seen: Option<&Mask>,
 ) -> Result<Comparison, TaskError> {
     let fail = |err: metrics::MetricError| TaskError::from_error("Compare prediction and measurement", &err);
     let whole = compare(predicted, measured, scale)?;
+    let Some(seen) = seen else { return Ok(whole) };
     let mut split = metrics::split(predicted, measured, seen, LAB_PEAK_M).map_err(fail)?;
     if scale == Scale::Assumed {
         // Lengths stay in the assumed metres; PSNR and SSIM are of the stretched images, as those of the whole are.

@@ -8,8 +8,8 @@ use super::job::JobCx;
 use super::labels::{Labels, PairLabels, Review};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Mask;
+use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::io::dataset::Dataset;
 use crate::io::export_unet::{self, ExportConfig, ExportEntry, ExportReport, LoadFailure};
 
@@ -27,12 +27,12 @@ pub struct HandMasks<'a> {
 
 impl HandMasks<'_> {
     /// The pairs and fingers that have one.
-    fn all(&self) -> BTreeSet<(String, Finger)> {
-        let mut all: BTreeSet<(String, Finger)> = self.labels.masks().into_iter().collect();
+    fn all(&self, rig: &Rig) -> BTreeSet<(String, PadId)> {
+        let mut all: BTreeSet<(String, PadId)> = self.labels.masks().into_iter().collect();
         for (pair, labels) in self.changed {
-            for finger in Finger::BOTH {
+            for finger in rig.pads() {
                 let key = (pair.clone(), finger);
-                match labels.masks[finger.index()] {
+                match labels.masks[finger] {
                     Some(_) => all.insert(key),
                     None => all.remove(&key),
                 };
@@ -42,12 +42,12 @@ impl HandMasks<'_> {
     }
 
     /// The mask of one finger, if it has one.
-    fn get(&self, pair: &str, finger: Finger) -> Result<Option<Mask>, TaskError> {
+    fn get(&self, pair: &str, finger: PadId) -> Result<Option<Mask>, TaskError> {
         let labels = match self.changed.get(pair) {
             Some(labels) => labels.clone(),
             None => self.labels.load(pair)?,
         };
-        Ok(labels.masks[finger.index()].as_ref().map(|hand| (*hand.mask).clone()))
+        Ok(labels.masks[finger].as_ref().map(|hand| (*hand.mask).clone()))
     }
 
     /// The review states that are not "todo", by pair name.
@@ -79,7 +79,7 @@ pub struct Exported {
 }
 
 /// Makes the mask of a finger that has none by hand.
-pub type Automatic<'a> = &'a mut dyn FnMut(&Sample, Finger, Option<&str>) -> Result<Mask, TaskError>;
+pub type Automatic<'a> = &'a mut dyn FnMut(&Sample, PadId, Option<&str>) -> Result<Mask, TaskError>;
 
 /// Writes images and masks of the pairs of a data set, and reads them back by the loader's rules. Pairs marked *skip* are
 /// left out. Without `automatic`, only masks drawn by hand are written.
@@ -95,13 +95,14 @@ pub fn export_masks(
     mut automatic: Option<Automatic<'_>>,
     cx: &JobCx,
 ) -> Result<Exported, TaskError> {
-    let (by_hand, reviews) = (masks.all(), masks.reviews());
+    let (by_hand, reviews) = (masks.all(&dataset.rig), masks.reviews());
     let all = || (0..dataset.index.pairs.len() as u32).map(PairId).collect::<Vec<_>>();
     let (mut entries, mut ids, mut skipped) = (Vec::new(), Vec::new(), 0);
     for id in setup.pairs.clone().unwrap_or_else(all) {
         let Some(entry) = dataset.index.get(id) else { continue };
-        let wanted: Vec<Finger> = Finger::BOTH
-            .into_iter()
+        let wanted: Vec<PadId> = dataset
+            .rig
+            .pads()
             .filter(|finger| automatic.is_some() || by_hand.contains(&(entry.name.clone(), *finger)))
             .collect();
         if !wanted.is_empty() && reviews.get(&entry.name) == Some(&Review::Skip) {
@@ -128,13 +129,14 @@ pub fn export_masks(
         export_unet::check_stored(store, stored).map_err(|err| TaskError::from_error(WHAT, &err))?;
     }
     let total = entries.len() as u64;
+    let split = ExportConfig { rig: dataset.rig.clone(), ..setup.split.clone() };
     let mut done = Exported { report: ExportReport::default(), by_hand: 0, skipped };
-    done.report = export_unet::export(folder, &entries, &setup.split, |at| {
+    done.report = export_unet::export(folder, &entries, &split, |at| {
         let entry = &entries[at];
         cx.check(WHAT).map_err(|_| LoadFailure::Stop)?;
-        cx.progress(at as u64, total, format!("{}, {}", entry.pair, entry.finger.name()));
+        cx.progress(at as u64, total, format!("{}, {}", entry.pair, dataset.rig.pad_key(entry.finger)));
         let sample = dataset.load(ids[at])?;
-        let bubble = sample.finger(entry.finger).and_then(|touch| touch.bubble.as_ref());
+        let bubble = sample.pad(entry.finger).and_then(|touch| touch.depth());
         let imprint = bubble.ok_or_else(|| TaskError::new(WHAT, "the finger has no imprint"))?.imprint.clone();
         let drawn = match by_hand.contains(&(entry.pair.clone(), entry.finger)) {
             true => masks.get(&entry.pair, entry.finger)?,

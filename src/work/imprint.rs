@@ -2,11 +2,11 @@
 
 use super::error::TaskError;
 use super::models::{Chains, Prediction};
-use crate::domain::grid::{DepthMap, Grid};
+use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{DepthChain, PostprocessError, RawPrediction, ShiftMode};
-use crate::domain::resample::bilinear;
-use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
+use crate::domain::resample::{bilinear, bilinear_rgb};
+use crate::domain::sample::{PadTouch, Sample};
+use crate::domain::rig::PadId;
 
 /// Longest side of a thumbnail, pixels.
 const THUMBNAIL_PX: usize = 44;
@@ -30,10 +30,22 @@ pub fn imprint_of(
     prediction: &Prediction,
     shift: ShiftMode,
     sample: &Sample,
-    finger: Finger,
+    finger: PadId,
 ) -> Result<DepthMap, TaskError> {
-    let bubble = sample.finger(finger).and_then(|t| t.bubble.as_ref());
+    let bubble = sample.pad(finger).and_then(|t| t.depth());
     imprint(prediction, shift, bubble.map_or([0, 0], |b| b.imprint.size()))
+}
+
+/// A prediction of a color sensor, as large as that sensor's picture `size` (`[width, height]`; with a zero in it the
+/// bundle's own size is kept): the difference on the 0..255 scale. `None` where it is depth that was predicted.
+///
+/// # Errors
+/// If the steps of the bundle do not fit its output.
+pub fn color(prediction: &Prediction, size: [usize; 2]) -> Result<Option<RgbGrid>, TaskError> {
+    let Some(chain) = prediction.color else { return Ok(None) };
+    let color = chain.run(&prediction.raw).map_err(|err| TaskError::from_error("Color picture", &err))?;
+    let fits = color.size() == size || size.contains(&0);
+    Ok(Some(if fits { color } else { bilinear_rgb(&color, size[0], size[1]) }))
 }
 
 /// A decoder's picture in metres, as large as the bubble image `size` (`[width, height]`; with a zero in it the chain's
@@ -77,10 +89,9 @@ pub fn chain_of(chains: &Chains, bundle: &str, shift: ShiftMode) -> Result<Depth
     }
 }
 
-/// A small picture of the measured imprint of the right finger, else of the left, else nothing (an empty image).
+/// A small picture of the measured imprint of the first finger that has one, else nothing (an empty image).
 pub fn thumbnail(sample: &Sample) -> DepthMap {
-    let bubble = |finger: Finger| sample.finger(finger).and_then(|t| t.bubble.as_ref());
-    let Some(bubble) = Finger::BOTH.into_iter().find_map(bubble) else { return Grid::filled(0, 0, 0.0) };
+    let Some(bubble) = sample.pads.iter().flatten().find_map(PadTouch::depth) else { return Grid::filled(0, 0, 0.0) };
     let imprint = &bubble.imprint;
     let longest = imprint.width().max(imprint.height());
     if longest <= THUMBNAIL_PX {
@@ -106,13 +117,14 @@ pub fn thumbnail(sample: &Sample) -> DepthMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::rig::lab;
 
     #[test]
     fn a_thumbnail_keeps_means_and_survives_holes() {
         let imprint = Grid::from_fn(175, 140, |x, y| if (x + y) % 2 == 0 { f32::NAN } else { 0.004 });
-        let bubble = crate::domain::sample::BubbleTouch { imprint, camera: None, truth: None };
-        let touch = crate::domain::sample::FingerTouch { bubble: Some(bubble), ..Default::default() };
-        let sample = Sample { fingers: [None, Some(touch)], ..Sample::default() };
+        let bubble = crate::domain::sample::DepthTouch { imprint, camera: None, truth: None };
+        let touch = crate::domain::sample::PadTouch::default().with(lab::BUBBLE_ID, Some(bubble));
+        let sample = Sample { pads: [None, Some(touch)].into(), ..Sample::default() };
         let small = thumbnail(&sample);
         assert_eq!(small.size(), [44, 36]);
         // The mean of equal numbers is that number up to rounding of a sum of at most 20.

@@ -12,7 +12,7 @@ use super::error::TaskError;
 use crate::domain::dataset::Problem;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, PerPad};
 use crate::io::dataset::Dataset;
 use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
 
@@ -103,8 +103,8 @@ pub struct HandMask {
 /// What a person said about one pair.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairLabels {
-    /// Corrected masks by [`Finger::index`].
-    pub masks: [Option<HandMask>; 2],
+    /// Corrected masks.
+    pub masks: PerPad<HandMask>,
     /// The review state.
     pub review: Review,
     /// Accepted `grasp_from_object` poses: from the measured, from the predicted imprint.
@@ -182,7 +182,7 @@ impl Labels {
     }
 
     /// The pairs and fingers that have a mask drawn by hand.
-    pub fn masks(&self) -> Vec<(String, Finger)> {
+    pub fn masks(&self) -> Vec<(String, PadId)> {
         (*self.store).as_ref().map_or_else(|_| Vec::new(), MaskStore::masks)
     }
 
@@ -196,8 +196,8 @@ impl Labels {
         let Ok(store) = &*self.store else { return Ok(PairLabels::default()) };
         let fail = |err: StoreError| store_error(&what, &err);
         let mut labels = PairLabels::default();
-        for finger in Finger::BOTH {
-            labels.masks[finger.index()] = store.load(name, finger).map_err(fail)?.map(|stored| HandMask {
+        for finger in store.rig().pads() {
+            labels.masks[finger] = store.load(name, finger).map_err(fail)?.map(|stored| HandMask {
                 mask: Arc::new(stored.mask),
                 revision: Revision::default(),
                 base: stored.base,
@@ -223,9 +223,8 @@ impl Labels {
         let store = self.store(&what)?;
         let fail = |err: StoreError| store_error(&what, &err);
         let before = lock(&self.saved).get(name).cloned().unwrap_or_default();
-        for finger in Finger::BOTH {
-            let at = finger.index();
-            let same = match (&before.masks[at], &labels.masks[at]) {
+        for finger in store.rig().pads() {
+            let same = match (&before.masks[finger], &labels.masks[finger]) {
                 (None, None) => true,
                 (Some(a), Some(b)) => a.mask == b.mask && a.base == b.base,
                 _ => false,
@@ -233,7 +232,7 @@ impl Labels {
             if same {
                 continue;
             }
-            let stored = labels.masks[at].as_ref().map(|hand| StoredMask {
+            let stored = labels.masks[finger].as_ref().map(|hand| StoredMask {
                 mask: (*hand.mask).clone(),
                 base: hand.base.clone(),
                 person: masks::person(),

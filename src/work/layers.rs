@@ -7,19 +7,19 @@ use crate::domain::align::reason::{self, Reason, ReasonCounts, reasons};
 use crate::domain::align::{Directions, PointFit};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{Grid, Mask};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, PerPad};
 
 /// What the layers show of one registration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerResult {
     /// The registered pose that they are of, `grasp_from_object`.
     pub grasp_from_object: PlanarPose,
-    /// The reason of every pixel, by [`Finger::index`].
-    pub reasons: [Option<Grid<Reason>>; 2],
-    /// Residual (metres) and weight of every contact point, by [`Finger::index`], in the order of the cloud.
-    pub fits: [Vec<PointFit>; 2],
-    /// Pixels per reason, by [`Finger::index`].
-    pub counts: [ReasonCounts; 2],
+    /// The reason of every pixel.
+    pub reasons: PerPad<Grid<Reason>>,
+    /// Residual (metres) and weight of every contact point, in the order of the cloud.
+    pub fits: PerPad<Vec<PointFit>>,
+    /// Pixels per reason.
+    pub counts: PerPad<ReasonCounts>,
     /// Residuals of the contact points of both fingers by size: shares of [`LayerResult::range_m`].
     pub histogram: Vec<u32>,
     /// Contact points with a larger residual than the range.
@@ -34,12 +34,12 @@ pub struct LayerResult {
 
 impl LayerResult {
     /// Residual, weight and reason at a raw bubble pixel; the fit only where the pixel is a contact point.
-    pub fn at(&self, finger: Finger, cloud: &FingerCloud, pixel: [u16; 2]) -> Option<(Reason, Option<PointFit>)> {
+    pub fn at(&self, finger: PadId, cloud: &FingerCloud, pixel: [u16; 2]) -> Option<(Reason, Option<PointFit>)> {
         let (x, y) = (usize::from(pixel[0]), usize::from(pixel[1]));
-        let reason = *self.reasons[finger.index()].as_ref()?.get(x, y)?;
+        let reason = *self.reasons[finger].as_ref()?.get(x, y)?;
         let fit = cloud.at_pixel(x, y).filter(|at| cloud.contact.get(*at) == Some(&true)).and_then(|at| {
             let before = cloud.contact[..at].iter().filter(|c| **c).count();
-            self.fits[finger.index()].get(before).copied()
+            self.fits[finger].as_ref()?.get(before).copied()
         });
         Some((reason, fit))
     }
@@ -47,7 +47,7 @@ impl LayerResult {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         let pixels: usize = self.reasons.iter().flatten().map(Grid::len).sum();
-        pixels + self.fits.iter().map(|f| f.len() * size_of::<PointFit>()).sum::<usize>() + size_of::<Self>()
+        pixels + self.fits.iter().flatten().map(|f| f.len() * size_of::<PointFit>()).sum::<usize>() + size_of::<Self>()
     }
 }
 
@@ -62,31 +62,30 @@ const RANGE_M: f64 = 4e-3;
 ///
 /// # Errors
 /// If the run did not record what became of the points, or they are not those of the clouds.
-pub fn layers(clouds: &Clouds, masks: [Option<&Mask>; 2], run: &PoseResult) -> Result<LayerResult, TaskError> {
+pub fn layers(clouds: &Clouds, masks: &PerPad<&Mask>, run: &PoseResult) -> Result<LayerResult, TaskError> {
     const WHAT: &str = "Layers";
     let mut rest = run.report.fits.as_slice();
-    let mut grids = [None, None];
-    let mut fits = [Vec::new(), Vec::new()];
-    for ((cloud, mask), (grid, own)) in clouds.fingers.iter().zip(masks).zip(grids.iter_mut().zip(&mut fits)) {
-        let Some(cloud) = cloud else { continue };
+    let mut grids = PerPad::default();
+    let mut fits = PerPad::default();
+    for (finger, cloud) in clouds.fingers.entries() {
         let contact = cloud.pixels.iter().zip(&cloud.contact).filter(|(_, contact)| **contact);
         let pixels: Vec<[u16; 2]> = contact.map(|(pixel, _)| *pixel).collect();
         let Some((part, others)) = rest.split_at_checked(pixels.len()) else {
             return Err(TaskError::new(WHAT, "the registration did not record what became of its points"));
         };
         rest = others;
-        *own = part.to_vec();
-        *grid = mask.and_then(|mask| reasons(mask, &pixels, part));
+        fits[finger] = Some(part.to_vec());
+        grids[finger] = masks[finger].and_then(|mask| reasons(mask, &pixels, part));
     }
     if !rest.is_empty() {
         return Err(TaskError::new(WHAT, "the registration was of other points than those shown"));
     }
     let kernel_m = run.report.trace.iter().map(|step| step.kernel_m).filter(|k| k.is_finite()).reduce(f64::min);
     let range_m = kernel_m.map_or(RANGE_M, |k| k * RANGE_KERNELS);
-    let (histogram, above) = histogram(fits.iter().flatten(), range_m);
+    let (histogram, above) = histogram(fits.iter().flatten().flatten(), range_m);
     Ok(LayerResult {
         grasp_from_object: run.grasp_from_object,
-        counts: grids.each_ref().map(reason::counts),
+        counts: grids.as_ref().map(|grid| grid.map(|grid| reason::counts([grid]))),
         reasons: grids,
         fits,
         histogram,

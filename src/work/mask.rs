@@ -8,7 +8,7 @@ use crate::domain::contact::{self, ContactMask};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::DepthMap;
 use crate::domain::pose::ToolModel;
-use crate::domain::sample::FingerTouch;
+use crate::domain::sample::PadTouch;
 
 /// An automatic mask's recipe.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -35,7 +35,7 @@ pub enum MaskRecipe {
 pub fn mask(
     recipe: &MaskRecipe,
     imprint: &DepthMap,
-    touch: Option<&FingerTouch>,
+    touch: Option<&PadTouch>,
     tool: Option<&ToolModel>,
     truth: Option<PlanarPose>,
 ) -> Result<ContactMask, TaskError> {
@@ -45,7 +45,7 @@ pub fn mask(
         MaskRecipe::TopPercent(percent) => contact::top_percent(imprint, f64::from(percent.get()), f32::NEG_INFINITY),
         MaskRecipe::Cad(limit_m) => {
             let camera = touch
-                .and_then(FingerTouch::camera)
+                .and_then(PadTouch::camera)
                 .ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))?;
             let tool = tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
             let truth = truth.ok_or_else(|| TaskError::new(WHAT, "the true pose is not known"))?;
@@ -54,7 +54,7 @@ pub fn mask(
         }
         MaskRecipe::Truth => {
             let truth = touch
-                .and_then(|t| t.bubble.as_ref()?.truth.as_ref())
+                .and_then(|t| t.depth()?.truth.as_ref())
                 .ok_or_else(|| TaskError::new(WHAT, "only simulated data knows the true contact"))?;
             truth.contact.clone()
         }

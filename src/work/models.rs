@@ -14,8 +14,7 @@ use super::job::{JobCx, PreviewPicture};
 use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GenerateConfig, Progress};
 use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::postprocess::{DepthChain, RawPrediction, ShiftMode};
-use crate::domain::sensor::gelslim;
+use crate::domain::postprocess::{ColorChain, DepthChain, RawPrediction, ShiftMode};
 use crate::infer::bundle::GeneratorSpec;
 use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
@@ -36,6 +35,8 @@ pub struct Prediction {
     pub raw: RawPrediction,
     /// The ways to metres that its bundle offers.
     pub chains: Chains,
+    /// The steps to a color sensor's picture; `None` where it is depth that was predicted.
+    pub color: Option<ColorChain>,
     /// The identity of the generator's bundle.
     pub bundle: Arc<str>,
     /// The engine that made it, for people.
@@ -49,7 +50,7 @@ pub struct Prediction {
 /// A prediction to be made.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
-    /// The condition: a GelSlim difference image.
+    /// The condition: [`crate::domain::sample::PadTouch::picture`] of the sensor that the bundle starts from.
     pub difference: &'a RgbGrid,
     /// Seed of its noise.
     pub seed: u64,
@@ -77,7 +78,7 @@ pub struct Models {
     store: Option<Mutex<Store>>,
     generators: Mutex<Loaded<Generator>>,
     masks: Mutex<Loaded<MaskModel>>,
-    chains: Mutex<BTreeMap<Arc<str>, Chains>>,
+    ways: Mutex<BTreeMap<Arc<str>, Ways>>,
     /// Generators that stay loaded side by side.
     most: usize,
 }
@@ -86,8 +87,21 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn chains_of(spec: &GeneratorSpec) -> Chains {
-    Arc::new(ShiftMode::iter().map(|mode| (mode, spec.depth_chain(mode).map_err(|err| err.to_string()))).collect())
+/// What becomes of a bundle's pictures: ways to metres, steps to a color picture, and how large its condition is.
+#[derive(Clone, Debug, Default)]
+struct Ways {
+    chains: Chains,
+    color: Option<ColorChain>,
+    input: [usize; 2],
+}
+
+fn ways_of(spec: &GeneratorSpec) -> Ways {
+    let chain = |mode| (mode, spec.depth_chain(mode).map_err(|err| err.to_string()));
+    Ways {
+        chains: Arc::new(ShiftMode::iter().map(chain).collect()),
+        color: spec.color_chain(),
+        input: spec.input.sensor.size,
+    }
 }
 
 /// The model of `key`, loaded by `load` if it is not there; the one used longest ago makes room before that.
@@ -128,7 +142,7 @@ impl Models {
             store: store.map(Mutex::new),
             generators: Mutex::default(),
             masks: Mutex::default(),
-            chains: Mutex::default(),
+            ways: Mutex::default(),
             most: 1,
         }
     }
@@ -151,13 +165,17 @@ impl Models {
     /// # Errors
     /// If the bundle cannot be opened.
     pub fn chains(&self, bundle: &BundleInfo) -> Result<Chains, TaskError> {
-        if let Some(known) = lock(&self.chains).get(&bundle.id) {
+        Ok(self.ways(bundle)?.chains)
+    }
+
+    fn ways(&self, bundle: &BundleInfo) -> Result<Ways, TaskError> {
+        if let Some(known) = lock(&self.ways).get(&bundle.id) {
             return Ok(known.clone());
         }
         let opened = bundle.open(&format!("Open {}", bundle.name))?;
-        let chains = opened.generator().map(chains_of).unwrap_or_default();
-        lock(&self.chains).insert(bundle.id.clone(), chains.clone());
-        Ok(chains)
+        let ways = opened.generator().map(ways_of).unwrap_or_default();
+        lock(&self.ways).insert(bundle.id.clone(), ways.clone());
+        Ok(ways)
     }
 
     /// Predictions, all of one call in one batch; one answer for each, in order. What was made before is not made
@@ -210,7 +228,7 @@ impl Models {
         };
         let fresh: Vec<usize> = (0..wanted.len()).filter(|at| answers[*at].is_none()).collect();
         // Nothing has to be loaded to show what is there.
-        let chains = self.chains(bundle)?;
+        let Ways { chains, color, .. } = self.ways(bundle)?;
         if !fresh.is_empty() {
             let mut loaded = lock(&self.generators);
             let generator = ready(&mut loaded, (bundle.id.clone(), engine), self.most, || {
@@ -234,6 +252,7 @@ impl Models {
         let prediction = |(raw, seconds, kept)| Prediction {
             raw,
             chains: chains.clone(),
+            color,
             bundle: bundle.id.clone(),
             engine: kind.label().to_owned(),
             seconds,
@@ -253,7 +272,8 @@ impl Models {
         engine: EngineChoice,
         config: &GenerateConfig,
     ) -> Result<Prediction, TaskError> {
-        let blank = RgbGrid::filled(gelslim::WIDTH, gelslim::HEIGHT, [0.0; 3]);
+        let [width, height] = self.ways(bundle)?.input;
+        let blank = RgbGrid::filled(width, height, [0.0; 3]);
         // Both fingers of a grasp go through the model together.
         let item = |seed| Wanted { difference: &blank, seed, size: [0, 0] };
         let both = [item(config.seed), item(config.seed.wrapping_add(1))];
@@ -271,7 +291,7 @@ impl Models {
         // Oldest first: the last one is the one shown.
         for stored in found.into_iter().rev() {
             let Some(bundle) = bundles.iter().find(|bundle| *bundle.id == *stored.recipe.bundle) else { continue };
-            let Ok(chains) = self.chains(bundle) else { continue };
+            let Ok(Ways { chains, color, .. }) = self.ways(bundle) else { continue };
             let engine = match stored.recipe.engine {
                 made if Some(made) == in_force => engine,
                 EngineKind::Rten => EngineChoice::Rten,
@@ -280,6 +300,7 @@ impl Models {
             let prediction = Prediction {
                 raw: stored.raw,
                 chains,
+                color,
                 bundle: bundle.id.clone(),
                 engine: stored.recipe.engine.label().to_owned(),
                 seconds: stored.seconds,

@@ -9,8 +9,8 @@ use super::models::{Prediction, Wanted};
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::postprocess::{ShiftFit, ShiftMode};
+use crate::domain::rig::{PadId, SensorId};
 use crate::domain::sample::{Sample, Scale};
-use crate::domain::sensor::Finger;
 use crate::io::masks::now_unix_s;
 use crate::io::statistics::{Provenance, ShiftStatistics, utc_text};
 
@@ -26,7 +26,9 @@ pub struct StatisticsSetup {
     /// The pairs. Any order of them gives the same figures.
     pub pairs: Vec<PairId>,
     /// Whose touches.
-    pub fingers: Vec<Finger>,
+    pub fingers: Vec<PadId>,
+    /// The sensor that the generator starts from.
+    pub input: SensorId,
     /// The generator.
     pub bundle: BundleInfo,
     /// The choices of the generation.
@@ -64,14 +66,14 @@ pub fn statistics(
             scale = Scale::Assumed;
         }
         for finger in &setup.fingers {
-            let touch = sample.finger(*finger);
-            let (Some(gelslim), Some(bubble)) =
-                (touch.and_then(|t| t.gelslim.as_ref()), touch.and_then(|t| t.bubble.as_ref()))
+            let touch = sample.pad(*finger);
+            let (Some(picture), Some(bubble)) =
+                (touch.and_then(|t| t.picture(setup.input)), touch.and_then(|t| t.depth()))
             else {
                 continue;
             };
             cx.check(WHAT)?;
-            let wanted = Wanted { difference: &gelslim.difference, seed: setup.config.seed, size: [0, 0] };
+            let wanted = Wanted { difference: &picture, seed: setup.config.seed, size: [0, 0] };
             let added = predict(wanted, &quiet).and_then(|made| {
                 let chain = super::imprint::chain(&made, ShiftMode::Raw)?;
                 engine.clone_from(&made.engine);

@@ -21,13 +21,15 @@ use touch2touch::domain::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift};
 use touch2touch::domain::resample::Resampling;
-use touch2touch::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
+use touch2touch::domain::rig::lab;
+use touch2touch::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch::domain::sim;
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::job::JobCx;
 use touch2touch::work::models::{Prediction, Wanted};
+use touch2touch::infer::bundle::SensorPair;
 
 /// `[width, height]` of the imprints of [`Source`].
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];
@@ -134,14 +136,12 @@ impl DataSource for Source {
                 depth + sign * 1e-5 * (x + y) as f32
             });
             let difference = RgbGrid::from_fn(6, 4, |x, y| [x as f32, y as f32, sign]);
-            Some(FingerTouch {
-                gelslim: Some(GelSlimTouch { images: None, difference }),
-                bubble: Some(BubbleTouch { imprint, camera: None, truth: None }),
-                rig: None,
-            })
+            let color = ColorTouch { images: None, difference };
+            let depth = DepthTouch { imprint, camera: None, truth: None };
+            Some(PadTouch::default().with(lab::GELSLIM_ID, Some(color)).with(lab::BUBBLE_ID, Some(depth)))
         };
         let notes = self.notes.lock().unwrap().clone();
-        Ok(Sample { fingers: [finger(1.0), finger(-1.0)], grasp_from_object: None, notes, ..Sample::default() })
+        Ok(Sample { pads: [finger(1.0), finger(-1.0)].into(), grasp_from_object: None, notes, ..Sample::default() })
     }
 
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
@@ -250,6 +250,7 @@ impl Services for Double {
                 defaults: GenerateConfig { steps: 20, ..GenerateConfig::default() },
                 training_steps: 1000,
                 guided: false,
+                sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
             }),
         };
         match self.bundles {
@@ -337,7 +338,7 @@ impl Double {
         let chains = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse]
             .map(|mode| (mode, chain.clone().with_mode(mode, None).map_err(|err| err.to_string())));
         let (chains, bundle) = (Arc::new(chains.into()), bundle.id.clone());
-        Ok(Prediction { raw, chains, bundle, engine: "double".into(), seconds: 0.0, kept: false })
+        Ok(Prediction { raw, chains, color: None, bundle, engine: "double".into(), seconds: 0.0, kept: false })
     }
 }
 

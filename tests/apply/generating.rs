@@ -11,7 +11,8 @@ use touch2touch::app::results::Preview;
 use touch2touch::app::settings::GenerateSettings;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::DepthMap;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::{PadId, lab};
+use touch2touch::infer::bundle::SensorPair;
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
@@ -19,8 +20,8 @@ use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::job::{Cancel, JobCx};
 use touch2touch::work::models::Prediction;
 
-const RIGHT: Finger = Finger::Right;
-const LEFT: Finger = Finger::Left;
+const RIGHT: PadId = lab::RIGHT;
+const LEFT: PadId = lab::LEFT;
 
 fn preview(recipe: &PredictionKey, step: u32) -> Arc<Preview> {
     Arc::new(Preview { recipe: recipe.clone(), step, of: recipe.steps, depth: DepthMap::filled(4, 3, 0.001) })
@@ -181,7 +182,12 @@ fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
         name: "x".into(),
         kind: BundleKind::Generator,
         folder: "x".into(),
-        generator: Some(GeneratorInfo { defaults, training_steps: 1000, guided }),
+        generator: Some(GeneratorInfo {
+            defaults,
+            training_steps: 1000,
+            guided,
+            sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
+        }),
     };
     let own = GenerateSettings { preset: None, guidance: 4.0, sampler: Sampler::Ddpm, ..GenerateSettings::default() };
     assert_eq!(own.config(&bundle(true)).guidance, 4.0);

@@ -9,7 +9,7 @@ use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
 use touch2touch::app::settings::{MaskSource, MaskTool};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::{PadId, lab};
 
 use super::double::Bench;
 use super::panes;
@@ -23,17 +23,17 @@ fn bench() -> Bench {
     bench
 }
 
-fn begin(bench: &mut Bench, finger: Finger, at_px: [f32; 2]) {
+fn begin(bench: &mut Bench, finger: PadId, at_px: [f32; 2]) {
     bench.send(Command::BeginStroke { finger, source: MEASURED, at_px, erase: false });
 }
 
-fn stroke(bench: &mut Bench, finger: Finger, from: [f32; 2], to: [f32; 2]) {
+fn stroke(bench: &mut Bench, finger: PadId, from: [f32; 2], to: [f32; 2]) {
     begin(bench, finger, from);
     bench.send(Command::StrokeTo(to));
     bench.send(Command::EndStroke);
 }
 
-fn mask(bench: &Bench, finger: Finger) -> Mask {
+fn mask(bench: &Bench, finger: PadId) -> Mask {
     (**bench.state.mask_in_force(MEASURED, finger).unwrap().mask).clone()
 }
 
@@ -46,46 +46,46 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     let mut bench = bench();
     bench.send(Command::SetMaskSource(MaskSource::Threshold));
     bench.settle();
-    let automatic = mask(&bench, Finger::Right);
+    let automatic = mask(&bench, lab::RIGHT);
     assert_eq!(count(&automatic), 35 + 4, "the ring and the spot");
-    begin(&mut bench, Finger::Right, [12.0, 2.0]);
+    begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
     bench.settle();
     assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0, "nothing is saved while the pen is down");
     bench.send(Command::StrokeTo([14.0, 2.0]));
     bench.send(Command::EndStroke);
-    let drawn = mask(&bench, Finger::Right);
+    let drawn = mask(&bench, lab::RIGHT);
     assert!(drawn[(12, 2)] && drawn[(14, 2)] && drawn[(4, 4)]);
-    let in_force = bench.state.mask_in_force(MEASURED, Finger::Right).unwrap();
+    let in_force = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap();
     assert_eq!(in_force.label, "By hand, from Threshold 5.00 mm");
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
-    assert_eq!(*saved.masks[0].as_ref().unwrap().mask, drawn);
-    assert_eq!(saved.masks[1], None);
+    assert_eq!(*saved.masks[lab::RIGHT].as_ref().unwrap().mask, drawn);
+    assert_eq!(saved.masks[lab::LEFT], None);
     assert_eq!(saved.review, Review::InProgress);
     assert!(bench.state.document.unsaved.is_empty());
     // Another automatic source does not touch it; removing it brings that source back.
     bench.send(Command::SetMaskSource(MaskSource::TopPercent));
     bench.settle();
-    assert_eq!(mask(&bench, Finger::Right), drawn);
+    assert_eq!(mask(&bench, lab::RIGHT), drawn);
     bench.send(Command::ResetMask);
     bench.settle();
-    assert!(matches!(bench.state.mask_in_force(MEASURED, Finger::Right).unwrap().version, MaskVersion::Auto(_)));
+    assert!(matches!(bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().version, MaskVersion::Auto(_)));
     // Undo changes the file too.
     bench.send(Command::Undo);
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
-    assert_eq!(*saved.masks[0].as_ref().unwrap().mask, drawn);
+    assert_eq!(*saved.masks[lab::RIGHT].as_ref().unwrap().mask, drawn);
 }
 
 #[test]
 fn a_stroke_that_changes_nothing_leaves_nothing() {
     let mut bench = bench();
     bench.send(Command::SetMaskTool(MaskTool::Eraser));
-    stroke(&mut bench, Finger::Right, [21.0, 1.0], [22.0, 1.0]);
+    stroke(&mut bench, lab::RIGHT, [21.0, 1.0], [22.0, 1.0]);
     bench.send(Command::SetMaskTool(MaskTool::Brush));
-    stroke(&mut bench, Finger::Right, [900.0, -900.0], [f32::NAN, 1.0]);
+    stroke(&mut bench, lab::RIGHT, [900.0, -900.0], [f32::NAN, 1.0]);
     bench.settle();
-    assert!(bench.state.document.hand_mask("tool_a/data_0", Finger::Right).is_none());
+    assert!(bench.state.document.hand_mask("tool_a/data_0", lab::RIGHT).is_none());
     assert!(Action::Undo.command(&bench.state).is_none());
     assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0);
     assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
@@ -94,30 +94,30 @@ fn a_stroke_that_changes_nothing_leaves_nothing() {
 #[test]
 fn escape_gives_a_stroke_up() {
     let mut bench = bench();
-    let before = mask(&bench, Finger::Right);
-    begin(&mut bench, Finger::Right, [12.0, 2.0]);
-    assert_ne!(mask(&bench, Finger::Right), before);
+    let before = mask(&bench, lab::RIGHT);
+    begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
+    assert_ne!(mask(&bench, lab::RIGHT), before);
     let cancel = Action::CancelJobs.command(&bench.state).unwrap();
     bench.send(cancel);
-    assert_eq!(mask(&bench, Finger::Right), before);
+    assert_eq!(mask(&bench, lab::RIGHT), before);
     assert!(bench.state.document.stroke.is_none());
 }
 
 #[test]
 fn undo_and_redo_follow_what_is_on_screen() {
     let mut bench = bench();
-    let automatic = [mask(&bench, Finger::Right), {
-        bench.send(Command::SelectFinger(Finger::Left));
+    let automatic = [mask(&bench, lab::RIGHT), {
+        bench.send(Command::SelectFinger(lab::LEFT));
         bench.settle();
-        mask(&bench, Finger::Left)
+        mask(&bench, lab::LEFT)
     }];
-    bench.send(Command::SelectFinger(Finger::Right));
-    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
-    let first = mask(&bench, Finger::Right);
-    stroke(&mut bench, Finger::Right, [20.0, 6.0], [21.0, 6.0]);
-    let second = mask(&bench, Finger::Right);
-    bench.send(Command::SelectFinger(Finger::Left));
-    stroke(&mut bench, Finger::Left, [20.0, 1.0], [21.0, 1.0]);
+    bench.send(Command::SelectFinger(lab::RIGHT));
+    stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
+    let first = mask(&bench, lab::RIGHT);
+    stroke(&mut bench, lab::RIGHT, [20.0, 6.0], [21.0, 6.0]);
+    let second = mask(&bench, lab::RIGHT);
+    bench.send(Command::SelectFinger(lab::LEFT));
+    stroke(&mut bench, lab::LEFT, [20.0, 1.0], [21.0, 1.0]);
     bench.send(Command::Select(PairId(1)));
     bench.settle();
     assert!(Action::Undo.command(&bench.state).is_none(), "nothing of pair 1 was changed");
@@ -125,35 +125,35 @@ fn undo_and_redo_follow_what_is_on_screen() {
     bench.send(Command::Select(PairId(0)));
     bench.settle();
     bench.send(Command::Undo);
-    assert_eq!(mask(&bench, Finger::Left), automatic[1], "only the left finger is on screen");
-    bench.send(Command::SelectFinger(Finger::Right));
-    assert_eq!(mask(&bench, Finger::Right), second);
+    assert_eq!(mask(&bench, lab::LEFT), automatic[1], "only the left finger is on screen");
+    bench.send(Command::SelectFinger(lab::RIGHT));
+    assert_eq!(mask(&bench, lab::RIGHT), second);
     bench.send(Command::Undo);
-    assert_eq!(mask(&bench, Finger::Right), first);
+    assert_eq!(mask(&bench, lab::RIGHT), first);
     bench.send(Command::Undo);
-    assert_eq!(mask(&bench, Finger::Right), automatic[0]);
+    assert_eq!(mask(&bench, lab::RIGHT), automatic[0]);
     assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo, "untouched again");
     bench.send(Command::Redo);
     bench.send(Command::Redo);
-    assert_eq!(mask(&bench, Finger::Right), second);
+    assert_eq!(mask(&bench, lab::RIGHT), second);
 }
 
 #[test]
 fn clean_ups_work_on_the_mask_in_force() {
     let mut bench = bench();
     bench.send(Command::FillHoles);
-    assert_eq!(count(&mask(&bench, Finger::Right)), 36 + 4);
+    assert_eq!(count(&mask(&bench, lab::RIGHT)), 36 + 4);
     bench.send(Command::LargestIsland);
-    assert_eq!(count(&mask(&bench, Finger::Right)), 36);
+    assert_eq!(count(&mask(&bench, lab::RIGHT)), 36);
     bench.send(Command::LargestIsland);
     assert!(bench.log().last().unwrap().contains("nothing to change"));
     bench.send(Command::AdoptAutomatic);
-    assert_eq!(count(&mask(&bench, Finger::Right)), 39);
+    assert_eq!(count(&mask(&bench, lab::RIGHT)), 39);
     for expected in [36, 40, 39] {
         bench.send(Command::Undo);
-        assert_eq!(count(&mask(&bench, Finger::Right)), expected);
+        assert_eq!(count(&mask(&bench, lab::RIGHT)), expected);
     }
-    assert!(bench.state.document.hand_mask("tool_a/data_0", Finger::Right).is_none());
+    assert!(bench.state.document.hand_mask("tool_a/data_0", lab::RIGHT).is_none());
 }
 
 #[test]
@@ -164,13 +164,13 @@ fn labels_that_cannot_be_read_are_never_written() {
     bench.settle();
     assert_eq!(bench.errors(), 1);
     assert!(bench.state.document.blocked("tool_a/data_0").is_some());
-    let automatic = mask(&bench, Finger::Right);
-    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
+    let automatic = mask(&bench, lab::RIGHT);
+    stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     for command in [Command::FillHoles, Command::AdoptAutomatic, Command::SetReview(Review::Done), Command::ResetMask] {
         bench.send(command);
     }
     bench.settle();
-    assert_eq!(mask(&bench, Finger::Right), automatic, "the automatic mask is shown, and stays");
+    assert_eq!(mask(&bench, lab::RIGHT), automatic, "the automatic mask is shown, and stays");
     assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0);
     assert!(Action::FillHoles.command(&bench.state).is_none());
 }
@@ -179,7 +179,7 @@ fn labels_that_cannot_be_read_are_never_written() {
 fn nothing_is_drawn_before_the_stored_labels_are_read() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Measured]));
-    begin(&mut bench, Finger::Right, [12.0, 2.0]);
+    begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
     assert!(bench.state.document.stroke.is_none());
     assert!(bench.state.document.labels.is_empty());
 }
@@ -188,7 +188,7 @@ fn nothing_is_drawn_before_the_stored_labels_are_read() {
 fn a_full_disk_is_said_and_what_was_drawn_is_kept_and_saved_later() {
     let mut bench = bench();
     bench.services.source.full_disk.store(true, Ordering::Relaxed);
-    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
+    stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     bench.settle();
     assert_eq!(bench.errors(), 1);
     assert!(bench.state.document.unsaved.contains("tool_a/data_0"));
@@ -204,7 +204,7 @@ fn a_full_disk_is_said_and_what_was_drawn_is_kept_and_saved_later() {
 fn an_answer_to_an_earlier_saving_confirms_nothing_newer() {
     let mut bench = bench();
     let unsaved = |bench: &Bench| bench.state.document.unsaved.contains("tool_a/data_0");
-    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
+    stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     // What an earlier request, which was being carried out when this one came, is answered with.
     bench.send(Command::LabelsSaved("tool_a/data_0".into(), Revision(0)));
     assert!(unsaved(&bench), "the stroke is not on the disk");
@@ -216,11 +216,11 @@ fn an_answer_to_an_earlier_saving_confirms_nothing_newer() {
 #[test]
 fn moving_on_ends_the_stroke() {
     let mut bench = bench();
-    begin(&mut bench, Finger::Right, [12.0, 2.0]);
+    begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
     bench.send(Command::Step(1));
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
-    assert!(saved.masks[0].as_ref().unwrap().mask[(12, 2)]);
+    assert!(saved.masks[lab::RIGHT].as_ref().unwrap().mask[(12, 2)]);
     assert!(bench.state.document.stroke.is_none());
 }
 
@@ -228,14 +228,14 @@ fn moving_on_ends_the_stroke() {
 fn strokes_waiting_for_the_disk_become_one_and_survive_the_end() {
     let mut bench = bench();
     for y in 0..5 {
-        stroke(&mut bench, Finger::Right, [20.0, y as f32 * 3.0], [21.0, y as f32 * 3.0]);
+        stroke(&mut bench, lab::RIGHT, [20.0, y as f32 * 3.0], [21.0, y as f32 * 3.0]);
     }
-    let drawn = mask(&bench, Finger::Right);
+    let drawn = mask(&bench, lab::RIGHT);
     let source = bench.services.source.clone();
     // The program ends before the disk had its turn: what waits to be written is written first.
     drop(bench);
     assert_eq!(source.saves.load(Ordering::Relaxed), 1);
-    assert_eq!(*source.labels.lock().unwrap()["tool_a/data_0"].masks[0].as_ref().unwrap().mask, drawn);
+    assert_eq!(*source.labels.lock().unwrap()["tool_a/data_0"].masks[lab::RIGHT].as_ref().unwrap().mask, drawn);
 }
 
 #[test]
@@ -259,10 +259,10 @@ fn done_goes_to_the_next_unfinished_and_survives_reopening() {
 #[test]
 fn opening_again_brings_the_masks_back() {
     let mut bench = bench();
-    stroke(&mut bench, Finger::Right, [20.0, 1.0], [21.0, 1.0]);
-    let drawn = mask(&bench, Finger::Right);
+    stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
+    let drawn = mask(&bench, lab::RIGHT);
     bench.send(Command::Reload);
     bench.settle();
-    assert_eq!(mask(&bench, Finger::Right), drawn);
+    assert_eq!(mask(&bench, lab::RIGHT), drawn);
     assert!(Action::Undo.command(&bench.state).is_none(), "what was undone before is not on the list any more");
 }

@@ -7,7 +7,7 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::MaskTool;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::{PadId, lab};
 
 use super::double::Bench;
 use super::panes;
@@ -20,8 +20,8 @@ fn said(doc: &Document) -> Said {
         .iter()
         .filter(|(_, labels)| !labels.is_empty())
         .map(|(name, labels)| {
-            let mask = |at: usize| labels.masks[at].as_ref().map(|hand| (*hand.mask).clone());
-            (name.clone(), [mask(0), mask(1)], labels.review)
+            let mask = |pad| labels.masks.get(pad).map(|hand| (*hand.mask).clone());
+            (name.clone(), lab::PADS.map(mask), labels.review)
         })
         .collect()
 }
@@ -34,8 +34,8 @@ fn position() -> impl Strategy<Value = [f32; 2]> {
     ]
 }
 
-fn finger() -> impl Strategy<Value = Finger> {
-    prop_oneof![Just(Finger::Right), Just(Finger::Left)]
+fn finger() -> impl Strategy<Value = PadId> {
+    prop_oneof![Just(lab::RIGHT), Just(lab::LEFT)]
 }
 
 fn command() -> impl Strategy<Value = Command> {
@@ -105,7 +105,7 @@ proptest! {
         for pair in 0..12 {
             bench.send(Command::Select(PairId(pair)));
             let name = bench.state.pair_name().to_owned();
-            while bench.state.history.next_undo(&name, &Finger::BOTH).is_some() {
+            while bench.state.history.next_undo(&name, &lab::PADS).is_some() {
                 bench.send(Command::Undo);
                 steps[pair as usize] += 1;
             }

@@ -12,7 +12,7 @@ use touch2touch::app::settings::{MaskSource, MaskTool};
 use touch2touch::app::state::{Absent, Lookup, State};
 use touch2touch::app::tasks::Entry;
 use touch2touch::domain::dataset::{PairId, Problem};
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;
@@ -35,11 +35,11 @@ fn the_pose_follows_the_mask() {
     // Rubbing out a part: while the pen is down nothing is computed, then cloud and pose are new.
     bench.send(Command::SetMaskTool(MaskTool::Eraser));
     let at_px = {
-        let mask = bench.state.mask_in_force(MEASURED, Finger::Right).unwrap().mask.clone();
+        let mask = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().mask.clone();
         let at = mask.as_slice().iter().position(|v| *v).unwrap();
         [(at % mask.width()) as f32, (at / mask.width()) as f32]
     };
-    bench.send(Command::BeginStroke { finger: Finger::Right, source: MEASURED, at_px, erase: false });
+    bench.send(Command::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px, erase: false });
     bench.send(Command::StrokeTo([at_px[0] + 10.0, at_px[1] + 10.0]));
     assert!(bench.state.wanted().is_empty());
     assert!(matches!(bench.state.pose(MEASURED), Lookup::Stale(_)), "the old pose stays until the new one is there");
@@ -73,14 +73,14 @@ fn a_source_without_camera_says_why_there_is_no_pose() {
     for (source, absent) in [(MaskSource::Truth, Absent::NotSimulated), (MaskSource::Cad, Absent::NoTruth)] {
         bench.send(Command::SetMaskSource(source));
         bench.settle();
-        match bench.state.mask_in_force(MEASURED, Finger::Right) {
+        match bench.state.mask_in_force(MEASURED, lab::RIGHT) {
             Err(Lookup::Absent(found)) => assert_eq!(found, absent),
             other => panic!("{other:?}"),
         }
     }
     bench.send(Command::SetMaskSource(MaskSource::Unet));
     bench.settle();
-    assert!(bench.state.mask_in_force(MEASURED, Finger::Right).is_ok());
+    assert!(bench.state.mask_in_force(MEASURED, lab::RIGHT).is_ok());
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     bench.send(panes(&[Pane::Measured]));
     bench.send(Command::SetMaskSource(MaskSource::Unet));
     bench.settle();
-    let shown = bench.state.mask_in_force(MEASURED, Finger::Right).unwrap();
+    let shown = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap();
     assert!(shown.label.starts_with("Depth ") && shown.label.contains("found no contact"), "{}", shown.label);
     assert_eq!(shown.mask.as_slice().iter().filter(|m| **m).count(), 35 + 4, "the ring and the spot");
     let said = |bench: &Bench| bench.state.log.entries.iter().filter(|e| e.text.contains("found no contact")).count();
@@ -98,7 +98,7 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     // The other finger says so when it is looked at, and a source that finds contact says nothing.
     bench.send(Command::SetMaskSource(MaskSource::Threshold));
     bench.settle();
-    assert_eq!(bench.state.mask_in_force(MEASURED, Finger::Right).unwrap().label, "Threshold 5.00 mm");
+    assert_eq!(bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().label, "Threshold 5.00 mm");
     assert_eq!(said(&bench), 1);
 }
 
@@ -128,7 +128,7 @@ fn without_models_the_rest_works_and_a_notice_says_what_to_do() {
     assert!(Action::Generate.command(&bench.state).is_none());
     bench.send(Command::Generate);
     assert_eq!(bench.errors(), 1);
-    assert!(bench.state.mask_in_force(MEASURED, Finger::Right).is_ok());
+    assert!(bench.state.mask_in_force(MEASURED, lab::RIGHT).is_ok());
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn threads_give_the_same_and_wake_the_window() {
     runtime.start(&mut state, Some(Place::Demo));
     runtime.tick(&mut state, vec![panes(&[Pane::Measured, Pane::Predicted, Pane::Error])]);
     let mut asked = false;
-    while state.comparison(Finger::Right).ready().is_none() {
+    while state.comparison(lab::RIGHT).ready().is_none() {
         if !asked && state.can_generate().is_ok() && state.sample().ready().is_some() {
             asked = true;
             runtime.tick(&mut state, vec![Command::Generate]);
@@ -161,5 +161,5 @@ fn threads_give_the_same_and_wake_the_window() {
         }
     }
     assert_eq!(services.source.loads_of(0), 1);
-    assert_eq!(state.chosen(Finger::Right).unwrap().seed, 42);
+    assert_eq!(state.chosen(lab::RIGHT).unwrap().seed, 42);
 }

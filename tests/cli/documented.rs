@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 use touch2touch::headless::check_command;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::{MaskStore, StoredMask};
@@ -110,10 +110,10 @@ impl Stage {
         // One mask corrected by hand, for the export.
         let id = touch2touch::domain::dataset::PairId(0);
         let sample = dataset.load(id).unwrap();
-        let imprint = &sample.finger(Finger::Right).unwrap().bubble.as_ref().unwrap().imprint;
+        let imprint = &sample.pad(lab::RIGHT).unwrap().depth().unwrap().imprint;
         let mask = imprint.map(|&depth| depth > 0.005);
         let stored = StoredMask { mask, base: "Threshold 5.00 mm".into(), person: "test".into(), saved_unix_s: 1 };
-        MaskStore::for_dataset(&dataset).unwrap().save(&name, Finger::Right, Some(&stored)).unwrap();
+        MaskStore::for_dataset(&dataset).unwrap().save(&name, lab::RIGHT, Some(&stored)).unwrap();
         let robot = dir.path().join("robot");
         std::fs::create_dir(&robot).unwrap();
         let touch = dataset.gelslim_file(id).unwrap();

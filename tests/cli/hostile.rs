@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::Value;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::MaskStore;
 use touch2touch::io::simulated::MANIFEST;
@@ -202,7 +202,7 @@ fn all_damaged_masks_are_listed_and_leftovers_of_killed_exports_go() {
     let store = MaskStore::for_dataset(&dataset).unwrap();
     std::fs::create_dir_all(store.folder()).unwrap();
     for entry in &dataset.index.pairs {
-        std::fs::write(store.mask_file(&entry.name, Finger::Left), "{").unwrap();
+        std::fs::write(store.mask_file(&entry.name, lab::LEFT), "{").unwrap();
     }
     // As a killed export leaves it: the lock is nobody's.
     let left = dir.path().join(".touch2touch-export-killed");
@@ -218,7 +218,7 @@ fn all_damaged_masks_are_listed_and_leftovers_of_killed_exports_go() {
     }
     assert!(!out.exists());
     for entry in &dataset.index.pairs {
-        std::fs::remove_file(store.mask_file(&entry.name, Finger::Left)).unwrap();
+        std::fs::remove_file(store.mask_file(&entry.name, lab::LEFT)).unwrap();
     }
     let done = run(&[&export[..], &["--pairs", "all", "--mask", "truth"]].concat(), dir.path());
     assert!(done.status.success(), "{}", error_text(&done));

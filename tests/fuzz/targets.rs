@@ -11,8 +11,9 @@ use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{Grid, Mask};
 use touch2touch::domain::moments::Moments;
 use touch2touch::domain::postprocess::{RawPrediction, ShiftFit};
-use touch2touch::domain::sample::BubbleCamera;
-use touch2touch::domain::sensor::{Finger, Intrinsics};
+use touch2touch::domain::sample::DepthCamera;
+use touch2touch::domain::rig::lab;
+use touch2touch::domain::sensor::Intrinsics;
 use touch2touch::infer::bundle::{Bundle, MANIFEST};
 use touch2touch::infer::engine::EngineKind;
 use touch2touch::infer::recipe::Recipe;
@@ -150,16 +151,17 @@ fn read_pt(_: &Path, file: &Path) -> Outcome {
 /// A pair of whatever dataset `dir` is.
 fn read_pair(dir: &Path, file: &Path) -> Outcome {
     let dataset = Dataset::open(dir).map_err(|err| format!("{err}: {}", file.display()))?;
-    let loaded = dataset.load_with_notes(PairId(0)).map_err(said)?;
+    let loaded = dataset.load_with_counts(PairId(0)).map_err(said)?;
     dataset.bubble_tile(PairId(0), loaded.sample.laid).map_err(said)?;
     dataset.gelslim_is_clipped(PairId(0)).map_err(said)?;
     Ok(())
 }
 
 fn case_seeds() -> Vec<Seed> {
-    let camera = BubbleCamera {
+    let camera = DepthCamera {
         depth_reference: Grid::from_fn(6, 4, |x, y| 0.09 + 1e-3 * (x + y) as f32),
         intrinsics: Intrinsics { fx: 212.0, fy: 211.0, cx: 112.3, cy: 86.1 },
+        crop: lab::BUBBLE.crop,
         grasp_from_camera: glam::DAffine3::from_translation(glam::DVec3::new(-0.0764, 0.001, -0.0541)),
     };
     let mask = Mask::from_fn(6, 4, |x, _| x > 2);
@@ -284,14 +286,14 @@ fn place_onnx(dir: &Path, bytes: &[u8]) -> PathBuf {
 }
 
 fn mask_file(dir: &Path) -> PathBuf {
-    MaskStore::in_folder(dir.to_owned()).mask_file("a", Finger::Right)
+    MaskStore::in_folder(dir.to_owned()).mask_file("a", lab::RIGHT)
 }
 
 fn mask_seeds() -> Vec<Seed> {
     let dir = tempfile::tempdir().unwrap();
     let mask = Mask::from_fn(30, 20, |x, y| (x + y) % 3 == 0);
     let stored = StoredMask { mask, base: "threshold".into(), person: "p".into(), saved_unix_s: 1 };
-    MaskStore::in_folder(dir.path().to_owned()).save("a", Finger::Right, Some(&stored)).unwrap();
+    MaskStore::in_folder(dir.path().to_owned()).save("a", lab::RIGHT, Some(&stored)).unwrap();
     let whole = std::fs::read_to_string(mask_file(dir.path())).unwrap();
     let huge = whole.replace("\"width\":30", "\"width\":4000000000").replace("\"height\":20", "\"height\":4000000000");
     assert_ne!(huge, whole);
@@ -301,7 +303,7 @@ fn mask_seeds() -> Vec<Seed> {
 fn read_mask(dir: &Path, _: &Path) -> Outcome {
     let store = MaskStore::in_folder(dir.to_owned());
     store.masks();
-    store.load("a", Finger::Right).map(drop).map_err(said)
+    store.load("a", lab::RIGHT).map(drop).map_err(said)
 }
 
 fn review_seeds() -> Vec<Seed> {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use touch2touch::domain::dataset::{PairId, Split};
 use touch2touch::domain::grid::Grid;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::upright::Turn;
 use touch2touch::io::dataset::{Dataset, LoadError, OpenError, SourceKind};
 use touch2touch::io::images;
@@ -37,12 +37,12 @@ fn a_written_touch_reads_back_whole() {
         let got = loaded.sample;
         let (a, b) = (got.grasp_from_object.unwrap(), want.grasp_from_object.unwrap());
         assert!((a.theta_rad - b.theta_rad).abs() < 1e-15 && (a.y_m - b.y_m).abs() < 1e-15);
-        for finger in Finger::BOTH {
-            let (a, b) = (got.finger(finger).unwrap(), want.finger(finger).unwrap());
-            let (ga, gb) = (a.gelslim.as_ref().unwrap(), b.gelslim.as_ref().unwrap());
+        for finger in lab::PADS {
+            let (a, b) = (got.pad(finger).unwrap(), want.pad(finger).unwrap());
+            let (ga, gb) = (a.color().unwrap(), b.color().unwrap());
             assert_eq!(ga.images.as_ref().unwrap().raw, gb.images.as_ref().unwrap().raw);
             assert_eq!(ga.difference, gb.difference);
-            let (ba, bb) = (a.bubble.as_ref().unwrap(), b.bubble.as_ref().unwrap());
+            let (ba, bb) = (a.depth().unwrap(), b.depth().unwrap());
             assert_eq!(ba.imprint, bb.imprint);
             assert_eq!(ba.truth.as_ref().unwrap().contact, bb.truth.as_ref().unwrap().contact);
             let (ca, cb) = (ba.camera.as_ref().unwrap(), bb.camera.as_ref().unwrap());
@@ -96,8 +96,9 @@ fn everything_wrong_is_listed_and_the_rest_opens() {
     assert!(error(3).contains("bubble_imprint") && error(3).contains("missing"), "{}", error(3));
     assert!(error(5).contains("empty") && error(6).contains("not a PyTorch file"));
     let odd = dataset.load_with_counts(id(4)).unwrap();
-    assert_eq!((odd.invalid[0].nan, odd.invalid[0].infinite, odd.invalid[1].nan), (1, 1, 1));
-    let right = odd.sample.finger(Finger::Right).unwrap().bubble.as_ref().unwrap();
+    let [right, left] = lab::PADS.map(|finger| odd.invalid[finger].unwrap());
+    assert_eq!((right.nan, right.infinite, left.nan), (1, 1, 1));
+    let right = odd.sample.pad(lab::RIGHT).unwrap().depth().unwrap();
     assert!(right.imprint[(5, 0)].is_nan() && right.imprint[(6, 0)].is_nan() && right.camera.is_none());
     for key in ["bubble_depth_ref", "\"K\"", "bubbles_tr_quat"] {
         assert!(odd.sample.notes.iter().any(|n| n.what.contains(key)), "{key}: {:#?}", odd.sample.notes);
@@ -108,25 +109,25 @@ fn everything_wrong_is_listed_and_the_rest_opens() {
 
 #[test]
 fn what_is_mostly_no_measurement_is_refused_with_its_share() {
-    for (finger, share, refused) in [(0, 0.4, false), (0, 0.6, true), (1, 1.0, true)] {
+    for (finger, share, refused) in [(lab::RIGHT, 0.4, false), (lab::RIGHT, 0.6, true), (lab::LEFT, 1.0, true)] {
         for sensor in ["GelSlim", "imprint", "reference"] {
             let dir = tempfile::tempdir().unwrap();
             let mut sample = touch(1.0);
-            let touch = sample.fingers[finger].as_mut().unwrap();
+            let touch = sample.pads[finger].as_mut().unwrap();
             let cut = |len: usize| (share * len as f64) as usize;
             match sensor {
                 "GelSlim" => {
-                    let raw = &mut touch.gelslim.as_mut().unwrap().images.as_mut().unwrap().raw;
+                    let raw = &mut touch.color_mut().unwrap().images.as_mut().unwrap().raw;
                     let cut = cut(raw.len());
                     raw.as_mut_slice()[..cut].fill([f32::NAN; 3]);
                 }
                 "imprint" => {
-                    let imprint = &mut touch.bubble.as_mut().unwrap().imprint;
+                    let imprint = &mut touch.depth_mut().unwrap().imprint;
                     let cut = cut(imprint.len());
                     imprint.as_mut_slice()[..cut].fill(f32::NAN);
                 }
                 _ => {
-                    let reference = &mut touch.bubble.as_mut().unwrap().camera.as_mut().unwrap().depth_reference;
+                    let reference = &mut touch.depth_mut().unwrap().camera.as_mut().unwrap().depth_reference;
                     let cut = cut(reference.len());
                     reference.as_mut_slice()[..cut].fill(f32::INFINITY);
                 }
@@ -150,7 +151,7 @@ fn what_is_mostly_no_measurement_is_refused_with_its_share() {
 fn halves_of_different_grasps_and_camera_zeros_are_noticed() {
     let dir = tempfile::tempdir().unwrap();
     let mut sample = touch(1.0);
-    let bubble = sample.fingers[1].as_mut().unwrap().bubble.as_mut().unwrap();
+    let bubble = sample.pads[lab::LEFT].as_mut().unwrap().depth_mut().unwrap();
     bubble.imprint[(3, 4)] = bubble.camera.as_ref().unwrap().depth_reference[(3, 4)];
     write_pair(dir.path(), Layout::Test, "rod", 0, &sample).unwrap();
     write_pair(dir.path(), Layout::Test, "rod", 1, &touch(2.0)).unwrap();
@@ -158,7 +159,7 @@ fn halves_of_different_grasps_and_camera_zeros_are_noticed() {
     let [gel1, _] = pair_paths(dir.path(), Layout::Test, "rod", 1);
     std::fs::copy(gel1, gel0).unwrap();
     let loaded = Dataset::open(dir.path()).unwrap().load_with_counts(PairId(0)).unwrap();
-    assert_eq!(loaded.invalid[1].dropped, 1);
+    assert_eq!(loaded.invalid[lab::LEFT].unwrap().dropped, 1);
     assert!(loaded.sample.notes[0].what.contains("differ"), "{:#?}", loaded.sample.notes);
 }
 
@@ -224,7 +225,7 @@ fn picture_folders() {
     assert_eq!(dataset.problems.len(), 1);
     assert!(dataset.problems[0].what.contains("lone_gelslim.png"));
     let touch = dataset.load(PairId(0)).unwrap();
-    let imprint = &touch.finger(Finger::Right).unwrap().bubble.as_ref().unwrap().imprint;
+    let imprint = &touch.pad(lab::RIGHT).unwrap().depth().unwrap().imprint;
     assert!(imprint[(0, 0)] > imprint[(174, 139)], "turned back by 180 degrees");
     assert!(dataset.load(PairId(1)).unwrap_err().to_string().contains("b10_bubble.png"));
     assert_eq!(dataset.vqvae_tile(PairId(0), Turn::default()).unwrap(), None);
@@ -243,7 +244,7 @@ fn the_demo_renders_what_is_asked_for() {
     assert!(seen.len() == pairs && pairs >= 12 * 20);
     let (a, again, b) = (demo.load(PairId(3)).unwrap(), demo.load(PairId(3)).unwrap(), demo.load(PairId(4)).unwrap());
     let imprint = |s: &touch2touch::domain::sample::Sample| {
-        let map = &s.finger(Finger::Left).unwrap().bubble.as_ref().unwrap().imprint;
+        let map = &s.pad(lab::LEFT).unwrap().depth().unwrap().imprint;
         map.as_slice().iter().map(|v| v.to_bits()).collect::<Vec<u32>>()
     };
     assert_eq!(imprint(&a), imprint(&again));

@@ -6,8 +6,8 @@ use std::path::Path;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Grid;
 use touch2touch::domain::mesh::TriMesh;
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::Sample;
-use touch2touch::domain::sensor::Finger;
 use touch2touch::domain::sim;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::doctor::{DoctorReport, examine};
@@ -45,9 +45,9 @@ fn spoilt(spoil: impl FnOnce(&mut Sample)) -> Vec<String> {
 }
 
 /// Changes both bubbles.
-fn bubbles(sample: &mut Sample, f: impl Fn(&mut touch2touch::domain::sample::BubbleTouch)) {
-    for finger in Finger::BOTH {
-        f(sample.fingers[finger.index()].as_mut().unwrap().bubble.as_mut().unwrap());
+fn bubbles(sample: &mut Sample, f: impl Fn(&mut touch2touch::domain::sample::DepthTouch)) {
+    for finger in lab::PADS {
+        f(sample.pads[finger].as_mut().unwrap().depth_mut().unwrap());
     }
 }
 
@@ -78,8 +78,8 @@ fn good_data_has_no_problem_and_every_spoilt_one_is_found() {
     has(spoilt(|s| bubbles(s, |b| b.camera.as_mut().unwrap().grasp_from_camera.translation *= 20.0)), "past the grasp");
     has(
         spoilt(|s| {
-            let left = s.fingers[1].clone();
-            s.fingers[0] = left;
+            let left = s.pads[lab::LEFT].clone();
+            s.pads[lab::RIGHT] = left;
         }),
         "same side",
     );
@@ -87,7 +87,7 @@ fn good_data_has_no_problem_and_every_spoilt_one_is_found() {
     has(spoilt(|s| s.grasp_from_object.as_mut().unwrap().y_m = 4.0), "millimetres?");
     has(
         spoilt(|s| {
-            let images = s.fingers[0].as_mut().unwrap().gelslim.as_mut().unwrap().images.as_mut().unwrap();
+            let images = s.pads[lab::RIGHT].as_mut().unwrap().color_mut().unwrap().images.as_mut().unwrap();
             images.raw = images.raw.map(|p| p.map(|v| v / 255.0));
         }),
         "not the scale 0..255",

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use touch2touch::domain::grid::{DepthMap, Grid, Mask};
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 use touch2touch::io::export_unet::{ExportConfig, ExportEntry, ExportError, MANIFEST, check_folder, export};
 use touch2touch::io::images;
 
@@ -12,7 +12,7 @@ fn entries(n: usize) -> Vec<ExportEntry> {
         .map(|i| ExportEntry {
             pair: format!("pattern_31_rod/data_{i}"),
             tool: Some("pattern_31_rod".into()),
-            finger: Finger::Right,
+            finger: lab::RIGHT,
         })
         .collect()
 }

@@ -5,7 +5,7 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 use touch2touch::infer::bundle::Bundle;
 use touch2touch::io::dataset::{Dataset, read_in_metres};
 use touch2touch::io::masks::MaskStore;
@@ -56,10 +56,10 @@ fn no_reader_waits_for_a_pipe_or_reads_a_device() {
         }
     }
     let dir = tempfile::tempdir().unwrap();
-    let name = MaskStore::in_folder(PathBuf::new()).mask_file("a", Finger::Right);
+    let name = MaskStore::in_folder(PathBuf::new()).mask_file("a", lab::RIGHT);
     for path in not_files(dir.path(), &name.to_string_lossy()) {
         let store = MaskStore::in_folder(path.parent().unwrap().to_owned());
-        let said = within_a_minute("a mask", move || error(store.load("a", Finger::Right)));
+        let said = within_a_minute("a mask", move || error(store.load("a", lab::RIGHT)));
         assert!(said.contains("not an ordinary file"), "{said}");
     }
 }

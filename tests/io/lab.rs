@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use touch2touch::domain::dataset::{PairId, Split};
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 use touch2touch::io::dataset::{Dataset, SourceKind};
 use touch2touch::io::{npz, stl};
 
@@ -32,13 +32,13 @@ fn every_tensor_of_the_reference_set_is_right() {
         // The truth was written from 32-bit numbers.
         assert!((pose.theta_rad.to_degrees() - number("theta_deg")).abs() < 1e-9, "{name}");
         assert!((pose.y_m + number("x")).abs() < 1e-9 && (pose.z_m + number("y")).abs() < 1e-9, "{name}");
-        for finger in Finger::BOTH {
-            let touch = sample.finger(finger).unwrap();
-            let imprint = &touch.bubble.as_ref().unwrap().imprint;
+        for finger in lab::PADS {
+            let touch = sample.pad(finger).unwrap();
+            let imprint = &touch.depth().unwrap().imprint;
             let sum: f64 = imprint.as_slice().iter().map(|&v| f64::from(v)).sum();
             let want_sum = want["imprint_sum"][finger.index()].as_f64().unwrap();
             assert!((sum - want_sum).abs() < 1e-9 * want_sum.abs(), "{name}: {sum} for {want_sum}");
-            let raw = &touch.gelslim.as_ref().unwrap().images.as_ref().unwrap().raw;
+            let raw = &touch.color().unwrap().images.as_ref().unwrap().raw;
             let sum: f64 = raw.as_slice().iter().flatten().map(|&v| f64::from(v)).sum();
             assert_eq!(sum, want["gelslim_sum"][finger.index()].as_f64().unwrap(), "{name}");
         }
@@ -56,8 +56,8 @@ fn the_deepest_pixels_of_both_fingers_lie_on_the_tool() {
         let object_from_grasp = sample.grasp_from_object.unwrap().inverse().to_affine();
         let mesh = dataset.tool_mesh(entry.tool.as_deref().unwrap()).unwrap().unwrap();
         let [lo, hi] = mesh.bounds().unwrap();
-        for finger in Finger::BOTH {
-            let bubble = sample.finger(finger).unwrap().bubble.as_ref().unwrap();
+        for finger in lab::PADS {
+            let bubble = sample.pad(finger).unwrap().depth().unwrap();
             let camera = bubble.camera.as_ref().unwrap();
             let mut order: Vec<usize> = (0..bubble.imprint.len()).collect();
             order.sort_by(|&a, &b| bubble.imprint.as_slice()[b].total_cmp(&bubble.imprint.as_slice()[a]));
@@ -65,14 +65,14 @@ fn the_deepest_pixels_of_both_fingers_lie_on_the_tool() {
             for &at in &order[..100] {
                 let (u, v) = (at % bubble.imprint.width(), at / bubble.imprint.width());
                 let depth = f64::from(camera.depth_reference[(u, v)] - bubble.imprint[(u, v)]);
-                let in_camera = camera.intrinsics.lift(u as f64, v as f64, depth);
+                let in_camera = camera.lift(u as f64, v as f64, depth);
                 let p = object_from_grasp * camera.grasp_from_camera;
                 let p: DVec3 = p.transform_point3(in_camera);
                 // 2 mm for the camera's noise.
                 let near = |p: f64, lo: f64, hi: f64| p > lo - 0.002 && p < hi + 0.002;
                 inside += usize::from(near(p.x, lo.x, hi.x) && near(p.y, lo.y, hi.y) && near(p.z, lo.z, hi.z));
             }
-            assert!(inside >= 90, "{} {}: {inside} of 100", entry.name, finger.name());
+            assert!(inside >= 90, "{} {}: {inside} of 100", entry.name, finger.index());
         }
     }
 }
@@ -110,8 +110,8 @@ fn the_real_pictures_open_without_a_problem() {
     for i in 0..36 {
         let loaded = dataset.load_with_counts(PairId(i)).unwrap();
         assert_eq!(loaded.sample.notes, []);
-        let touch = loaded.sample.finger(Finger::Right).unwrap();
-        let imprint = &touch.bubble.as_ref().unwrap().imprint;
+        let touch = loaded.sample.pad(lab::RIGHT).unwrap();
+        let imprint = &touch.depth().unwrap().imprint;
         assert_eq!(imprint.size(), [175, 140]);
         let largest = imprint.as_slice().iter().copied().fold(0f32, f32::max);
         assert!((0.015..=0.0180001).contains(&largest), "{i}: {largest}");
@@ -119,7 +119,7 @@ fn the_real_pictures_open_without_a_problem() {
         assert_eq!(dataset.bubble_tile(PairId(i), laid).unwrap().unwrap().size(), [128, 128]);
         assert_eq!(dataset.vqvae_tile(PairId(i), laid).unwrap().unwrap().size(), [128, 128]);
         assert_eq!(dataset.vqvae_imprint(PairId(i), laid).unwrap().unwrap().size(), [175, 140]);
-        let difference = &touch.gelslim.as_ref().unwrap().difference;
+        let difference = &touch.color().unwrap().difference;
         for (c, sum) in squares.iter_mut().enumerate() {
             let mean_square: f64 =
                 difference.as_slice().iter().map(|p| f64::from(p[c]).powi(2)).sum::<f64>() / difference.len() as f64;

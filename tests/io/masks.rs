@@ -8,7 +8,7 @@ use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::Mask;
 use touch2touch::domain::hand::{AcceptedPose, HandPose};
 use touch2touch::domain::label::{Patch, paint_stroke};
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::{FOLDER, JournalEntry, MaskStore, StoreError, StoredMask, StoredReview};
 
@@ -47,30 +47,30 @@ fn paint(mask: &mut Mask, number: u32) {
 fn what_is_saved_is_loaded_and_undo_changes_the_file() {
     let dir = tempfile::tempdir().unwrap();
     let store = MaskStore::in_folder(dir.path().join("deep/masks"));
-    assert_eq!(store.load(PAIR, Finger::Right).unwrap(), None);
+    assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), None);
     let before = Mask::filled(175, 140, false);
     let mut after = before.clone();
     paint(&mut after, 0);
-    store.save(PAIR, Finger::Right, Some(&stored(after.clone()))).unwrap();
-    assert_eq!(store.load(PAIR, Finger::Right).unwrap(), Some(stored(after.clone())));
-    assert_eq!(store.load(PAIR, Finger::Left).unwrap(), None);
+    store.save(PAIR, lab::RIGHT, Some(&stored(after.clone()))).unwrap();
+    assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), Some(stored(after.clone())));
+    assert_eq!(store.load(PAIR, lab::LEFT).unwrap(), None);
     let mut undo = Patch::between(&after, &before).unwrap();
     undo.swap(&mut after).unwrap();
-    store.save(PAIR, Finger::Right, Some(&stored(after))).unwrap();
-    assert_eq!(store.load(PAIR, Finger::Right).unwrap(), Some(stored(before)));
+    store.save(PAIR, lab::RIGHT, Some(&stored(after))).unwrap();
+    assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), Some(stored(before)));
     // Names that look alike do not share a file.
     for name in ["a/b", "a_b", "A/b", "../x", "ä"] {
-        store.save(name, Finger::Left, Some(&stored(Mask::filled(name.len(), 1, true)))).unwrap();
+        store.save(name, lab::LEFT, Some(&stored(Mask::filled(name.len(), 1, true)))).unwrap();
     }
     for name in ["a/b", "a_b", "A/b", "../x", "ä"] {
-        assert_eq!(store.load(name, Finger::Left).unwrap().unwrap().mask.width(), name.len());
+        assert_eq!(store.load(name, lab::LEFT).unwrap().unwrap().mask.width(), name.len());
     }
     let mut names: Vec<String> = store.masks().into_iter().map(|(name, _)| name).collect();
     names.sort();
     assert_eq!(names, ["../x", "A/b", "a/b", "a_b", PAIR, "ä"]);
-    store.save(PAIR, Finger::Right, None).unwrap();
-    store.save(PAIR, Finger::Right, None).unwrap();
-    assert_eq!(store.load(PAIR, Finger::Right).unwrap(), None);
+    store.save(PAIR, lab::RIGHT, None).unwrap();
+    store.save(PAIR, lab::RIGHT, None).unwrap();
+    assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), None);
 }
 
 #[test]
@@ -78,8 +78,8 @@ fn a_damaged_file_blocks_its_pair_and_is_kept() {
     let dir = tempfile::tempdir().unwrap();
     let store = MaskStore::in_folder(dir.path().to_owned());
     let mask = stored(Mask::filled(175, 140, true));
-    store.save(PAIR, Finger::Right, Some(&mask)).unwrap();
-    let file = store.mask_file(PAIR, Finger::Right);
+    store.save(PAIR, lab::RIGHT, Some(&mask)).unwrap();
+    let file = store.mask_file(PAIR, lab::RIGHT);
     let good = std::fs::read_to_string(&file).unwrap();
     for bad in [
         String::new(),
@@ -94,15 +94,15 @@ fn a_damaged_file_blocks_its_pair_and_is_kept() {
         assert_ne!(bad, good);
         std::fs::write(&file, &bad).unwrap();
         for result in [
-            store.load(PAIR, Finger::Right).map(drop),
-            store.save(PAIR, Finger::Right, Some(&mask)),
-            store.save(PAIR, Finger::Right, None),
+            store.load(PAIR, lab::RIGHT).map(drop),
+            store.save(PAIR, lab::RIGHT, Some(&mask)),
+            store.save(PAIR, lab::RIGHT, None),
         ] {
             let err = result.unwrap_err();
             assert!(matches!(err, StoreError::Damaged { .. }) && err.hint().contains("backup"), "{err}");
         }
         assert_eq!(std::fs::read_to_string(&file).unwrap(), bad, "it is left as it is");
-        store.save(PAIR, Finger::Left, Some(&mask)).unwrap();
+        store.save(PAIR, lab::LEFT, Some(&mask)).unwrap();
     }
 }
 
@@ -174,19 +174,19 @@ fn masks_lie_beside_the_dataset_or_in_the_users_folder() {
     let store = MaskStore::for_dataset(&dataset).unwrap();
     assert_eq!(store.folder(), root.canonicalize().unwrap().join(FOLDER));
     assert!(!store.folder().exists(), "opening creates nothing");
-    store.save(PAIR, Finger::Left, Some(&stored(Mask::filled(2, 2, true)))).unwrap();
+    store.save(PAIR, lab::LEFT, Some(&stored(Mask::filled(2, 2, true)))).unwrap();
     assert_eq!(Dataset::open(&root).unwrap().index.pairs.len(), 1, "the masks are no data");
     // A root that cannot be written: here, because it is not there.
     let user = dir.path().join("home/masks/x");
     let missing = dir.path().join("gone");
     let store = MaskStore::choose(Some(&missing), Some(user.clone())).unwrap();
     assert_eq!(store.folder(), user);
-    store.save(PAIR, Finger::Left, Some(&stored(Mask::filled(2, 2, true)))).unwrap();
+    store.save(PAIR, lab::LEFT, Some(&stored(Mask::filled(2, 2, true)))).unwrap();
     // Back again, beside the data: the earlier work is still there.
     std::fs::create_dir(&missing).unwrap();
     let store = MaskStore::choose(Some(&missing), Some(user)).unwrap();
     assert_eq!(store.folder(), missing.join(FOLDER));
-    assert!(store.load(PAIR, Finger::Left).unwrap().is_some());
+    assert!(store.load(PAIR, lab::LEFT).unwrap().is_some());
     assert!(matches!(MaskStore::choose(Some(&dir.path().join("no")), None), Err(StoreError::NoFolder { .. })));
 }
 
@@ -200,7 +200,7 @@ fn child_that_paints() {
     for number in 0..1_000_000 {
         store.append_journal(&entry(number, &stroke(number))).unwrap();
         paint(&mut mask, number);
-        store.save(PAIR, Finger::Right, Some(&stored(mask.clone()))).unwrap();
+        store.save(PAIR, lab::RIGHT, Some(&stored(mask.clone()))).unwrap();
         println!("saved {number}");
     }
 }
@@ -233,7 +233,7 @@ fn a_kill_in_mid_stroke_loses_at_most_that_stroke() {
         assert!(killed, "the child ended by itself");
         let saved = saved.unwrap();
         let store = MaskStore::in_folder(dir.path().to_owned());
-        let found = store.load(PAIR, Finger::Right).unwrap().unwrap().mask;
+        let found = store.load(PAIR, lab::RIGHT).unwrap().unwrap().mask;
         let mut expected = Mask::filled(175, 140, false);
         (0..=saved).for_each(|number| paint(&mut expected, number));
         if found != expected {
@@ -245,7 +245,7 @@ fn a_kill_in_mid_stroke_loses_at_most_that_stroke() {
         assert!(entries > saved && entries <= saved + 2, "{entries} lines for {saved} strokes");
         assert!(journal.iter().enumerate().all(|(i, e)| *e == entry(i as u32, &stroke(i as u32))));
         // Work goes on after the crash.
-        store.save(PAIR, Finger::Right, Some(&stored(expected.clone()))).unwrap();
-        assert_eq!(store.load(PAIR, Finger::Right).unwrap().unwrap().mask, expected);
+        store.save(PAIR, lab::RIGHT, Some(&stored(expected.clone()))).unwrap();
+        assert_eq!(store.load(PAIR, lab::RIGHT).unwrap().unwrap().mask, expected);
     }
 }

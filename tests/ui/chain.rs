@@ -8,7 +8,7 @@ use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch::domain::ambiguity::Touch;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::postprocess::FlagKind;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 
@@ -47,7 +47,7 @@ fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
     let state = rig.harness.state().state();
     assert_eq!(state.settings.workspace, Workspace::Inspect);
     assert!(state.selection.panes.contains(&Pane::Ledger));
-    let found = state.ledger(Finger::Right).ready().expect("the chain of the finger shown");
+    let found = state.ledger(lab::RIGHT).ready().expect("the chain of the finger shown");
     assert_eq!(found.ledger.flags[0].kind, FlagKind::DoubledMapping);
     for stage in &found.ledger.stages {
         let name = format!("Stage {}:", stage.stage.name());
@@ -62,12 +62,12 @@ fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
     rig.take("Reading Exact inverse");
     let state = rig.harness.state().state();
     assert_eq!(state.settings.shift, ShiftMode::ExactInverse);
-    let found = state.ledger(Finger::Right).ready().unwrap();
+    let found = state.ledger(lab::RIGHT).ready().unwrap();
     assert!(found.ledger.flags.iter().all(|f| f.kind != FlagKind::DoubledMapping), "{:?}", found.ledger.flags);
     rig.take("Depth chain of the left finger");
     rig.shoot("test-depth-chain-maximised");
-    assert_eq!(rig.harness.state().state().selection.finger, Finger::Left);
-    assert!(rig.harness.state().state().ledger(Finger::Left).ready().is_some());
+    assert_eq!(rig.harness.state().state().selection.finger, lab::LEFT);
+    assert!(rig.harness.state().state().ledger(lab::LEFT).ready().is_some());
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
     let state = rig.harness.state().state();
     let ShiftMode::Refit(refit) = state.settings.shift else { panic!("{:?}", state.settings.shift) };
     assert!(state.log.entries.iter().any(|e| e.text.contains("Shift statistics of 8 touches")), "{:?}", state.log);
-    assert!(state.ledger(Finger::Right).ready().is_some());
+    assert!(state.ledger(lab::RIGHT).ready().is_some());
     let kept = std::fs::read_dir(rig.config.join("statistics")).unwrap().count();
     assert_eq!(kept, 1);
     // The mean of what is predicted is that of what is measured, over the data set.
@@ -107,8 +107,8 @@ fn seen_and_invented_stand_beside_each_other_and_a_bare_shaft_is_said() {
     rig.send(Command::Open(Place::Path(folder.path().to_owned())));
     rig.send(Command::Generate);
     let state = rig.harness.state().state();
-    assert_eq!(state.ambiguity(Finger::Right).unwrap().kind, Touch::BareShaft);
-    let split = state.comparison(Finger::Right).ready().unwrap().split.unwrap();
+    assert_eq!(state.ambiguity(lab::RIGHT).unwrap().kind, Touch::BareShaft);
+    let split = state.comparison(lab::RIGHT).ready().unwrap().split.unwrap();
     assert!(split.seen.pixels > 1000 && split.invented.pixels > 10 * split.seen.pixels);
     for label in ["Seen ", "Invented ", "The gel shows a bare shaft"] {
         assert!(rig.harness.query_all_by_label_contains(label).next().is_some(), "{label}");

@@ -6,7 +6,7 @@ use touch2touch::app::command::Command;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::state::{Absent, Lookup};
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
 use touch2touch::io::simulated::{Layout, pair_paths, write_pair};
 
@@ -37,8 +37,8 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     let state = rig.harness.state().state();
     assert_eq!(names(&rig)[..before.len()], before, "the pairs before keep their places");
     assert!(state.pair_name().ends_with("data_40"), "{}", state.pair_name());
-    assert!(state.imprint(ImprintSource::Predicted, Finger::Right).ready().is_some());
-    assert!(state.imprint(ImprintSource::Measured, Finger::Right).ready().is_some());
+    assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
+    assert!(state.imprint(ImprintSource::Measured, lab::RIGHT).ready().is_some());
     assert!(state.pose(ImprintSource::Predicted).ready().is_some(), "{:?}", state.pose(ImprintSource::Predicted));
     rig.shoot("follow-1280");
 
@@ -51,9 +51,9 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     rig.settle();
     let state = rig.harness.state().state();
     assert!(state.pair_name().ends_with("data_41"), "{}", state.pair_name());
-    let measured = state.imprint(ImprintSource::Measured, Finger::Right);
+    let measured = state.imprint(ImprintSource::Measured, lab::RIGHT);
     assert!(matches!(measured, Lookup::Absent(Absent::NoBubble)), "{measured:?}");
-    assert!(state.imprint(ImprintSource::Predicted, Finger::Right).ready().is_some());
+    assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
     assert!(state.pose(ImprintSource::Predicted).ready().is_some(), "{:?}", state.pose(ImprintSource::Predicted));
     assert_eq!(state.library.follow.as_ref().unwrap().arrived, 2);
     rig.send(Command::SetWorkspace(Workspace::Inspect));

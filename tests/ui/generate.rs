@@ -3,7 +3,7 @@
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::Command;
 use touch2touch::app::keys::{ImprintSource, Preset};
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 
 use super::rig::Rig;
 
@@ -14,7 +14,7 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     let Some((mut rig, gate)) = Rig::gated(SIZE) else { return };
     rig.harness.state_mut().push(Command::DismissHint);
     rig.harness.state_mut().push(Command::Generate);
-    rig.until("a preview", |state| state.preview(Finger::Right).is_some());
+    rig.until("a preview", |state| state.preview(lab::RIGHT).is_some());
     for _ in 0..3 {
         rig.harness.step();
     }
@@ -22,16 +22,28 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     assert!(rig.harness.query_by_label("Predicted imprint right").is_none(), "it is not taken for the result");
     rig.shoot("generate-preview");
     let state = rig.harness.state().state();
-    assert!(state.imprint(ImprintSource::Predicted, Finger::Right).ready().is_none());
-    assert_eq!(state.preview(Finger::Right).unwrap().step, 4);
+    assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_none());
+    assert_eq!(state.preview(lab::RIGHT).unwrap().step, 4);
     gate.open();
-    rig.until("the result", |state| state.imprint(ImprintSource::Predicted, Finger::Right).ready().is_some());
+    rig.until("the result", |state| state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
     for _ in 0..3 {
         rig.harness.step();
     }
     assert!(rig.harness.query_by_label("Predicted imprint right, preview").is_none());
     assert!(rig.harness.query_by_label("Predicted imprint right").is_some());
-    assert!(rig.harness.state().state().preview(Finger::Right).is_none());
+    assert!(rig.harness.state().state().preview(lab::RIGHT).is_none());
+}
+
+#[test]
+fn a_color_sensor_is_predicted_in_the_same_pane() {
+    let Some(mut rig) = Rig::with_bundle(SIZE, "Tiny generator from Soft Bubble to GelSlim") else { return };
+    rig.send(Command::DismissHint);
+    rig.send(Command::Generate);
+    let state = rig.harness.state().state();
+    let picture = state.predicted_color(lab::RIGHT).expect("the model predicts a color picture").ready().unwrap();
+    assert_eq!(picture.size(), lab::GELSLIM.size());
+    assert!(rig.harness.query_by_label("Predicted imprint right").is_some(), "the picture, not a sentence");
+    rig.shoot("generate-color");
 }
 
 #[test]
@@ -39,7 +51,7 @@ fn presets_are_one_click_and_show_their_numbers() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     let steps = |rig: &Rig| {
         let state = rig.harness.state().state();
-        state.recipe(state.touch_key(Finger::Right).unwrap()).unwrap().steps
+        state.recipe(state.touch_key(lab::RIGHT).unwrap()).unwrap().steps
     };
     assert_eq!(steps(&rig), 4, "what the bundle recommends");
     for (label, preset) in [("Fast", Preset::Fast), ("Sharp", Preset::Sharp), ("Default", Preset::Default)] {

@@ -11,7 +11,7 @@ use touch2touch::app::command::{Command, Pane};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch::domain::postprocess::ShiftMode;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::MaskStore;
 
@@ -50,7 +50,7 @@ impl Rig {
         self.settle();
     }
 
-    fn stored(&self, pair: &str, finger: Finger) -> Option<usize> {
+    fn stored(&self, pair: &str, finger: PadId) -> Option<usize> {
         let dataset = Dataset::open(&self.data).unwrap();
         let store = MaskStore::for_dataset(&dataset).unwrap();
         store.load(pair, finger).unwrap().map(|m| m.mask.as_slice().iter().filter(|on| **on).count())
@@ -86,21 +86,21 @@ fn browse_generate_shift_paint_undo() {
     // An empty pane offers what it lacks; the same by key gives another seed's result when asked so.
     rig.click("Generate (Ctrl+G)");
     let state = rig.harness.state().state();
-    for finger in Finger::BOTH {
+    for finger in lab::PADS {
         assert!(state.chosen(finger).is_some(), "{finger:?}");
-        assert!(state.imprint(ImprintSource::Predicted, Finger::Right).ready().is_some());
+        assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
     }
     rig.key(Modifiers::CTRL | Modifiers::SHIFT, Key::G);
     let state = rig.harness.state().state();
-    let touch = state.touch_key(Finger::Right).unwrap();
+    let touch = state.touch_key(lab::RIGHT).unwrap();
     assert_eq!(state.results.made[&touch].len(), 2, "the first result is kept");
 
     // Another range mapping, by its button.
-    let exact = state.imprint(ImprintSource::Predicted, Finger::Right).ready().unwrap().clone();
+    let exact = state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().unwrap().clone();
     rig.click("Paper shift");
     let state = rig.harness.state().state();
     assert_eq!(state.settings.shift, ShiftMode::PaperShift);
-    assert_ne!(*state.imprint(ImprintSource::Predicted, Finger::Right).ready().unwrap(), exact);
+    assert_ne!(*state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().unwrap(), exact);
 
     // Another image in the same place.
     assert!(!state.selection.panes.contains(&Pane::GelRaw));
@@ -115,20 +115,20 @@ fn browse_generate_shift_paint_undo() {
     let pair = state.pair_name().to_owned();
     let before = state.pose(ImprintSource::Measured).ready().expect("a pose before the stroke").clone();
     let area = |rig: &Rig| {
-        let mask = rig.harness.state().state().mask_in_force(ImprintSource::Measured, Finger::Right).unwrap();
+        let mask = rig.harness.state().state().mask_in_force(ImprintSource::Measured, lab::RIGHT).unwrap();
         mask.mask.as_slice().iter().filter(|on| **on).count()
     };
     let automatic = area(&rig);
-    assert_eq!(rig.stored(&pair, Finger::Right), None);
+    assert_eq!(rig.stored(&pair, lab::RIGHT), None);
     rig.stroke("Measured imprint right", &[[0.1, 0.5], [0.3, 0.45], [0.6, 0.55], [0.9, 0.5]]);
     let state = rig.harness.state().state();
-    assert!(state.document.hand_mask(&pair, Finger::Right).is_some());
-    assert!(state.document.hand_mask(&pair, Finger::Left).is_none(), "only the finger painted on");
+    assert!(state.document.hand_mask(&pair, lab::RIGHT).is_some());
+    assert!(state.document.hand_mask(&pair, lab::LEFT).is_none(), "only the finger painted on");
     let painted = area(&rig);
     assert!(painted > automatic, "{painted} > {automatic}");
     let after = state.pose(ImprintSource::Measured).ready().expect("a pose after the stroke").clone();
     assert!(after.num_points > before.num_points, "{} > {}", after.num_points, before.num_points);
-    assert_eq!(rig.stored(&pair, Finger::Right), Some(painted), "saved by itself");
+    assert_eq!(rig.stored(&pair, lab::RIGHT), Some(painted), "saved by itself");
 
     // Erase with Ctrl-less tool by key, then take both back.
     rig.key(Modifiers::NONE, Key::E);
@@ -136,7 +136,7 @@ fn browse_generate_shift_paint_undo() {
     assert!(area(&rig) < painted);
     rig.key(Modifiers::CTRL, Key::Z);
     assert_eq!(area(&rig), painted);
-    assert_eq!(rig.stored(&pair, Finger::Right), Some(painted), "undo changes the file too");
+    assert_eq!(rig.stored(&pair, lab::RIGHT), Some(painted), "undo changes the file too");
     rig.key(Modifiers::CTRL, Key::Z);
     assert_eq!(area(&rig), automatic);
     assert_eq!(
@@ -152,7 +152,7 @@ fn browse_generate_shift_paint_undo() {
     rig.restart(SIZE);
     let state = rig.harness.state().state();
     assert!(state.document.review(&pair).is_finished());
-    assert_eq!(rig.stored(&pair, Finger::Right), Some(painted));
+    assert_eq!(rig.stored(&pair, lab::RIGHT), Some(painted));
 }
 
 #[test]

@@ -18,9 +18,10 @@ use touch2touch::domain::postprocess::{
     DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift, ShiftMode, ShiftStats,
 };
 use touch2touch::domain::resample::Resampling;
-use touch2touch::domain::sensor::bubble;
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
 use touch2touch::infer::engine::EngineChoice;
+use touch2touch::infer::bundle::SensorPair;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::ui::{Options, StudioApp};
@@ -89,6 +90,7 @@ impl Services for QuickGenerator {
                 defaults: GenerateConfig { steps: 4, ..GenerateConfig::default() },
                 training_steps: 1000,
                 guided: false,
+                sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
             }),
         };
         (vec![info], Vec::new())
@@ -112,7 +114,7 @@ impl Services for QuickGenerator {
             mapping: Mapping::Doubled,
             reduction: Reduction::Mean,
             shift: Shift::None,
-            size: [bubble::WIDTH, bubble::HEIGHT],
+            size: [lab::BUBBLE.width, lab::BUBBLE.height],
             resampling: Resampling::Bilinear,
             rotation_deg: 180,
         };
@@ -137,7 +139,7 @@ impl Services for QuickGenerator {
             let mean = picture(item.difference, item.seed);
             let raw = RawPrediction { channels: [-0.02, 0.0, 0.02].map(|off| mean.map(|v| v + off)).to_vec() };
             let (chains, bundle) = (chains.clone(), bundle.id.clone());
-            Prediction { raw, chains, bundle, engine: "double".into(), seconds: 0.0, kept: false }
+            Prediction { raw, chains, color: None, bundle, engine: "double".into(), seconds: 0.0, kept: false }
         };
         Ok(wanted.iter().map(one).collect())
     }
@@ -214,6 +216,19 @@ impl Rig {
         rig.harness = Self::build(size, services, Some(rig.data.clone()), false);
         rig.until("the data set", |state| state.library.open.is_some() && state.sample().ready().is_some());
         Some((rig, gate))
+    }
+
+    /// As [`Rig::new`] with the program's own services, the tiny bundles of the tests and one of them chosen.
+    pub(super) fn with_bundle(size: [f32; 2], name: &str) -> Option<Self> {
+        let mut rig = Self::new(size, 1)?;
+        let services = LiveServices::with_config_folder(Some(rig.config.clone()));
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles");
+        let mut settings = Settings { bundle_folders: vec![folder], ..Settings::default() };
+        settings.generate.bundle = Some(name.to_owned());
+        services.save_settings(&settings).unwrap();
+        rig.harness = Self::build(size, Arc::new(services), Some(rig.data.clone()), true);
+        rig.settle();
+        Some(rig)
     }
 
     /// Frames until something is so; a failure after five minutes.

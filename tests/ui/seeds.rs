@@ -4,7 +4,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, Pane};
 use touch2touch::app::seeds::SeedsCommand;
 use touch2touch::domain::ensemble::AngleFan;
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::lab;
 
 use super::rig::Rig;
 
@@ -18,7 +18,7 @@ fn click(rig: &mut Rig, label: &str) {
 /// Predictions of the ensemble of the active finger that are there.
 fn there(rig: &Rig) -> usize {
     let state = rig.harness.state().state();
-    let recipes = state.seed_recipes(Finger::Right).unwrap();
+    let recipes = state.seed_recipes(lab::RIGHT).unwrap();
     recipes.iter().filter(|r| state.results.predictions.contains(r)).count()
 }
 
@@ -34,9 +34,9 @@ fn seeds_run_in_sight_only_and_show_where_they_disagree() {
     assert_eq!(there(&rig), 8);
 
     let state = rig.harness.state().state();
-    let ensemble = state.ensemble(Finger::Right).ready().expect("mean and spread");
+    let ensemble = state.ensemble(lab::RIGHT).ready().expect("mean and spread");
     assert_eq!(ensemble.spread.count, 8);
-    let recipes = state.seed_recipes(Finger::Right).unwrap();
+    let recipes = state.seed_recipes(lab::RIGHT).unwrap();
     let imprints: Vec<_> = recipes.iter().map(|r| state.seed_imprint(r).unwrap()).collect();
     let at = (90, 70);
     let mean = imprints.iter().map(|i| f64::from(i[at])).sum::<f64>() / 8.0;
@@ -54,10 +54,10 @@ fn seeds_run_in_sight_only_and_show_where_they_disagree() {
     // A click on one shows it everywhere; the ones made meanwhile do not.
     let third = recipes[2].clone();
     click(&mut rig, &format!("Seed {}", third.seed));
-    assert_eq!(rig.harness.state().state().chosen(Finger::Right), Some(&third));
+    assert_eq!(rig.harness.state().state().chosen(lab::RIGHT), Some(&third));
     rig.send(Command::Seeds(SeedsCommand::Count(12)));
     assert_eq!(there(&rig), 12);
-    assert_eq!(rig.harness.state().state().chosen(Finger::Right), Some(&third));
+    assert_eq!(rig.harness.state().state().chosen(lab::RIGHT), Some(&third));
 
     // Stopped: another pair gets none until told so.
     click(&mut rig, "Run the seeds");

@@ -10,7 +10,7 @@ use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::workbench::{HandTry, Layer, PoseOf, SceneTool, WorkbenchCommand};
 use touch2touch::domain::align::reason::Reason;
 use touch2touch::domain::hand::{HandAxis, PoseDifference, STEP_M, STEP_RAD};
-use touch2touch::domain::sensor::Finger;
+use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::MaskStore;
 
@@ -245,7 +245,7 @@ fn distances_and_angles_are_measured_from_point_to_point() {
 fn a_clicked_point_says_all_about_itself() {
     let Some(mut rig) = Rig::aligned() else { return };
     let clouds = rig.model().cloud(MEASURED).ready().unwrap();
-    let cloud = clouds.finger(Finger::Right).unwrap();
+    let cloud = clouds.finger(lab::RIGHT).unwrap();
     let contact = (0..cloud.points.len()).filter(|i| cloud.contact[*i]).nth(40).unwrap();
     let at = rig.harness.state().on_screen(MEASURED, cloud.points[contact].to_array()).unwrap();
     rig.click_at(at);
@@ -253,7 +253,7 @@ fn a_clicked_point_says_all_about_itself() {
     let clouds = rig.model().cloud(MEASURED).ready().unwrap();
     let layers = rig.model().layers(MEASURED).ready().expect("reasons are there once they are shown");
     let (reason, _) = layers.at(picked.finger, clouds.finger(picked.finger).unwrap(), picked.pixel).unwrap();
-    for label in [format!("Reason {reason}"), format!("Pixel {}", picked.finger.name())] {
+    for label in [format!("Reason {reason}"), format!("Pixel {}", rig.model().finger_name(picked.finger))] {
         assert!(rig.harness.query_all_by_label_contains(&label).count() > 0, "{label}");
     }
     rig.shoot("test-picked");
@@ -270,7 +270,7 @@ fn layers_go_round_and_their_numbers_add_up() {
         rig.shoot(&format!("test-layer-{}", layer.name()).to_lowercase());
     }
     let layers = rig.model().layers(MEASURED).ready().expect("the pane shows them");
-    for finger in Finger::BOTH {
+    for finger in lab::PADS {
         let pixels = rig.model().imprint(MEASURED, finger).ready().unwrap().len();
         assert_eq!(layers.counts[finger.index()].iter().sum::<usize>(), pixels, "a reason for every pixel");
         let mask = rig.model().mask_in_force(MEASURED, finger).unwrap().mask;
@@ -307,7 +307,7 @@ fn what_no_pane_shows_is_not_computed_and_rest_is_rest() {
     assert!(rig.model().selection.panes.contains(&Pane::Poses));
     assert_eq!(rig.model().results.clouds.len(), clouds + 2, "one more for each finger");
     let truth = rig.model().truth().unwrap();
-    for of in [PoseOf::Right, PoseOf::Left, PoseOf::Joint] {
+    for of in PoseOf::all(&rig.model().rig()) {
         let pose = rig.model().pose_of(MEASURED, of).ready().unwrap().grasp_from_object;
         let off = PoseDifference::between(pose, truth);
         assert!(off.position_m < 0.02, "{of:?} {off:?}");

@@ -20,6 +20,7 @@ use crate::domain::grid::Grid;
 use crate::work::bundles::BundleKind;
 use crate::work::error::{TaskError, TaskErrorKind};
 use crate::work::models::Prediction;
+use crate::domain::rig::PerPad;
 
 pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
     match command {
@@ -200,6 +201,10 @@ fn store(state: &mut State, request: Request, computed: Computed) {
             let size = bytes(&depth);
             results.imprints.insert((recipe, shift), depth, size);
         }
+        (Request::Imprint(recipe, _), Computed::Color(picture)) => {
+            let size = picture.len() * 12;
+            results.colors.insert(recipe, picture, size);
+        }
         (Request::Comparison(recipe, shift), Computed::Comparison(comparison)) => {
             let size = bytes(&comparison.error);
             results.comparisons.insert((recipe, shift), comparison, size);
@@ -263,7 +268,7 @@ fn mask_arrived(state: &mut State, key: MaskKey, found: ContactMask) {
         let touch = key.imprint.touch();
         let said = state.results.mask_bases.insert(key.clone(), found.basis) == Some(found.basis);
         if let Some(entry) = state.library.entry(touch.pair.pair).filter(|_| !said && is_selected(state, touch.pair)) {
-            let text = format!("{}, {} finger: {why}", entry.name, touch.finger.name());
+            let text = format!("{}, {} finger: {why}", entry.name, state.finger_name(touch.finger));
             state.log.push(Level::Warning, text, None, None);
         }
     }
@@ -272,7 +277,7 @@ fn mask_arrived(state: &mut State, key: MaskKey, found: ContactMask) {
 }
 
 /// The pair and imprint a cloud belongs to.
-fn place_of<M>(parts: &[Option<(ImprintKey, M)>; 2]) -> Option<(PairKey, ImprintSource)> {
+fn place_of<M>(parts: &PerPad<(ImprintKey, M)>) -> Option<(PairKey, ImprintSource)> {
     let (imprint, _) = parts.iter().flatten().next()?;
     let source = match imprint {
         ImprintKey::Measured(_) => ImprintSource::Measured,

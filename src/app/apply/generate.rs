@@ -4,9 +4,9 @@ use super::super::effect::Effect;
 use super::super::keys::PredictionKey;
 use super::super::state::{Absent, State};
 use super::save_settings;
-use crate::domain::sensor::Finger;
 use crate::work::bundles::BundleKind;
 use crate::work::error::TaskError;
+use crate::domain::rig::{PadId, Text};
 
 /// Starts the predictions of the fingers that are looked at, in one go; one that exists is shown instead.
 pub(super) fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
@@ -28,9 +28,9 @@ pub(super) fn same_seed(state: &mut State, effects: &mut Vec<Effect>) {
     // A finger without a GelSlim image is left out; while the sample loads, the job finds out.
     let loaded = state.sample().ready().is_some();
     let mut fingers = state.fingers_to_generate();
-    fingers.retain(|finger| !loaded || state.gelslim(*finger).ready().is_some());
+    fingers.retain(|finger| !loaded || state.can_start(*finger));
     if fingers.is_empty() {
-        return state.log.error(&refusal(Absent::NoGelSlim));
+        return state.log.error(&refusal(Absent::NoInput));
     }
     start(state, &fingers, effects);
 }
@@ -39,7 +39,7 @@ fn refusal(absent: Absent) -> TaskError {
     TaskError::new("Generate", absent.text().trim_end_matches('.'))
 }
 
-fn start(state: &mut State, fingers: &[Finger], effects: &mut Vec<Effect>) {
+fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
     let Ok(bundle) = state.bundle(BundleKind::Generator).cloned() else { return };
     let (Some(pair), Some(open)) = (state.pair_key(), &state.library.open) else { return };
     let (source, sample) = (open.source.clone(), state.results.samples.get(&pair).cloned());
@@ -55,7 +55,7 @@ fn start(state: &mut State, fingers: &[Finger], effects: &mut Vec<Effect>) {
     if recipes.is_empty() {
         return;
     }
-    let names: Vec<&str> = recipes.iter().map(|recipe| recipe.touch.finger.name()).collect();
+    let names: Vec<Text> = recipes.iter().map(|recipe| state.finger_name(recipe.touch.finger)).collect();
     let title = format!("Generate {} {}", state.pair_name(), names.join(" and "));
     let ticket = state.tasks.start(title, recipes.clone());
     effects.push(Effect::Generate { ticket, recipes, bundle, source, sample });

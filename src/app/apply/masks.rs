@@ -14,8 +14,8 @@ use super::{reorder, save_labels};
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{self, Patch};
-use crate::domain::sensor::Finger;
 use crate::work::error::TaskError;
+use crate::domain::rig::PadId;
 
 /// Whether the selected pair may be edited; says why not.
 pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
@@ -37,7 +37,7 @@ pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
 /// The mask in force and where it comes from; an empty one where none can be had.
 ///
 /// `None` while it is being computed: a correction must not start from something else than what is shown.
-fn start_from(state: &State, source: ImprintSource, finger: Finger) -> Option<(Arc<Mask>, String)> {
+fn start_from(state: &State, source: ImprintSource, finger: PadId) -> Option<(Arc<Mask>, String)> {
     match state.mask_in_force(source, finger) {
         Ok(mask) => {
             let base = match state.document.hand_mask(state.pair_name(), finger) {
@@ -55,7 +55,7 @@ fn start_from(state: &State, source: ImprintSource, finger: Finger) -> Option<(A
 }
 
 /// The imprint whose mask the clean-ups work on: the measured one where it is there.
-fn edited_source(state: &State, finger: Finger) -> ImprintSource {
+fn edited_source(state: &State, finger: PadId) -> ImprintSource {
     if state.imprint(ImprintSource::Measured, finger).ready().is_some() {
         ImprintSource::Measured
     } else {
@@ -65,7 +65,7 @@ fn edited_source(state: &State, finger: Finger) -> ImprintSource {
 
 pub(super) fn begin_stroke(
     state: &mut State,
-    finger: Finger,
+    finger: PadId,
     source: ImprintSource,
     at_px: [f32; 2],
     erase: bool,
@@ -79,7 +79,7 @@ pub(super) fn begin_stroke(
         MaskTool::Pan => return,
     };
     let radius_px = settings.radius_px;
-    if !state.selection.fingers().contains(&finger) || !check_editable(state, "Correct the mask") {
+    if !state.fingers().contains(&finger) || !check_editable(state, "Correct the mask") {
         return;
     }
     let Some((pixels, base)) = start_from(state, source, finger) else {
@@ -89,7 +89,7 @@ pub(super) fn begin_stroke(
     let pair = state.pair_name().to_owned();
     let revision = state.document.next_revision();
     let labels = state.document.labels.entry(pair.clone()).or_default();
-    let before = labels.masks[finger.index()].replace(HandMask { mask: pixels.clone(), revision, base });
+    let before = labels.masks[finger].replace(HandMask { mask: pixels.clone(), revision, base });
     state.document.stroke = Some(Stroke { pair, finger, value, radius_px, at: at_px, before, pixels });
     stroke_to(state, at_px);
 }
@@ -103,7 +103,7 @@ pub(super) fn stroke_to(state: &mut State, at_px: [f32; 2]) {
     let [a, b] = [stroke.at, at_px].map(|p| DVec2::new(p[0].into(), p[1].into()));
     stroke.at = at_px;
     let (value, radius) = (stroke.value, f64::from(stroke.radius_px));
-    let hand = doc.labels.get_mut(&stroke.pair).and_then(|labels| labels.masks[stroke.finger.index()].as_mut());
+    let hand = doc.labels.get_mut(&stroke.pair).and_then(|labels| labels.masks[stroke.finger].as_mut());
     if let Some(hand) = hand
         && label::paint(Arc::make_mut(&mut hand.mask), [a, b], radius, value).is_some()
     {
@@ -115,7 +115,7 @@ pub(super) fn stroke_to(state: &mut State, at_px: [f32; 2]) {
 pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     let doc = &mut state.document;
     let Some(stroke) = doc.stroke.take() else { return };
-    let slot = &mut doc.labels.entry(stroke.pair.clone()).or_default().masks[stroke.finger.index()];
+    let slot = &mut doc.labels.entry(stroke.pair.clone()).or_default().masks[stroke.finger];
     let Some(now) = slot.as_ref() else { return };
     // The patch that leads back: what undo needs.
     let Some(patch) = Patch::between(&now.mask, &stroke.pixels) else {
@@ -134,7 +134,7 @@ pub(super) fn cancel_stroke(state: &mut State) {
     let doc = &mut state.document;
     let Some(stroke) = doc.stroke.take() else { return };
     if let Some(labels) = doc.labels.get_mut(&stroke.pair) {
-        labels.masks[stroke.finger.index()] = stroke.before;
+        labels.masks[stroke.finger] = stroke.before;
     }
 }
 
@@ -175,7 +175,7 @@ fn replace(
 fn set_hand_mask(
     state: &mut State,
     name: &'static str,
-    finger: Finger,
+    finger: PadId,
     mask: Option<(Arc<Mask>, String)>,
     effects: &mut Vec<Effect>,
 ) {
@@ -269,7 +269,7 @@ pub(super) fn undo(state: &mut State, effects: &mut Vec<Effect>) {
     if state.document.stroke.is_some() {
         return cancel_stroke(state);
     }
-    let (pair, fingers) = (state.pair_name().to_owned(), state.selection.fingers());
+    let (pair, fingers) = (state.pair_name().to_owned(), state.fingers());
     let name = state.history.undo(&mut state.document, &pair, &fingers).map(|gesture| gesture.name);
     travelled(state, "Undone", &pair, name, effects);
 }
@@ -278,7 +278,7 @@ pub(super) fn redo(state: &mut State, effects: &mut Vec<Effect>) {
     if state.document.stroke.is_some() {
         return;
     }
-    let (pair, fingers) = (state.pair_name().to_owned(), state.selection.fingers());
+    let (pair, fingers) = (state.pair_name().to_owned(), state.fingers());
     let name = state.history.redo(&mut state.document, &pair, &fingers).map(|gesture| gesture.name);
     travelled(state, "Done again", &pair, name, effects);
 }

@@ -80,7 +80,7 @@ pub(super) fn follow_range(state: &mut State) {
 fn range_from_shown(state: &mut State) {
     const CUT: usize = 200;
     let mut values: Vec<f32> = Vec::new();
-    for finger in state.selection.fingers() {
+    for finger in state.fingers() {
         for source in [ImprintSource::Measured, ImprintSource::Predicted] {
             if let Some(imprint) = state.imprint(source, finger).ready() {
                 values.extend(imprint.as_slice().iter().filter(|v| v.is_finite()));

@@ -4,7 +4,7 @@ use super::super::effect::Effect;
 use super::super::keys::ShiftMode;
 use super::super::state::State;
 use super::save_settings;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::PadId;
 use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::BundleKind;
 use crate::work::error::TaskError;
@@ -23,7 +23,7 @@ pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
         Err(absent) => return state.log.error(&TaskError::new(TITLE, absent.text().trim_end_matches('.'))),
     };
     let (Some(touch), Some(source)) =
-        (state.touch_key(Finger::Right), state.library.open.as_ref().map(|open| open.source.clone()))
+        (state.touch_key(PadId::default()), state.library.open.as_ref().map(|open| open.source.clone()))
     else {
         return;
     };

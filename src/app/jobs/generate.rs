@@ -1,10 +1,14 @@
 //! Predictions of one pair, in one go.
 
+use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::super::keys::PredictionKey;
 use super::super::services::{DataSource, Services};
 use super::Onlooker;
+use crate::domain::grid::RgbGrid;
+use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::work::bundles::BundleInfo;
 use crate::work::error::TaskError;
@@ -29,20 +33,34 @@ pub fn generate(
     onlooker: Option<Onlooker>,
 ) -> Result<Keyed, TaskError> {
     let Some(first) = recipes.first() else { return Ok(Vec::new()) };
-    let fingers: Vec<&str> = recipes.iter().map(|recipe| recipe.touch.finger.name()).collect();
-    let missing = format!("there is no GelSlim image of the {} finger", fingers.join(" or "));
+    let rig = source.rig();
+    let ends = bundle.ends(&rig).transpose().map_err(|err| TaskError::from_error("Generate", &err))?;
+    let input = ends.ok_or_else(|| TaskError::new("Generate", "the bundle is not a generator"))?.input;
+    let sensor = rig.sensor(input).map_or("input", |sensor| &*sensor.name).to_owned();
+    let fingers: Vec<_> = recipes.iter().map(|recipe| rig.pad_key(recipe.touch.finger)).collect();
+    let missing = format!("there is no {sensor} image of the {} finger", fingers.join(" or "));
     let sample = match sample {
         Some(sample) => sample,
         None => Arc::new(source.load(first.touch.pair.pair)?),
     };
     let (engine, config) = (first.runtime, first.config());
     let touched = |recipe: PredictionKey| {
-        let touch = sample.finger(recipe.touch.finger)?;
-        let size = touch.bubble.as_ref().map_or([0, 0], |bubble| bubble.imprint.size());
-        let wanted = Wanted { difference: &touch.gelslim.as_ref()?.difference, seed: recipe.seed, size };
-        Some((recipe, wanted))
+        let touch = sample.pad(recipe.touch.finger)?;
+        let size = touch.depth().map_or([0, 0], |bubble| bubble.imprint.size());
+        Some((recipe, (touch.picture(input)?, size)))
     };
-    let (keys, wanted): (Vec<PredictionKey>, Vec<Wanted<'_>>) = recipes.into_iter().filter_map(touched).unzip();
+    // One picture for each finger, whatever the number of seeds: it is encoded once.
+    let mut pictures: BTreeMap<PadId, (Cow<'_, RgbGrid>, [usize; 2])> = BTreeMap::new();
+    let mut keys: Vec<PredictionKey> = Vec::new();
+    for (key, found) in recipes.into_iter().filter_map(touched) {
+        pictures.entry(key.touch.finger).or_insert(found);
+        keys.push(key);
+    }
+    let wanted = |key: &PredictionKey| {
+        let (picture, size) = &pictures[&key.touch.finger];
+        Wanted { difference: picture, seed: key.seed, size: *size }
+    };
+    let wanted: Vec<Wanted<'_>> = keys.iter().map(wanted).collect();
     if keys.is_empty() {
         return Err(TaskError::new("Generate", missing));
     }

@@ -1,5 +1,6 @@
 //! From a request to a job: gathers the inputs from the state, so that the job needs the state no more.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::super::command::Computed;
@@ -9,7 +10,7 @@ use super::super::services::SharedServices;
 use super::super::state::State;
 use super::{Lane, generate};
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::metrics::footprint_mask;
+use crate::domain::rig::{PerPad, SensorId};
 use crate::domain::sample::Sample;
 use crate::work::error::TaskError;
 use crate::work::job::JobCx;
@@ -37,7 +38,7 @@ enum Imprint {
 impl Imprint {
     fn get(&self) -> Option<&DepthMap> {
         match self {
-            Self::Measured(sample, touch) => Some(&sample.finger(touch.finger)?.bubble.as_ref()?.imprint),
+            Self::Measured(sample, touch) => Some(&sample.pad(touch.finger)?.depth()?.imprint),
             Self::Predicted(depth) => Some(depth),
         }
     }
@@ -108,14 +109,16 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             let bundles = state.library.bundles.clone();
             let runtime = state.settings.runtime;
             let sample = results.samples.get(&touch.pair)?.clone();
-            sample.finger(touch.finger)?.gelslim.as_ref()?;
+            // Only sensors that some bundle starts from.
+            let starts = bundles.iter().filter_map(|bundle| bundle.ends(&sample.rig)?.ok()).map(|ends| ends.input);
+            let inputs: BTreeSet<SensorId> = starts.collect();
             job(
                 Lane::Files,
                 "Look for earlier predictions".into(),
                 Box::new(move |_| {
-                    let gelslim = sample.finger(touch.finger).and_then(|t| t.gelslim.as_ref());
-                    let found = gelslim.map(|g| services.stored(&bundles, runtime, touch, &g.difference));
-                    let keyed = found.unwrap_or_default().into_iter().map(|(key, made)| (key, Arc::new(made)));
+                    let pictures = inputs.iter().filter_map(|input| sample.pad(touch.finger)?.picture(*input));
+                    let found = pictures.flat_map(|picture| services.stored(&bundles, runtime, touch, &picture));
+                    let keyed = found.map(|(key, made)| (key, Arc::new(made)));
                     Ok(Computed::Predictions(keyed.collect()))
                 }),
             )
@@ -150,10 +153,20 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
         Request::Imprint(recipe, shift) => {
             let prediction = results.predictions.get(recipe)?.clone();
             let sample = results.samples.get(&recipe.touch.pair)?;
-            let bubble = sample.finger(recipe.touch.finger).and_then(|t| t.bubble.as_ref());
+            let bubble = sample.pad(recipe.touch.finger).and_then(|t| t.depth());
             // Without a measurement the bundle's own size is kept.
             let size = bubble.map_or([0, 0], |b| b.imprint.size());
             let shift = *shift;
+            if prediction.color.is_some() {
+                return job(
+                    Lane::Compute,
+                    "Predicted color picture".into(),
+                    Box::new(move |_| {
+                        let picture = imprint::color(&prediction, [0, 0])?.ok_or_else(gone)?;
+                        Ok(Computed::Color(Arc::new(picture)))
+                    }),
+                );
+            }
             job(
                 Lane::Compute,
                 "Prediction in metres".into(),
@@ -170,8 +183,8 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 "Compare prediction and measurement".into(),
                 Box::new(move |_| {
                     let measured = measured.get().ok_or_else(gone)?;
-                    let seen = footprint_mask(finger, measured.size());
-                    let found = compare::compare_parts(&predicted, measured, sample.scale, &seen)?;
+                    let seen = sample.rig.seen_mask(finger, measured.size());
+                    let found = compare::compare_parts(&predicted, measured, sample.scale, seen.as_ref())?;
                     Ok(Computed::Comparison(Arc::new(found)))
                 }),
             )
@@ -184,7 +197,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "Depth chain".into(),
                 Box::new(move |_| {
-                    let measured = sample.finger(finger).and_then(|t| t.bubble.as_ref()).map(|b| &b.imprint);
+                    let measured = sample.pad(finger).and_then(|t| t.depth()).map(|b| &b.imprint);
                     Ok(Computed::Ledger(Arc::new(ledger::of_prediction(&prediction, shift, false, measured)?)))
                 }),
             )
@@ -196,7 +209,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "What the GelSlim image leaves open".into(),
                 Box::new(move |_| {
-                    let gelslim = sample.finger(finger).and_then(|t| t.gelslim.as_ref());
+                    let gelslim = sample.pad(finger).and_then(|t| t.color());
                     let difference = &gelslim.ok_or_else(gone)?.difference;
                     Ok(Computed::Ambiguity(crate::domain::ambiguity::ambiguity(difference)))
                 }),
@@ -229,7 +242,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                     let mask = mask::mask(
                         &recipe,
                         imprint,
-                        sample.finger(touch.finger),
+                        sample.pad(touch.finger),
                         tool.as_deref().map(|t| &t.model),
                         sample.grasp_from_object,
                     )?;
@@ -238,26 +251,26 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             )
         }
         Request::Cloud(key) => {
-            let mut parts: [Option<(Imprint, Option<Arc<Mask>>)>; 2] = [None, None];
+            let mut parts: PerPad<(Imprint, Option<Arc<Mask>>)> = PerPad::default();
             let mut pair = None;
-            for (part, slot) in key.parts.iter().zip(&mut parts) {
-                let Some((imprint_key, version)) = part else { continue };
+            for (finger, (imprint_key, version)) in key.parts.entries() {
                 pair = Some(imprint_key.touch().pair);
                 let mask = match version {
                     None => None,
                     Some(version) => Some(mask_of(state, imprint_key, version)?),
                 };
-                *slot = Some((imprint_of(state, imprint_key)?, mask));
+                parts[finger] = Some((imprint_of(state, imprint_key)?, mask));
             }
             let sample = results.samples.get(&pair?)?.clone();
             job(
                 Lane::Compute,
                 "Point cloud".into(),
                 Box::new(move |_| {
-                    let part = |at: usize| {
-                        parts[at].as_ref().and_then(|(imprint, mask)| Some((imprint.get()?, mask.as_deref())))
-                    };
-                    Ok(Computed::Cloud(Arc::new(cloud::clouds(&sample, [part(0), part(1)])?)))
+                    let parts = parts.as_ref().map(|part| {
+                        let (imprint, mask) = part?;
+                        Some((imprint.get()?, mask.as_deref()))
+                    });
+                    Ok(Computed::Cloud(Arc::new(cloud::clouds(&sample, &parts)?)))
                 }),
             )
         }
@@ -296,8 +309,8 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "Layers of the registration".into(),
                 Box::new(move |_| {
-                    let masks = [masks[0].as_deref(), masks[1].as_deref()];
-                    Ok(Computed::Layers(Arc::new(layers::layers(&clouds, masks, &run)?)))
+                    let masks = masks.as_ref().map(|mask| mask.map(|mask| &**mask));
+                    Ok(Computed::Layers(Arc::new(layers::layers(&clouds, &masks, &run)?)))
                 }),
             )
         }
@@ -331,9 +344,9 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
 }
 
 /// The masks of a cloud, by finger.
-fn masks_of(state: &State, key: &CloudKey) -> [Option<Arc<Mask>>; 2] {
-    key.parts.each_ref().map(|part| {
-        let (imprint, version) = part.as_ref()?;
+fn masks_of(state: &State, key: &CloudKey) -> PerPad<Arc<Mask>> {
+    key.parts.as_ref().map(|part| {
+        let (imprint, version) = part?;
         mask_of(state, imprint, version.as_ref()?)
     })
 }

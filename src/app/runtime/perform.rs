@@ -14,7 +14,6 @@ use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
 use crate::domain::dataset::PairId;
 use crate::domain::mesh::sampling::spread;
-use crate::domain::sensor::Finger;
 use crate::work::error::TaskError;
 use crate::work::evaluate;
 use crate::work::job::{Cancel, JobCx};
@@ -65,9 +64,14 @@ impl Runtime {
                 let services = self.services.clone();
                 let body: Body<Command> = Box::new(move |cx| {
                     let pairs = spread(source.index().pairs.len(), STUDIO_PAIRS);
+                    let rig = source.rig();
+                    let fail = |err| TaskError::from_error("Shift statistics", &err);
+                    let ends = bundle.ends(&rig).transpose().map_err(fail)?;
+                    let no_generator = || TaskError::new("Shift statistics", "the bundle is not a generator");
                     let setup = StatisticsSetup {
                         pairs: pairs.into_iter().map(|i| PairId(i as u32)).collect(),
-                        fingers: Finger::BOTH.to_vec(),
+                        fingers: rig.pad_list(),
+                        input: ends.ok_or_else(no_generator)?.input,
                         config: recipe.config(),
                         dataset: source.title().to_owned(),
                         bundle,

@@ -18,6 +18,7 @@ use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::mesh::TriMesh;
+use crate::domain::rig::Rig;
 use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
 use crate::infer::store::{self, Store};
@@ -102,6 +103,10 @@ impl DataSource for LiveSource {
 
     fn as_dataset(&self) -> Option<&Dataset> {
         Some(&self.dataset)
+    }
+
+    fn rig(&self) -> Arc<Rig> {
+        self.dataset.rig.clone()
     }
 
     fn index(&self) -> &Index {
@@ -286,9 +291,9 @@ mod tests {
     use crate::domain::frames::PlanarPose;
     use crate::domain::grid::Mask;
     use crate::domain::hand::{AcceptedPose, HandPose};
-    use crate::domain::sensor::Finger;
     use crate::io::masks::MaskStore;
     use crate::work::labels::{HandMask, Revision};
+    use crate::domain::rig::lab;
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
@@ -301,7 +306,7 @@ mod tests {
     fn labels() -> PairLabels {
         let mask = Arc::new(Mask::from_fn(175, 140, |x, y| x > 20 && y < 9));
         PairLabels {
-            masks: [Some(HandMask { mask, revision: Revision(3), base: "Threshold 5.00 mm".into() }), None],
+            masks: [Some(HandMask { mask, revision: Revision(3), base: "Threshold 5.00 mm".into() }), None].into(),
             review: Review::InProgress,
             accepted: [
                 Some(PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
@@ -340,7 +345,7 @@ mod tests {
         let name = source.index().pairs[0].name.clone();
         source.save_labels(&name, &labels()).unwrap();
         let folder = source.labels.folder().unwrap().to_owned();
-        let file = MaskStore::in_folder(folder).mask_file(&name, Finger::Right);
+        let file = MaskStore::in_folder(folder).mask_file(&name, lab::RIGHT);
         std::fs::write(&file, b"{ half a fi").unwrap();
         let again = open_source(&place).unwrap();
         assert!(again.load_labels(&name).unwrap_err().hint.is_some());
@@ -358,9 +363,9 @@ mod tests {
         let cx = JobCx::unwatched();
         let none = source.export_masks(&BTreeMap::new(), &out, &cx).unwrap_err();
         assert!(none.why.contains("no mask") && !out.exists());
-        let finger = source.load(PairId(0)).unwrap().fingers.iter().position(Option::is_some).unwrap();
+        let finger = source.load(PairId(0)).unwrap().pads.entries().next().unwrap().0;
         let mut labels = labels();
-        labels.masks.swap(0, finger);
+        assert_eq!(finger, lab::RIGHT);
         let line = source.export_masks(&BTreeMap::from([(name.clone(), labels.clone())]), &out, &cx).unwrap();
         assert!(line.starts_with("Exported 1 masks"), "{line}");
         labels.review = Review::Skip;

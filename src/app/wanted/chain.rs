@@ -4,15 +4,18 @@ use super::super::keys::{Request, TouchKey};
 use super::super::state::{Absent, Lookup, State};
 use super::Wanted;
 use crate::domain::ambiguity::Ambiguity;
-use crate::domain::sensor::Finger;
 use crate::work::ledger::LedgerResult;
+use crate::domain::rig::PadId;
 
 impl State {
     /// The depth chain of the prediction shown for one finger.
-    pub fn ledger(&self, finger: Finger) -> Lookup<'_, LedgerResult> {
+    pub fn ledger(&self, finger: PadId) -> Lookup<'_, LedgerResult> {
         let Some(recipe) = self.chosen(finger) else {
             return self.touch(finger).and_then(Absent::NoPrediction, |_| None);
         };
+        if self.is_color(recipe) {
+            return Lookup::Absent(Absent::PredictsColor);
+        }
         let key = (recipe.clone(), self.settings.shift);
         match self.results.ledgers.get(&key) {
             Some(ledger) => Lookup::Ready(ledger),
@@ -21,13 +24,13 @@ impl State {
     }
 
     /// What the GelSlim image of one finger leaves open, once it is known.
-    pub fn ambiguity(&self, finger: Finger) -> Option<Ambiguity> {
+    pub fn ambiguity(&self, finger: PadId) -> Option<Ambiguity> {
         **self.results.ambiguities.get(&self.touch_key(finger)?)?
     }
 }
 
 impl Wanted<'_> {
-    pub(super) fn ambiguity(&mut self, finger: Finger, touch: TouchKey) {
+    pub(super) fn ambiguity(&mut self, finger: PadId, touch: TouchKey) {
         if self.state.gelslim(finger).ready().is_some() {
             self.ask(self.state.results.ambiguities.contains(&touch), Request::Ambiguity(touch));
         }
@@ -36,7 +39,8 @@ impl Wanted<'_> {
     pub(super) fn ledger(&mut self, touch: TouchKey) {
         let state = self.state;
         let Some(recipe) = state.results.chosen.get(&touch) else { return };
-        if state.results.samples.contains(&touch.pair) && state.results.predictions.contains(recipe) {
+        let there = state.results.samples.contains(&touch.pair) && state.results.predictions.contains(recipe);
+        if there && !state.is_color(recipe) {
             let key = (recipe.clone(), state.settings.shift);
             self.ask(state.results.ledgers.contains(&key), Request::Ledger(key.0, key.1));
         }

@@ -2,7 +2,7 @@ use rayon::prelude::*;
 
 use super::*;
 use crate::domain::grid::Grid;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::lab;
 use crate::domain::sim::{self, SimConfig};
 
 /// What is found in both fingers' images of some grasps, half of them with randomised sensors.
@@ -16,8 +16,8 @@ fn survey(seeds: std::ops::Range<u64>, on_a_shaft: bool) -> Vec<(String, Ambigui
             let tool = if on_a_shaft { sim::on_a_shaft(tool) } else { tool };
             let config = if seed % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(seed) };
             let sample = sim::simulate(&tool, sim::random_grasp(seed), seed, &config);
-            let found = Finger::BOTH.map(|finger| {
-                let touch = sample.finger(finger).and_then(|t| t.gelslim.as_ref()).unwrap();
+            let found = lab::PADS.map(|finger| {
+                let touch = sample.pad(finger).and_then(|t| t.color()).unwrap();
                 (name.clone(), ambiguity(&touch.difference).unwrap())
             });
             found.into_iter()

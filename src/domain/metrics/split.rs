@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use crate::domain::grid::{Grid, Mask};
-use crate::domain::sensor::{Finger, seen_by_gelslim};
 
 use super::image::{check_size, psnr_of_mse};
 use super::{MetricError, SsimRange, ssim};
@@ -34,11 +33,6 @@ pub struct Split {
     pub seen: Figures,
     /// Outside: the model made this up.
     pub invented: Figures,
-}
-
-/// Which pixels of a bubble image of `size` (raw orientation) the GelSlim of this finger sees.
-pub fn footprint_mask(finger: Finger, size: [usize; 2]) -> Mask {
-    Grid::from_fn(size[0], size[1], |x, y| seen_by_gelslim(finger, [x as f64, y as f64], size))
 }
 
 /// The figures of a prediction (raw orientation) whole and by parts. `peak` is PSNR's peak and SSIM's range.
@@ -78,19 +72,20 @@ pub fn split(prediction: &Grid<f32>, truth: &Grid<f32>, seen: &Mask, peak: f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::sensor::{bubble, gelslim_footprint_in_bubble};
+    use crate::domain::rig::{Rig, lab};
 
-    const SIZE: [usize; 2] = [bubble::WIDTH, bubble::HEIGHT];
+    const SIZE: [usize; 2] = [lab::BUBBLE.width, lab::BUBBLE.height];
 
     #[test]
     fn the_footprint_is_where_the_paper_draws_it() {
-        for finger in Finger::BOTH {
-            let mask = footprint_mask(finger, SIZE);
-            let [_, _, w, h] = gelslim_footprint_in_bubble(finger);
+        let rig = Rig::lab();
+        for finger in rig.pads() {
+            let mask = rig.seen_mask(finger, SIZE).unwrap();
+            let [_, _, w, h] = rig.color_window(finger).unwrap().rectangle();
             let count = mask.as_slice().iter().filter(|s| **s).count() as f64;
             assert!((count / (w * h) - 1.0).abs() < 0.05, "{count}");
             // The same part of an image of another size.
-            let small = footprint_mask(finger, [128, 128]);
+            let small = rig.seen_mask(finger, [128, 128]).unwrap();
             let share = small.as_slice().iter().filter(|s| **s).count() as f64 / (128.0 * 128.0);
             assert!((share - w * h / (175.0 * 140.0)).abs() < 0.01, "{share}");
         }
@@ -99,7 +94,7 @@ mod tests {
     #[test]
     fn an_error_outside_the_footprint_leaves_the_seen_part_clean() {
         let truth = Grid::from_fn(SIZE[0], SIZE[1], |x, y| 1e-4 * ((x * y) % 50) as f32);
-        let seen = footprint_mask(Finger::Right, SIZE);
+        let seen = Rig::lab().seen_mask(lab::RIGHT, SIZE).unwrap();
         let mut prediction = truth.clone();
         for (p, s) in prediction.as_mut_slice().iter_mut().zip(seen.as_slice()) {
             *p += if *s { 0.0 } else { -0.001 };

@@ -7,8 +7,8 @@ use super::noise::{Noise, Stream};
 use super::tools::{Bar, ToolSpec};
 use super::{Grasp, SimConfig, simulate, simulate_apart};
 use crate::domain::grid::RgbGrid;
+use crate::domain::rig::lab;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 
 /// Largest distance along y and z between the grasps of a misaligned pair, metres.
 pub const MISALIGNMENT_M: f64 = 0.008;
@@ -87,9 +87,9 @@ impl Condition {
             }
             Self::Noise => {
                 let mut sample = simulate(tool, grasp, seed, config);
-                for finger in Finger::BOTH {
+                for finger in lab::PADS {
                     let mut noise = Noise::new(seed, Stream::Condition, finger.index());
-                    let gelslim = sample.fingers[finger.index()].as_mut().and_then(|t| t.gelslim.as_mut());
+                    let gelslim = sample.pads.get_mut(finger).and_then(|t| t.color_mut());
                     if let Some((difference, images)) = gelslim.map(|g| (&mut g.difference, &mut g.images)) {
                         let drawn = RgbGrid::from_fn(difference.width(), difference.height(), |_, _| {
                             NOISE_STD.map(|std| std * noise.normal())
@@ -150,11 +150,11 @@ mod tests {
     use strum::IntoEnumIterator as _;
 
     fn imprint(sample: &Sample) -> &crate::domain::grid::DepthMap {
-        &sample.finger(Finger::Right).unwrap().bubble.as_ref().unwrap().imprint
+        &sample.pad(lab::RIGHT).unwrap().depth().unwrap().imprint
     }
 
     fn gelslim(sample: &Sample) -> &RgbGrid {
-        &sample.finger(Finger::Right).unwrap().gelslim.as_ref().unwrap().difference
+        &sample.pad(lab::RIGHT).unwrap().color().unwrap().difference
     }
 
     #[test]

@@ -6,7 +6,8 @@ use super::membrane::{Dome, Membrane};
 use super::noise::{Noise, Stream, blur3};
 use super::{BubbleConfig, rig};
 use crate::domain::grid::{DepthMap, Grid, Mask};
-use crate::domain::sensor::{Finger, Intrinsics, bubble};
+use crate::domain::rig::{PadId, lab};
+use crate::domain::sensor::Intrinsics;
 
 /// Membrane points up to this far from the tool count as contact, metres: the lab labels its masks so.
 pub const CONTACT_DISTANCE_M: f64 = 0.001;
@@ -22,7 +23,7 @@ pub(super) struct Rays {
 }
 
 impl Rays {
-    pub(super) fn new(finger: Finger, intrinsics: Intrinsics, grasp_from_camera: DAffine3) -> Self {
+    pub(super) fn new(finger: PadId, intrinsics: Intrinsics, grasp_from_camera: DAffine3) -> Self {
         Self { intrinsics, grasp_from_camera, outward: rig::outward(finger) }
     }
 
@@ -34,7 +35,7 @@ impl Rays {
 
     /// Direction of pixel `(u, v)`: a point at depth `z` is `origin + z * direction`.
     fn direction(&self, u: usize, v: usize) -> DVec3 {
-        let d = self.grasp_from_camera.matrix3 * self.intrinsics.lift(u as f64, v as f64, 1.0);
+        let d = self.grasp_from_camera.matrix3 * lab::BUBBLE.crop.lift(&self.intrinsics, u as f64, v as f64, 1.0);
         DVec3::new(self.outward * d.x, d.y, d.z)
     }
 }
@@ -42,7 +43,7 @@ impl Rays {
 /// Depth of the free dome, metres.
 pub(super) fn dome_depth(rays: &Rays, dome: &Dome) -> DepthMap {
     let origin = rays.origin();
-    DepthMap::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| dome_hit(origin, rays.direction(u, v), dome) as f32)
+    DepthMap::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| dome_hit(origin, rays.direction(u, v), dome) as f32)
 }
 
 /// Depth at which a ray meets the dome: its height over the dome is a quadratic in depth, negative at the camera.
@@ -58,10 +59,10 @@ fn dome_hit(origin: DVec3, d: DVec3, dome: &Dome) -> f64 {
 /// Depth of the pressed membrane, metres, and where it lies on the tool.
 pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap, Mask) {
     let origin = rays.origin();
-    let mut contact = Mask::filled(bubble::WIDTH, bubble::HEIGHT, false);
+    let mut contact = Mask::filled(lab::BUBBLE.width, lab::BUBBLE.height, false);
     // the membrane is nowhere pushed in further than this, so a ray cannot meet it before it meets this dome
     let lowest = membrane.lowest_dome();
-    let depth = DepthMap::from_fn(bubble::WIDTH, bubble::HEIGHT, |u, v| {
+    let depth = DepthMap::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| {
         let d = rays.direction(u, v);
         let above = |z: f64| {
             let p = origin + d * z;
@@ -112,10 +113,10 @@ pub(super) fn measure(
     reference: &DepthMap,
     depth: &DepthMap,
     config: &BubbleConfig,
-    finger: Finger,
+    finger: PadId,
     seed: u64,
 ) -> DepthMap {
-    let (w, h) = (bubble::WIDTH, bubble::HEIGHT);
+    let (w, h) = (lab::BUBBLE.width, lab::BUBBLE.height);
     let mut noise = Noise::new(seed, Stream::Depth, finger.index());
     let texture = texture(config, finger);
     let grain = correlated(&mut noise, w, h);
@@ -150,8 +151,8 @@ fn correlated(noise: &mut Noise, w: usize, h: usize) -> Grid<f32> {
 }
 
 /// The fixed pattern of a sensor's reference frame, metres.
-fn texture(config: &BubbleConfig, finger: Finger) -> Grid<f32> {
-    let (w, h) = (bubble::WIDTH, bubble::HEIGHT);
+fn texture(config: &BubbleConfig, finger: PadId) -> Grid<f32> {
+    let (w, h) = (lab::BUBBLE.width, lab::BUBBLE.height);
     let mut noise = Noise::new(config.texture_seed, Stream::DepthTexture, finger.index());
     let grain = correlated(&mut noise, w, h);
     let slow = noise.smooth(w, h, 30.0);

@@ -4,8 +4,8 @@ use glam::{DVec2, DVec3};
 
 use super::{Bar, Grasp, SimConfig, ToolSpec, simulate, tools};
 use crate::domain::mesh::TriMesh;
+use crate::domain::rig::lab;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 
 /// What is wrong with a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter, strum::Display)]
@@ -70,7 +70,7 @@ impl Fault {
         }
         let mut sample = simulate(&felt, self.grasp(), SEED, &SimConfig::default());
         if self == Self::BlankFinger {
-            let bubble = sample.fingers[Finger::Left.index()].as_mut().and_then(|touch| touch.bubble.as_mut());
+            let bubble = sample.pads.get_mut(lab::LEFT).and_then(|touch| touch.depth_mut());
             if let Some(bubble) = bubble {
                 bubble.imprint.as_mut_slice().fill(0.0);
                 if let Some(truth) = &mut bubble.truth {
@@ -98,18 +98,19 @@ impl Fault {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::rig::PadId;
     use strum::IntoEnumIterator;
 
     #[test]
     fn each_touch_has_its_fault_and_only_that() {
         for fault in Fault::iter() {
             let sample = fault.sample();
-            let pushed = |finger: Finger| {
-                let bubble = sample.finger(finger).unwrap().bubble.as_ref().unwrap();
+            let pushed = |finger: PadId| {
+                let bubble = sample.pad(finger).unwrap().depth().unwrap();
                 bubble.imprint.as_slice().iter().filter(|d| **d > 5e-3).count()
             };
-            assert!(pushed(Finger::Right) > 500, "{fault}");
-            assert_eq!(pushed(Finger::Left) == 0, fault == Fault::BlankFinger, "{fault}");
+            assert!(pushed(lab::RIGHT) > 500, "{fault}");
+            assert_eq!(pushed(lab::LEFT) == 0, fault == Fault::BlankFinger, "{fault}");
             let mesh = fault.mesh();
             let reach = mesh.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
             assert_eq!(reach > 1.0, fault == Fault::StlInMillimetres, "{fault}");

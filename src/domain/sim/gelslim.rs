@@ -13,15 +13,15 @@ use super::tools::ToolSpec;
 use super::{GelSlimConfig, rig};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::RgbGrid;
-use crate::domain::sample::{GelSlimImages, GelSlimTouch};
-use crate::domain::sensor::{Finger, gelslim};
+use crate::domain::rig::{PadId, lab};
+use crate::domain::sample::{ColorImages, ColorTouch};
 
 /// Spacing of the grid that the gel is solved on, metres.
 const STEP_M: f64 = 0.000_15;
 /// How far the gel goes on beyond the picture, metres.
 const MARGIN_M: f64 = 0.002_4;
 /// Pixels of the picture per grid step.
-const PX_PER_STEP: f64 = STEP_M * gelslim::PX_PER_M;
+const PX_PER_STEP: f64 = STEP_M * lab::GELSLIM.px_per_m;
 /// Grid steps from the first node to the first pixel.
 const MARGIN_STEPS: f64 = MARGIN_M / STEP_M;
 
@@ -35,7 +35,7 @@ impl Gel {
         config: &GelSlimConfig,
         tool: &ToolSpec,
         object_from_grasp: PlanarPose,
-        finger: Finger,
+        finger: PadId,
         noise: &mut Noise,
     ) -> Self {
         let (columns, rows) = grid_size();
@@ -131,9 +131,9 @@ pub(super) fn touch(
     config: &GelSlimConfig,
     tool: &ToolSpec,
     object_from_grasp: PlanarPose,
-    finger: Finger,
+    finger: PadId,
     seed: u64,
-) -> GelSlimTouch {
+) -> ColorTouch {
     let mut noise = Noise::new(seed, Stream::Gel, finger.index());
     let gel = Gel::press(config, tool, object_from_grasp, finger, &mut noise);
 
@@ -151,10 +151,10 @@ pub(super) fn touch(
         stamp(&mut raw, at, size, config.marker_darkness);
     }
     add_noise(&mut raw, config.noise, &mut Noise::new(seed, Stream::GelNoise, finger.index()));
-    let difference = RgbGrid::from_fn(gelslim::WIDTH, gelslim::HEIGHT, |x, y| {
+    let difference = RgbGrid::from_fn(lab::GELSLIM.width, lab::GELSLIM.height, |x, y| {
         std::array::from_fn(|c| raw[(x, y)][c] - reference[(x, y)][c])
     });
-    GelSlimTouch { images: Some(GelSlimImages { raw, reference }), difference }
+    ColorTouch { images: Some(ColorImages { raw, reference }), difference }
 }
 
 /// A colour at every grid node, for effects that are smooth over a few pixels.
@@ -177,13 +177,13 @@ impl Wash {
 
     /// The interpolated picture.
     fn picture(&self) -> RgbGrid {
-        let steps: Vec<(usize, f32)> = (0..gelslim::WIDTH.max(gelslim::HEIGHT))
+        let steps: Vec<(usize, f32)> = (0..lab::GELSLIM.width.max(lab::GELSLIM.height))
             .map(|x| {
                 let i = x as f64 / PX_PER_STEP + MARGIN_STEPS;
                 (i as usize, i.fract() as f32)
             })
             .collect();
-        RgbGrid::from_fn(gelslim::WIDTH, gelslim::HEIGHT, |x, y| {
+        RgbGrid::from_fn(lab::GELSLIM.width, lab::GELSLIM.height, |x, y| {
             let ((i, tx), (j, ty)) = (steps[x], steps[y]);
             let k = j * self.columns + i;
             let (a, b) = (&self.values[k], &self.values[k + 1]);
@@ -200,19 +200,19 @@ impl Wash {
 /// Columns and rows of the solver's grid.
 fn grid_size() -> (usize, usize) {
     (
-        (gelslim::WIDTH as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1,
-        (gelslim::HEIGHT as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1,
+        (lab::GELSLIM.width as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1,
+        (lab::GELSLIM.height as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1,
     )
 }
 
 /// The light without contact and without markers: each LED is brighter on its own side.
-fn illumination(config: &GelSlimConfig, finger: Finger) -> RgbGrid {
+fn illumination(config: &GelSlimConfig, finger: PadId) -> RgbGrid {
     let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 8 + finger.index());
     let (columns, rows) = grid_size();
     let stain = noise.smooth(columns, rows, 150.0 / PX_PER_STEP);
     let leds = config.led_directions();
     let middle = DVec2::new(columns as f64, rows as f64) * 0.5;
-    let half_width = 0.5 * gelslim::WIDTH as f64 / PX_PER_STEP;
+    let half_width = 0.5 * lab::GELSLIM.width as f64 / PX_PER_STEP;
     Wash::new(columns, rows, |i, j| {
         let p = (DVec2::new(i as f64, j as f64) - middle) / half_width;
         std::array::from_fn(|c| {
@@ -253,13 +253,13 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, noise: &mut Noi
 }
 
 /// Centre (pixels) and radius (pixels) of each marker without contact.
-fn marker_grid(config: &GelSlimConfig, finger: Finger) -> Vec<(DVec2, f64)> {
+fn marker_grid(config: &GelSlimConfig, finger: PadId) -> Vec<(DVec2, f64)> {
     let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 16 + finger.index());
-    let pitch = config.marker_pitch_m * gelslim::PX_PER_M;
-    let radius = config.marker_radius_m * gelslim::PX_PER_M;
-    let centre = DVec2::new(0.5 * gelslim::WIDTH as f64, 0.5 * gelslim::HEIGHT as f64);
+    let pitch = config.marker_pitch_m * lab::GELSLIM.px_per_m;
+    let radius = config.marker_radius_m * lab::GELSLIM.px_per_m;
+    let centre = DVec2::new(0.5 * lab::GELSLIM.width as f64, 0.5 * lab::GELSLIM.height as f64);
     let turn = DVec2::from_angle(config.marker_angle_rad);
-    let reach = (gelslim::WIDTH as f64 / pitch) as i32;
+    let reach = (lab::GELSLIM.width as f64 / pitch) as i32;
     let mut markers = Vec::new();
     for j in -reach..=reach {
         for i in -reach..=reach {
@@ -270,7 +270,7 @@ fn marker_grid(config: &GelSlimConfig, finger: Finger) -> Vec<(DVec2, f64)> {
             let p = centre + flat * (1.0 + config.marker_fan * (flat / centre.x).length_squared());
             let size = radius * (1.0 + 0.12 * f64::from(noise.normal()));
             let inside = p.cmpge(DVec2::splat(-10.0)).all()
-                && p.cmple(DVec2::new(gelslim::WIDTH as f64, gelslim::HEIGHT as f64) + 10.0).all();
+                && p.cmple(DVec2::new(lab::GELSLIM.width as f64, lab::GELSLIM.height as f64) + 10.0).all();
             if inside {
                 markers.push((p, size));
             }
@@ -286,7 +286,7 @@ fn moved(markers: &[(DVec2, f64)], config: &GelSlimConfig, gel: &Gel, noise: &mu
     let shear = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.shear_m;
     let twist = f64::from(noise.normal()) * config.twist_rad;
     let deepest = bulk.values.iter().fold(1e-9_f32, |a, &b| a.max(b));
-    let centre = DVec2::new(0.5 * gelslim::WIDTH as f64, 0.5 * gelslim::HEIGHT as f64);
+    let centre = DVec2::new(0.5 * lab::GELSLIM.width as f64, 0.5 * lab::GELSLIM.height as f64);
     markers
         .iter()
         .map(|&(p, size)| {
@@ -294,8 +294,8 @@ fn moved(markers: &[(DVec2, f64)], config: &GelSlimConfig, gel: &Gel, noise: &mu
             let away = -DVec2::new(slopes[0].at(node.x, node.y), slopes[1].at(node.x, node.y));
             // friction drags the gel along where it is pressed
             let held = bulk.at(node.x, node.y) / f64::from(deepest);
-            let drag = (shear * gelslim::PX_PER_M + (p - centre).perp() * twist) * (0.35 + 0.65 * held);
-            (p + away * config.marker_push_m * gelslim::PX_PER_M + drag, size)
+            let drag = (shear * lab::GELSLIM.px_per_m + (p - centre).perp() * twist) * (0.35 + 0.65 * held);
+            (p + away * config.marker_push_m * lab::GELSLIM.px_per_m + drag, size)
         })
         .collect()
 }

@@ -2,7 +2,7 @@
 
 use super::noise::{Noise, Stream};
 use crate::domain::grid::{Grid, Mask};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::PadId;
 
 /// How badly a mask is spoilt. Lengths in pixels; ranges are drawn from uniformly.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +64,7 @@ impl Spoil {
 }
 
 /// A spoilt copy of the contact mask of `finger`. The same arguments give the same mask on every machine.
-pub fn spoil_mask(clean: &Mask, spoil: &Spoil, finger: Finger, seed: u64) -> Mask {
+pub fn spoil_mask(clean: &Mask, spoil: &Spoil, finger: PadId, seed: u64) -> Mask {
     let [width, height] = clean.size();
     let mut noise = Noise::new(seed, Stream::Mask, finger.index());
     let contact: Vec<[f64; 2]> = pixels(clean);
@@ -179,6 +179,7 @@ fn outline_distance(mask: &Mask) -> Grid<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::rig::lab;
 
     fn bar() -> Mask {
         Mask::from_fn(175, 140, |x, y| (30..140).contains(&x) && (60..72).contains(&y))
@@ -195,11 +196,11 @@ mod tests {
     fn masks_are_spoilt_as_much_as_said_and_repeat() {
         for (spoil, range) in [(Spoil::nominal(), 0.7..0.9), (Spoil::hard(), 0.3..0.65)] {
             let overlaps: Vec<f64> =
-                (0..40).map(|seed| overlap(&spoil_mask(&bar(), &spoil, Finger::Left, seed), &bar())).collect();
+                (0..40).map(|seed| overlap(&spoil_mask(&bar(), &spoil, lab::LEFT, seed), &bar())).collect();
             let mean = overlaps.iter().sum::<f64>() / 40.0;
             assert!(range.contains(&mean), "{mean}");
-            assert_eq!(spoil_mask(&bar(), &spoil, Finger::Left, 3), spoil_mask(&bar(), &spoil, Finger::Left, 3));
-            assert_ne!(spoil_mask(&bar(), &spoil, Finger::Left, 3), spoil_mask(&bar(), &spoil, Finger::Right, 3));
+            assert_eq!(spoil_mask(&bar(), &spoil, lab::LEFT, 3), spoil_mask(&bar(), &spoil, lab::LEFT, 3));
+            assert_ne!(spoil_mask(&bar(), &spoil, lab::LEFT, 3), spoil_mask(&bar(), &spoil, lab::RIGHT, 3));
         }
     }
 
@@ -208,14 +209,14 @@ mod tests {
         let d = outline_distance(&bar());
         assert_eq!((d[(80, 60)], d[(80, 59)], d[(80, 62)], d[(80, 50)]), (-0.5, 0.5, -2.5, 9.5));
         let nothing = Mask::filled(9, 7, false);
-        let mask = spoil_mask(&nothing, &Spoil { blobs: 0.0, flipped_share: 0.0, ..Spoil::hard() }, Finger::Left, 1);
+        let mask = spoil_mask(&nothing, &Spoil { blobs: 0.0, flipped_share: 0.0, ..Spoil::hard() }, lab::LEFT, 1);
         assert_eq!(mask, nothing, "no contact, no outline");
         let all = Mask::filled(9, 7, true);
         assert_eq!(
             spoil_mask(
                 &all,
                 &Spoil { blobs: 0.0, ends: 0.0, cut: 0.0, flipped_share: 0.0, ..Spoil::hard() },
-                Finger::Left,
+                lab::LEFT,
                 1
             ),
             all

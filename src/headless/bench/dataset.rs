@@ -14,9 +14,9 @@ use super::Machine;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::{Engine, FingerInput, contact_cloud, estimate, register};
-use crate::domain::sample::BubbleCamera;
-use crate::domain::sensor::Finger;
+use crate::domain::pose::{Engine, FingerInput, Fingers, contact_cloud, estimate, register};
+use crate::domain::rig::{Rig, lab};
+use crate::domain::sample::DepthCamera;
 use crate::domain::sim::{self, SimConfig, Spoil, spoil_mask};
 use crate::domain::tool::ToolModel;
 use crate::domain::units::angle_error;
@@ -53,7 +53,7 @@ pub(in crate::headless) struct DatasetArgs {
 struct Grasp {
     tool: usize,
     imprints: [DepthMap; 2],
-    cameras: [BubbleCamera; 2],
+    cameras: [DepthCamera; 2],
     masks: [Mask; 2],
     truth: PlanarPose,
 }
@@ -61,7 +61,7 @@ struct Grasp {
 /// A pair of the data set: a grasp seen from cameras that stand a little elsewhere.
 struct Pair<'a> {
     grasp: &'a Grasp,
-    cameras: [BubbleCamera; 2],
+    cameras: [DepthCamera; 2],
     points: Vec<DVec3>,
     truth: PlanarPose,
 }
@@ -181,8 +181,8 @@ fn grasp(i: usize, seed: u64) -> anyhow::Result<Grasp> {
     let sample = sim::simulate(&sim::tools()[tool], held, rng.random(), &SimConfig::default());
     let mask_seed = rng.random();
     let mut parts = Vec::new();
-    for finger in Finger::BOTH {
-        let touch = sample.finger(finger).and_then(|t| t.bubble.as_ref());
+    for finger in lab::PADS {
+        let touch = sample.pad(finger).and_then(|t| t.depth());
         let touch = touch.ok_or_else(|| anyhow::anyhow!("the simulator left a finger out"))?;
         let (Some(camera), Some(truth)) = (&touch.camera, &touch.truth) else {
             anyhow::bail!("the simulator left camera or truth out");
@@ -218,8 +218,11 @@ fn pair(grasp: &Grasp, i: usize, seed: u64) -> anyhow::Result<Pair<'_>> {
     Ok(Pair { grasp, cameras, points, truth })
 }
 
-fn fingers<'a>(grasp: &'a Grasp, cameras: &'a [BubbleCamera; 2]) -> [Option<FingerInput<'a>>; 2] {
-    [0, 1].map(|f| Some(FingerInput { imprint: &grasp.imprints[f], camera: &cameras[f], mask: Some(&grasp.masks[f]) }))
+fn fingers<'a>(grasp: &'a Grasp, cameras: &'a [DepthCamera; 2]) -> Fingers<'a> {
+    Fingers::new(&Rig::lab(), |pad| {
+        let f = pad.index();
+        Some(FingerInput { imprint: &grasp.imprints[f], camera: &cameras[f], mask: Some(&grasp.masks[f]) })
+    })
 }
 
 fn text(report: &Report) -> String {

@@ -17,7 +17,8 @@ use super::{Machine, peers};
 use crate::domain::align::{AlignError, AlignReport, DistanceField};
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
-use crate::domain::pose::{Engine, FingerInput, ToolModel, contact_cloud, estimate, register};
+use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, contact_cloud, estimate, register};
+use crate::domain::rig::Rig;
 use crate::domain::units::angle_error;
 use crate::headless::args::{LimitArgs, at_least_one};
 use crate::headless::output::says;
@@ -220,12 +221,15 @@ pub(super) fn is_straight(mesh: &TriMesh) -> bool {
     half - root < (half + root) / 36.0
 }
 
-fn fingers(case: &Case, masks: Masks) -> [Option<FingerInput<'_>>; 2] {
+fn fingers(case: &Case, masks: Masks) -> Fingers<'_> {
     let masks = match masks {
         Masks::Spoilt => &case.masks,
         Masks::Clean => &case.masks_clean,
     };
-    [0, 1].map(|f| Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&masks[f]) }))
+    Fingers::new(&Rig::lab(), |pad| {
+        let f = pad.index();
+        Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&masks[f]) })
+    })
 }
 
 fn prepare(set: &CaseSet, masks: Masks) -> anyhow::Result<Vec<Prepared>> {

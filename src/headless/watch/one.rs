@@ -18,9 +18,9 @@ use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::Problem;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{Grid, RgbGrid};
-use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
+use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, estimate};
+use crate::domain::rig::Text;
 use crate::domain::sample::Sample;
-use crate::domain::sensor::Finger;
 use crate::domain::units::angle_error;
 use crate::infer::engine::resolve;
 use crate::io::dataset::{Dataset, read_in_metres};
@@ -44,7 +44,7 @@ pub(super) struct Worker<'a> {
 /// Figures of one finger.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct FingerFigures {
-    finger: &'static str,
+    finger: Text,
     min_m: f64,
     max_m: f64,
     mean_m: f64,
@@ -215,7 +215,7 @@ impl<'a> Worker<'a> {
             scale: sample.scale.key(),
             mask_notes: fingers
                 .iter()
-                .filter_map(|f| Some(format!("{} finger: {}", f.finger.name(), f.basis.note()?)))
+                .filter_map(|f| Some(format!("{} finger: {}", f.name, f.basis.note()?)))
                 .collect(),
             fingers: fingers.iter().map(|f| figures(sample, f, source_key)).collect(),
             pose,
@@ -232,15 +232,12 @@ impl<'a> Worker<'a> {
 
     /// Imprints of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
     fn imprints(&mut self, sample: &Sample) -> anyhow::Result<Option<Vec<FingerResult>>> {
-        let touched: Vec<(Finger, &RgbGrid)> = Finger::BOTH
-            .into_iter()
-            .filter_map(|finger| Some((finger, &sample.finger(finger)?.gelslim.as_ref()?.difference)))
-            .collect();
+        let touched = self.predictor.conditions(sample)?;
         if touched.is_empty() {
-            anyhow::bail!("no GelSlim image");
+            return Err(self.predictor.no_condition());
         }
         let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
-        let differences: Vec<&RgbGrid> = touched.iter().map(|(_, difference)| *difference).collect();
+        let differences: Vec<&RgbGrid> = touched.iter().map(|(_, picture)| &**picture).collect();
         let made = match self.predictor.predict(&differences, &cx) {
             Err(_) if self.stop.is_cancelled() => return Ok(None),
             other => other?,
@@ -249,7 +246,8 @@ impl<'a> Worker<'a> {
         let mut out = Vec::new();
         for ((finger, _), made) in touched.iter().zip(&made) {
             let imprint = imprint_of(made, shift, sample, *finger)?;
-            out.push(FingerResult { finger: *finger, imprint, mask: None, basis: MaskBasis::Source });
+            let name = sample.rig.pad_key(*finger);
+            out.push(FingerResult { finger: *finger, name, imprint, mask: None, basis: MaskBasis::Source });
         }
         Ok(Some(out))
     }
@@ -264,13 +262,12 @@ impl<'a> Worker<'a> {
     ) -> Result<PoseFigures, String> {
         let engine = self.engine;
         let name = tool.ok_or("the file's name says no tool; name it with --tool")?;
-        let mut inputs = [None, None];
-        for f in fingers {
-            let camera = sample.finger(f.finger).and_then(|t| t.camera());
-            inputs[f.finger.index()] =
-                camera.map(|camera| FingerInput { imprint: &f.imprint, camera, mask: f.mask.as_ref() });
-        }
-        if inputs.iter().all(Option::is_none) {
+        let inputs = Fingers::new(&sample.rig, |finger| {
+            let f = fingers.iter().find(|f| f.finger == finger)?;
+            let camera = sample.pad(finger)?.camera()?;
+            Some(FingerInput { imprint: &f.imprint, camera, mask: f.mask.as_ref() })
+        });
+        if inputs.is_empty() {
             return Err("no bubble camera is known; name a bubble file of the rig with --camera".into());
         }
         let model = self.tool(dataset, name)?;
@@ -314,12 +311,12 @@ fn load_tool(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<
 /// Numbers of one prediction, against the measurement where there is one.
 fn figures(sample: &Sample, result: &FingerResult, source: &'static str) -> FingerFigures {
     let stats = crate::domain::postprocess::Stats::of(&result.imprint);
-    let measured = sample.finger(result.finger).and_then(|t| t.bubble.as_ref()).map(|b| &b.imprint);
+    let measured = sample.pad(result.finger).and_then(|t| t.depth()).map(|b| &b.imprint);
     let measured = measured.filter(|m| m.size() == result.imprint.size());
     let compared = measured.and_then(|m| compare::compare(&result.imprint, m, sample.scale).ok());
     let count = |mask: &Grid<bool>| mask.as_slice().iter().filter(|&&m| m).count();
     FingerFigures {
-        finger: result.finger.name(),
+        finger: sample.rig.pad_key(result.finger),
         min_m: stats.min,
         max_m: stats.max,
         mean_m: stats.mean,

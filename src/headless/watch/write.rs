@@ -10,7 +10,7 @@ use super::Source;
 use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, Text};
 use crate::io::dataset::OUTPUT_MARK;
 use crate::io::pt::{PtItem, Tensor};
 use crate::io::{atomic, files, images, names, npz, pt};
@@ -41,7 +41,8 @@ pub(super) fn is_done(stem: &Path, source: &Source, recipe: &Value) -> bool {
 /// One finger's part of a result.
 #[derive(Debug)]
 pub(super) struct FingerResult {
-    pub finger: Finger,
+    pub finger: PadId,
+    pub name: Text,
     pub imprint: DepthMap,
     pub mask: Option<Mask>,
     pub basis: MaskBasis,
@@ -55,9 +56,9 @@ pub(super) fn predictions(stem: &Path, fingers: &[FingerResult], save: &[Save]) 
         let mut arrays: Vec<(String, Tensor)> = Vec::new();
         for f in fingers {
             let shape = [f.imprint.height(), f.imprint.width()];
-            arrays.push((format!("imprint_{}", f.finger.name()), Tensor::f32(&shape, f.imprint.as_slice().to_vec())));
+            arrays.push((format!("imprint_{}", f.name), Tensor::f32(&shape, f.imprint.as_slice().to_vec())));
             if let Some(mask) = &f.mask {
-                arrays.push((format!("mask_{}", f.finger.name()), Tensor::u8(&shape, bits(mask))));
+                arrays.push((format!("mask_{}", f.name), Tensor::u8(&shape, bits(mask))));
             }
         }
         let arrays: Vec<(&str, Tensor)> = arrays.iter().map(|(name, t)| (name.as_str(), t.clone())).collect();
@@ -67,7 +68,7 @@ pub(super) fn predictions(stem: &Path, fingers: &[FingerResult], save: &[Save]) 
     if save.contains(&Save::Png) {
         for f in fingers {
             let picture = f.imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
-            files.push(output(stem, &format!("{}.png", f.finger.name())));
+            files.push(output(stem, &format!("{}.png", f.name)));
             images::write_grey16(&files[files.len() - 1], &picture)?;
         }
     }
@@ -77,7 +78,7 @@ pub(super) fn predictions(stem: &Path, fingers: &[FingerResult], save: &[Save]) 
         let depths = fingers.iter().flat_map(|f| f.imprint.as_slice()).copied().collect();
         let mut items: Vec<(&str, PtItem)> = vec![
             ("prediction", Tensor::f32(&shape, depths).into()),
-            ("fingers", PtItem::Texts(fingers.iter().map(|f| f.finger.name().to_owned()).collect())),
+            ("fingers", PtItem::Texts(fingers.iter().map(|f| f.name.to_string()).collect())),
         ];
         if fingers.iter().all(|f| f.mask.is_some()) {
             let masks = fingers.iter().filter_map(|f| f.mask.as_ref()).flat_map(bits).collect();

@@ -6,13 +6,13 @@ use crate::infer::onnx_header::{self, FLOAT32, INT64, Port};
 
 /// A tensor the manifest promises: its name, element types, and shape after the batch.
 pub(in crate::infer) struct Promise {
-    pub(in crate::infer) name: &'static str,
+    pub(in crate::infer) name: String,
     elements: &'static [u64],
     pub(in crate::infer) shape: Vec<usize>,
 }
 
-fn float(name: &'static str, shape: impl Into<Vec<usize>>) -> Promise {
-    Promise { name, elements: &[FLOAT32], shape: shape.into() }
+fn float(name: &str, shape: impl Into<Vec<usize>>) -> Promise {
+    Promise { name: name.to_owned(), elements: &[FLOAT32], shape: shape.into() }
 }
 
 /// Adds everything in which the graph differs from the manifest, and notes the timestep's type in `spec`.
@@ -73,13 +73,14 @@ pub(in crate::infer) fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<P
             let [width, height] = input.size;
             let latent = || float("latent", latent.shape);
             match role {
-                Role::ConditionEncoder => {
-                    Some((vec![float("gelslim", [3, height, width])], vec![float("condition", condition.shape)]))
-                }
+                Role::ConditionEncoder => Some((
+                    vec![float(&input.sensor.key, [input.channels(), height, width])],
+                    vec![float("condition", condition.shape)],
+                )),
                 Role::Denoiser => {
-                    let timestep = Promise { name: "timestep", elements: &[INT64, FLOAT32], shape: vec![] };
+                    let timestep = Promise { name: "timestep".to_owned(), elements: &[INT64, FLOAT32], shape: vec![] };
                     let inputs = vec![latent(), timestep, float("condition", condition.shape)];
-                    Some((inputs, vec![Promise { name: "prediction", ..latent() }]))
+                    Some((inputs, vec![Promise { name: "prediction".to_owned(), ..latent() }]))
                 }
                 Role::Decoder => {
                     let [width, height] = output.size;
@@ -93,7 +94,7 @@ pub(in crate::infer) fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<P
 }
 
 fn compare(port: &Port, promise: &Promise, what: &str, problems: &mut Problems) {
-    let name = promise.name;
+    let name = &promise.name;
     if !promise.elements.contains(&port.element) {
         let expected = if promise.elements.contains(&INT64) { "int64 or float32" } else { "float32" };
         let found = port.element;

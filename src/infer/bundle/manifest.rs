@@ -6,15 +6,18 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::sensor::SensorSpec;
 use super::{Problems, Role};
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
 use crate::domain::postprocess::{
-    DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
+    ColorChain, DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
 };
 use crate::domain::resample::Resampling;
+use crate::domain::rig::{Sensor, SensorKind, lab};
 
 const FORMAT: &str = "touch2touch-bundle";
-const VERSION: u64 = 1;
+/// The newest version; the first declares no sensors, and means the lab's.
+const VERSION: u64 = 2;
 /// No side of an image or latent may be longer; a larger number is a mistake and would exhaust the memory.
 const MAX_SIDE: usize = 4096;
 /// Most values of one tensor: four pictures with the longest sides.
@@ -33,7 +36,7 @@ pub struct FileEntry {
 /// What a bundle is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BundleSpec {
-    /// GelSlim difference to Soft Bubble imprint.
+    /// What one sensor felt to what another would have felt.
     Generator(Box<GeneratorSpec>),
     /// Imprint to contact mask.
     MaskUnet(MaskSpec),
@@ -90,10 +93,11 @@ impl GeneratorSpec {
     /// The steps from the decoder's picture to depth, for the user's choice of shift.
     ///
     /// # Errors
-    /// [`PostprocessError::NoStatistics`] for the paper's shift of a bundle without statistics.
+    /// [`PostprocessError::NoStatistics`] for the paper's shift of a bundle without statistics,
+    /// [`PostprocessError::NotDepth`] for a bundle that predicts a color picture.
     pub fn depth_chain(&self, mode: ShiftMode) -> Result<DepthChain, PostprocessError> {
         let chain = DepthChain {
-            range: self.output.range_m,
+            range: self.output.range_m.ok_or(PostprocessError::NotDepth)?,
             mapping: Mapping::Correct,
             reduction: self.output.reduction,
             shift: Shift::None,
@@ -102,6 +106,16 @@ impl GeneratorSpec {
             rotation_deg: self.output.rotation_deg,
         };
         chain.with_mode(mode, self.shift)
+    }
+
+    /// The steps from the decoder's picture to a color sensor's difference; `None` for a bundle that predicts depth.
+    pub fn color_chain(&self) -> Option<ColorChain> {
+        Some(ColorChain {
+            range: self.output.range?,
+            size: self.output.imprint_size,
+            resampling: self.output.resampling,
+            rotation_deg: self.output.rotation_deg,
+        })
     }
 }
 
@@ -118,16 +132,16 @@ pub enum TimestepType {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GeneratorInput {
-    /// Which sensor: always `gelslim`, the difference of touched and untouched image, RGB.
-    pub sensor: GelslimSensor,
-    /// `[width, height]` the difference is resized to, pixels.
+    /// Which sensor: of a color sensor the difference of touched and untouched image, RGB; of a depth sensor the imprint.
+    pub sensor: SensorSpec,
+    /// `[width, height]` the picture is resized to, pixels.
     pub size: [usize; 2],
-    /// Scale of the difference before mean and deviation.
+    /// Scale of the picture before mean and deviation.
     pub scale: InputScale,
-    /// Subtracted per channel.
-    pub mean: [f64; 3],
+    /// Subtracted per channel: three of a color sensor, one of a depth sensor.
+    pub mean: Vec<f64>,
     /// Divided by per channel.
-    pub std: [f64; 3],
+    pub std: Vec<f64>,
     /// How it is resized.
     #[serde(default = "bilinear")]
     pub resampling: Resampling,
@@ -136,23 +150,7 @@ pub struct GeneratorInput {
     pub rotation_deg: u32,
 }
 
-/// The only sensor a generator can start from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum GelslimSensor {
-    /// GelSlim.
-    Gelslim,
-}
-
-/// The only sensor a mask UNet can start from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum BubbleSensor {
-    /// Soft Bubble.
-    Bubble,
-}
-
-/// Scale of the difference image that mean and deviation belong to.
+/// Scale of the picture that mean and deviation belong to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum InputScale {
     /// Divided by 255.
@@ -161,6 +159,19 @@ pub enum InputScale {
     /// As stored.
     #[serde(rename = "0..255")]
     Byte,
+    /// Metres, of a depth sensor.
+    #[serde(rename = "m")]
+    Metres,
+}
+
+impl GeneratorInput {
+    /// Channels of the prepared picture.
+    pub fn channels(&self) -> usize {
+        match self.sensor.kind {
+            SensorKind::Color => 3,
+            SensorKind::Depth => 1,
+        }
+    }
 }
 
 /// The shape of a tensor without its batch: channels, rows, columns.
@@ -226,19 +237,25 @@ impl ScheduleSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputSpec {
+    /// Which sensor would have felt it.
+    pub sensor: SensorSpec,
     /// `[width, height]` of the decoder's picture.
     pub size: [usize; 2],
     /// Channels of the decoder's picture.
     pub channels: usize,
-    /// What -1 and 1 mean, metres.
-    pub range_m: DepthRange,
-    /// How channels become one.
+    /// What -1 and 1 mean, metres: of a depth sensor.
+    #[serde(default)]
+    pub range_m: Option<DepthRange>,
+    /// What -1 and 1 mean, differences on the 0..255 scale: of a color sensor.
+    #[serde(default)]
+    pub range: Option<[f64; 2]>,
+    /// How the channels of a depth picture become one.
     #[serde(default)]
     pub reduction: Reduction,
-    /// Rotation from the picture to the raw orientation of the lab's bubble files: 0 or 180 degrees.
+    /// Rotation from the picture to the sensor's own raw orientation: 0 or 180 degrees.
     #[serde(default)]
     pub rotation_deg: u32,
-    /// `[width, height]` of the imprint the picture stands for.
+    /// `[width, height]` of the imprint (or color picture) that the decoder's picture stands for.
     pub imprint_size: [usize; 2],
     /// How the picture is brought to that size.
     #[serde(default = "bilinear")]
@@ -262,8 +279,8 @@ pub struct MaskSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaskInput {
-    /// Which sensor: always `bubble`.
-    pub sensor: BubbleSensor,
+    /// Which sensor: a depth sensor.
+    pub sensor: SensorSpec,
     /// `[width, height]`, pixels.
     pub size: [usize; 2],
     /// The imprint's depth that becomes 0 and 1, metres.
@@ -313,8 +330,8 @@ pub struct ClassifierSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClassifierInput {
-    /// Which sensor: always `bubble`.
-    pub sensor: BubbleSensor,
+    /// Which sensor: a depth sensor.
+    pub sensor: SensorSpec,
     /// `[width, height]`, pixels; resized bilinearly.
     pub size: [usize; 2],
     /// The imprint's depth that becomes -1 and 1, metres; clamped.
@@ -384,11 +401,12 @@ pub(super) fn parse(text: &[u8], problems: &mut Problems) -> Option<Manifest> {
         return None;
     }
     match keys.remove("format_version") {
+        Some(version) if version.as_u64() == Some(1) => upgrade(&mut keys),
         Some(version) if version.as_u64() == Some(VERSION) => {}
         version => {
             let version = version.map_or("missing".to_owned(), |v| v.to_string());
             problems.add(
-                format!("format_version: {version}, but this program reads version {VERSION}"),
+                format!("format_version: {version}, but this program reads versions 1 to {VERSION}"),
                 "use a bundle made for this version of the program, or update the program",
             );
             return None;
@@ -425,6 +443,21 @@ pub(super) fn parse(text: &[u8], problems: &mut Problems) -> Option<Manifest> {
     Some(Manifest { name, files, spec, provenance })
 }
 
+/// Declares the sensors of a manifest of the first version, which were always the lab's.
+fn upgrade(keys: &mut Map<String, Value>) {
+    let generator = keys.get("kind").and_then(Value::as_str) == Some("generator");
+    let (input, output) = if generator { (&lab::GELSLIM, Some(&lab::BUBBLE)) } else { (&lab::BUBBLE, None) };
+    let declared = |sensor: &Sensor| serde_json::to_value(SensorSpec::of(sensor)).unwrap_or_default();
+    if let Some(Value::Object(section)) = keys.get_mut("input")
+        && section.get("sensor").and_then(Value::as_str) == Some(&*input.key)
+    {
+        section.insert("sensor".into(), declared(input));
+    }
+    if let (Some(Value::Object(section)), Some(output)) = (keys.get_mut("output"), output) {
+        section.insert("sensor".into(), declared(output));
+    }
+}
+
 /// Takes one key out of the manifest and reads it.
 fn section<T: DeserializeOwned>(keys: &mut Map<String, Value>, key: &str, problems: &mut Problems) -> Option<T> {
     let value = keys.remove(key).or_else(|| {
@@ -459,9 +492,18 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
     if let Some(input) = &input {
         check(sides(&input.size), "input.size: out of range", SIDES);
         check(turn(input.rotation_deg), "input.rotation_deg: not supported", TURNS);
-        check(input.mean.iter().all(|m| m.is_finite()), "input.mean: not numbers", "give three numbers");
-        let positive = input.std.iter().all(|&s| s > 0.0 && s.is_finite());
-        check(positive, "input.std: not positive", "give three positive numbers");
+        check(sides(&input.sensor.size), "input.sensor.size: out of range", SIDES);
+        let n = input.channels();
+        let each = "give one number per channel: three of a color sensor, one of a depth sensor";
+        check(input.mean.len() == n && input.mean.iter().all(|m| m.is_finite()), "input.mean: not numbers", each);
+        let positive = input.std.len() == n && input.std.iter().all(|&s| s > 0.0 && s.is_finite());
+        check(positive, "input.std: not positive", each);
+        let metres = (input.sensor.kind == SensorKind::Depth) == (input.scale == InputScale::Metres);
+        check(
+            metres,
+            "input.scale: not the sensor's",
+            "\"m\" of a depth sensor, \"0..1\" or \"0..255\" of a color sensor",
+        );
     }
     if let Some(condition) = &condition {
         check(sides(&condition.shape), "condition.shape: out of range", SIDES);
@@ -474,7 +516,20 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
     if let Some(output) = &output {
         check(sides(&output.size), "output.size: out of range", SIDES);
         check(sides(&output.imprint_size), "output.imprint_size: out of range", SIDES);
-        check(output.range_m.is_valid(), "output.range_m: empty", "give [smallest, largest] depth in metres");
+        check(sides(&output.sensor.size), "output.sensor.size: out of range", SIDES);
+        match output.sensor.kind {
+            SensorKind::Depth => {
+                let valid = output.range_m.is_some_and(|range| range.is_valid()) && output.range.is_none();
+                check(valid, "output.range_m: empty", "give [smallest, largest] depth in metres");
+            }
+            SensorKind::Color => {
+                let valid = output.range.is_some_and(|[lo, hi]| lo < hi && lo.is_finite() && hi.is_finite());
+                let valid = valid && output.range_m.is_none();
+                check(valid, "output.range: empty", "give [smallest, largest] difference on the 0..255 scale");
+                check(output.channels == 3, "output.channels: not a color picture's", "a color sensor has 3 channels");
+                check(shift.is_none(), "shift: not for a color picture", "remove it");
+            }
+        }
         check(turn(output.rotation_deg), "output.rotation_deg: not supported", TURNS);
         check((1..=4).contains(&output.channels), "output.channels: out of range", "1 to 4 channels can be used");
         let luma = output.reduction != Reduction::Luma || output.channels == 3;
@@ -538,6 +593,9 @@ fn mask(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<Bundle
         if !turn(input.rotation_deg) {
             problems.add("input.rotation_deg: not supported", TURNS);
         }
+        if input.sensor.kind != SensorKind::Depth {
+            problems.add("input.sensor.kind: not depth", "contact and tools are found in imprints of a depth sensor");
+        }
     }
     if let Some(output) = &output {
         if !(1..=2).contains(&output.classes) {
@@ -562,6 +620,9 @@ fn classifier(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<
         }
         if !turn(input.rotation_deg) {
             problems.add("input.rotation_deg: not supported", TURNS);
+        }
+        if input.sensor.kind != SensorKind::Depth {
+            problems.add("input.sensor.kind: not depth", "contact and tools are found in imprints of a depth sensor");
         }
     }
     if let Some(output) = &output {

@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Case, Stratum};
 use crate::domain::mesh::TriMesh;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, lab};
 use crate::domain::sim::{self, Bar, Spoil, ToolSpec, spoil_mask};
 
 /// Deviation of the camera's true angle and place from the nominal ones, per axis.
@@ -72,20 +72,20 @@ pub fn simulated(position: usize, count: usize, seed: u64, tools: &[ToolSpec]) -
     let mask_seed: u64 = rng.random();
     // Of the degenerate cases, three of four have one blank finger, either one equally often.
     let blank = (stratum == Stratum::Degenerate && rng.random_bool(0.75)).then(|| rng.random_range(0..2));
-    let touch = |finger: Finger| {
-        let touch = sample.finger(finger).and_then(|t| t.bubble.as_ref());
+    let touch = |finger: PadId| {
+        let touch = sample.pad(finger).and_then(|t| t.depth());
         touch.expect("the simulator presses both fingers")
     };
     let camera = |finger| touch(finger).camera.clone().expect("the simulator's bubbles have cameras");
-    let clean = Finger::BOTH.map(|f| touch(f).truth.as_ref().expect("the simulator knows the contact").contact.clone());
-    let mut masks = Finger::BOTH.map(|f| spoil_mask(&clean[f.index()], &spoil, f, mask_seed));
+    let clean = lab::PADS.map(|f| touch(f).truth.as_ref().expect("the simulator knows the contact").contact.clone());
+    let mut masks = lab::PADS.map(|f| spoil_mask(&clean[f.index()], &spoil, f, mask_seed));
     if let Some(finger) = blank {
         let finger: usize = finger;
         masks[finger].as_mut_slice().fill(false);
     }
-    let mut imprints = Finger::BOTH.map(|f| touch(f).imprint.clone());
+    let mut imprints = lab::PADS.map(|f| touch(f).imprint.clone());
     for (f, imprint) in imprints.iter_mut().enumerate() {
-        let reference = camera(Finger::BOTH[f]).depth_reference;
+        let reference = camera(lab::PADS[f]).depth_reference;
         for (value, reference) in imprint.as_mut_slice().iter_mut().zip(reference.as_slice()) {
             if rng.random_bool(DROPPED) {
                 *value = if f == 0 { *reference } else { f32::NAN };
@@ -94,7 +94,7 @@ pub fn simulated(position: usize, count: usize, seed: u64, tools: &[ToolSpec]) -
     }
     Case {
         imprints,
-        cameras: Finger::BOTH.map(camera),
+        cameras: lab::PADS.map(camera),
         masks,
         masks_clean: clean,
         grasp_from_object: sample.grasp_from_object.expect("the simulator knows the pose"),

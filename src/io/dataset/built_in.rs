@@ -105,7 +105,7 @@ mod tests {
     use strum::IntoEnumIterator as _;
 
     use super::*;
-    use crate::domain::sensor::Finger;
+    use crate::domain::rig::lab;
 
     #[test]
     fn every_pair_has_its_tool_and_the_last_one_renders() {
@@ -122,7 +122,7 @@ mod tests {
             }
             let last = PairId(u32::try_from(pairs.len()).unwrap() - 1);
             let sample = set.load(last).unwrap();
-            assert!(sample.finger(Finger::Left).unwrap().bubble.as_ref().unwrap().truth.is_some());
+            assert!(sample.pad(lab::LEFT).unwrap().depth().unwrap().truth.is_some());
             assert!(set.load(PairId(last.0 + 1)).is_none());
         }
         for no in ["", "test-set-", "test-set-odd", "test-sets", "Demo"] {

@@ -8,9 +8,9 @@ use std::sync::{Arc, OnceLock};
 use super::lab::{self, FileRef, Lab};
 use super::{Dataset, LoadError, OpenError, SAME_NAME, Scan, Source, SourceKind, pictures, problem};
 use crate::domain::dataset::{PairId, Problem};
-use crate::domain::sample::{BubbleCamera, Sample};
-use crate::domain::sensor::Finger;
+use crate::domain::sample::{DepthCamera, Sample};
 use crate::io::caught::caught;
+use crate::domain::rig::PerPad;
 
 /// What is in the name of every file that is written beside a touch; such files are never taken for touches.
 pub const OUTPUT_MARK: &str = ".t2t.";
@@ -62,9 +62,9 @@ impl Dataset {
         let fresh = Self::of(scan.ok_or_else(|| OpenError::NothingFound { path: root.clone() })?);
         let known: BTreeMap<&str, usize> =
             self.index.pairs.iter().enumerate().map(|(at, entry)| (entry.name.as_str(), at)).collect();
-        let mut dataset = Self { problems: fresh.problems.clone(), rig: OnceLock::new(), ..self.clone() };
-        if let Some(rig) = self.rig.get().filter(|rig| rig.iter().any(Option::is_some)) {
-            dataset.rig.set(rig.clone()).ok();
+        let mut dataset = Self { problems: fresh.problems.clone(), cameras: OnceLock::new(), ..self.clone() };
+        if let Some(cameras) = self.cameras.get().filter(|cameras| !cameras.is_empty()) {
+            dataset.cameras.set(cameras.clone()).ok();
         }
         let (mut new, mut changed) = (Vec::new(), Vec::new());
         for (at, entry) in fresh.index.pairs.iter().enumerate() {
@@ -152,14 +152,14 @@ impl Dataset {
         }
     }
 
-    /// Lets touches that come without a bubble use these cameras, by [`Finger::index`].
-    pub fn set_rig_cameras(&mut self, cameras: [Option<BubbleCamera>; 2]) {
-        self.rig = OnceLock::from(cameras.map(|camera| camera.map(Arc::new)));
+    /// Lets touches that come without a depth picture use these cameras.
+    pub fn set_rig_cameras(&mut self, cameras: PerPad<DepthCamera>) {
+        self.cameras = OnceLock::from(cameras.map(|camera| camera.map(Arc::new)));
     }
 
     /// The cameras for touches without a bubble: of [`RIG_FILE`] in the root, else of the first bubble file.
-    fn rig(&self) -> &[Option<Arc<BubbleCamera>>; 2] {
-        self.rig.get_or_init(|| {
+    fn cameras(&self) -> &PerPad<Arc<DepthCamera>> {
+        self.cameras.get_or_init(|| {
             let named = self.root.iter().map(|root| root.join(RIG_FILE)).find(|file| file.is_file());
             let first = || match &self.source {
                 Source::Lab(lab) => lab.first_bubble(),
@@ -170,29 +170,29 @@ impl Dataset {
                 Some((Ok(cameras), _)) => cameras.map(|camera| camera.map(Arc::new)),
                 Some((Err(err), file)) => {
                     log::warn!("no cameras for touches without a bubble: {err} ({})", file.display());
-                    [None, None]
+                    PerPad::default()
                 }
-                None => [None, None],
+                None => PerPad::default(),
             }
         })
     }
 
     pub(super) fn lend_cameras(&self, sample: &mut Sample) {
-        for finger in Finger::BOTH {
-            if let Some(touch) = &mut sample.fingers[finger.index()]
-                && touch.bubble.is_none()
+        for pad in sample.rig.pads() {
+            if let Some(touch) = sample.pads.get_mut(pad)
+                && touch.depth().is_none()
             {
-                touch.rig.clone_from(&self.rig()[finger.index()]);
+                touch.lent.clone_from(&self.cameras()[pad]);
             }
         }
     }
 }
 
-/// The cameras in a bubble file of the lab's, by [`Finger::index`].
+/// The cameras in a bubble file of the lab's.
 ///
 /// # Errors
 /// [`LoadError`] if the file cannot be read; one without camera data has none.
-pub fn cameras_of(file: &Path) -> Result<[Option<BubbleCamera>; 2], LoadError> {
+pub fn cameras_of(file: &Path) -> Result<PerPad<DepthCamera>, LoadError> {
     caught(|| Lab::cameras(file))
         .unwrap_or_else(|message| Err(LoadError::Bug { files: vec![file.to_owned()], message }))
 }

@@ -16,9 +16,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
-use crate::domain::sample::BubbleCamera;
-use crate::io::caught::caught;
-use crate::io::pt::read_dict;
+use crate::domain::sample::DepthCamera;
+use crate::domain::rig::{PerPad, Rig};
 
 use super::{LoadError, Loaded, Scan, Source, SourceKind, is_output, last_integer, problem, same_name};
 
@@ -193,6 +192,7 @@ impl Scanner {
             problems: self.problems,
             source: Source::Lab(Lab { folders: self.folders, pairs: files, meshes, flat: groups.is_empty() }),
             kind: SourceKind::Lab,
+            rig: Rig::lab(),
         }
     }
 }
@@ -428,9 +428,9 @@ impl Lab {
     }
 
     /// The cameras in a bubble file, by finger.
-    pub(super) fn cameras(file: &Path) -> Result<[Option<BubbleCamera>; 2], LoadError> {
+    pub(super) fn cameras(file: &Path) -> Result<PerPad<DepthCamera>, LoadError> {
         let sample = load::pair(None, Some(file))?.sample;
-        Ok(sample.fingers.map(|touch| touch?.bubble?.camera))
+        Ok(sample.pads.map(|touch| touch?.depth()?.camera.clone()))
     }
 
     pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {

@@ -1,6 +1,9 @@
 //! A folder of pictures (PNG or JPEG): `NAME_gelslim.png`, optionally with `NAME_bubble.png` and `NAME_vqvae.png`; or
 //! the camera's own images, `NAME_touch.png` with `NAME_reference.png` or one `reference.png` for all.
 //!
+//! A file [`RIG_JSON`] in the folder declares the sensors ([`Rig`]); the names of the first color and the first depth
+//! sensor then stand for `gelslim` and `bubble` in file names. Without it they are the lab's.
+//!
 //! Camera images are used as they are. The others lost their scale: each was stretched to 0..255 on its own. What is
 //! assumed instead:
 //!
@@ -14,12 +17,13 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use crate::domain::dataset::{PairEntry, PairId, Split};
+use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::resample;
-use crate::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample, Scale};
-use crate::domain::sensor::bubble;
+use crate::domain::rig::{Rig, Sensor, SensorId, SensorKind, lab};
+use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample, Scale};
 use crate::domain::upright::{self, Turn};
 use crate::io::images;
 
@@ -41,34 +45,60 @@ const CLEAN_GAIN: [f32; 3] = [0.039 * 0.0989 * 255.0, 0.039 * 0.0746 * 255.0, 0.
 /// Standard deviation of the lab's difference images, 0..255 scale (its training set's 0.0687, 0.0428, 0.0576).
 const DIFFERENCE_STD: [f32; 3] = [0.0687 * 255.0, 0.0428 * 255.0, 0.0576 * 255.0];
 
-/// Position of the GelSlim's suffix in [`SUFFIXES`].
+/// Position of the GelSlim's suffix in [`suffixes`].
 const GELSLIM: usize = 0;
-/// Position of the bubble's suffix in [`SUFFIXES`].
+/// Position of the bubble's suffix in [`suffixes`].
 pub(super) const BUBBLE: usize = 1;
-/// Position of the prediction's suffix in [`SUFFIXES`].
+/// Position of the prediction's suffix in [`suffixes`].
 pub(super) const VQVAE: usize = 2;
-/// Position of the camera image's suffix in [`SUFFIXES`].
+/// Position of the camera image's suffix in [`suffixes`].
 const TOUCH: usize = 3;
-/// Position of the untouched camera image's suffix in [`SUFFIXES`].
+/// Position of the untouched camera image's suffix in [`suffixes`].
 const REFERENCE: usize = 4;
 
-const SUFFIXES: [&str; 5] = ["_gelslim", "_bubble", "_vqvae", "_touch", "_reference"];
+const KINDS: usize = 5;
+/// The file in a folder of pictures that says which sensors took them.
+pub const RIG_JSON: &str = "rig.json";
 const EXTENSIONS: [&str; 3] = [".png", ".jpg", ".jpeg"];
 /// The untouched image of all touches that have none of their own.
 const COMMON_REFERENCE: &str = "reference";
 
-type Files = [Option<PathBuf>; SUFFIXES.len()];
+type Files = [Option<PathBuf>; KINDS];
 
 /// The files of a picture folder, in the order of the index.
 #[derive(Clone, Debug)]
 pub(super) struct Pictures {
     pub(super) pairs: Vec<Files>,
     pub(super) folder: PathBuf,
+    rig: Arc<Rig>,
+}
+
+/// What the names of the pictures end in, in lower case.
+fn suffixes(rig: &Rig) -> [String; KINDS] {
+    let of = |sensor: Option<&Sensor>, without: &Sensor| format!("_{}", sensor.unwrap_or(without).key.to_lowercase());
+    let (color, depth) = (of(rig.color(), &lab::GELSLIM), of(rig.depth(), &lab::BUBBLE));
+    [color, depth, "_vqvae".into(), "_touch".into(), "_reference".into()]
+}
+
+/// The sensors that the folder declares, else the lab's.
+fn rig_of(folder: &Path, problems: &mut Vec<Problem>) -> Arc<Rig> {
+    let file = folder.join(RIG_JSON);
+    let Ok(text) = std::fs::read(&file) else { return Rig::lab() };
+    match Rig::parse(&text) {
+        Ok(rig) => Arc::new(rig),
+        Err(why) => {
+            let hint = "correct it, or remove it to take the pictures for the lab's sensors";
+            problems.push(problem(file, format!("does not declare a rig: {why}"), hint));
+            Rig::lab()
+        }
+    }
 }
 
 /// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
 pub(super) fn scan(folder: &Path) -> Option<Scan> {
     let mut problems = Vec::new();
+    let rig = rig_of(folder, &mut problems);
+    let suffixes = suffixes(&rig);
     let mut found: BTreeMap<String, Files> = BTreeMap::new();
     let mut common = None;
     for entry in std::fs::read_dir(folder).ok()? {
@@ -89,9 +119,9 @@ pub(super) fn scan(folder: &Path) -> Option<Scan> {
             common = Some(path);
             continue;
         }
-        let Some(kind) = SUFFIXES.iter().position(|suffix| stem.ends_with(suffix)) else { continue };
+        let Some(kind) = suffixes.iter().position(|suffix| stem.ends_with(suffix.as_str())) else { continue };
         // Suffix and extension are ASCII, so the cut is at a character.
-        let pair = name[..stem.len() - SUFFIXES[kind].len()].to_owned();
+        let pair = name[..stem.len() - suffixes[kind].len()].to_owned();
         let slot = &mut found.entry(pair).or_default()[kind];
         match slot {
             Some(first) => problems.push(same_name(path, stem, first)),
@@ -118,7 +148,7 @@ pub(super) fn scan(folder: &Path) -> Option<Scan> {
             let file = if files[BUBBLE].is_some() { lone(BUBBLE) } else { lone(VQVAE) };
             problems.push(problem(
                 file,
-                format!("its other half {name}{}.png is missing", SUFFIXES[GELSLIM]),
+                format!("its other half {name}{}.png is missing", suffixes[GELSLIM]),
                 "add the missing picture, or remove this one",
             ));
         }
@@ -129,8 +159,9 @@ pub(super) fn scan(folder: &Path) -> Option<Scan> {
         root: folder.to_owned(),
         pairs,
         problems,
-        source: Source::Pictures(Pictures { pairs: files, folder: folder.to_owned() }),
+        source: Source::Pictures(Pictures { pairs: files, folder: folder.to_owned(), rig: rig.clone() }),
         kind: SourceKind::Pictures,
+        rig,
     })
 }
 
@@ -158,7 +189,9 @@ impl Pictures {
     fn difference(&self, id: PairId) -> Result<Option<(RgbGrid, Turn)>, LoadError> {
         let Some(path) = self.file(id, GELSLIM)? else { return Ok(None) };
         let difference = difference_from_tile(&images::read_rgb(path)?);
-        let turn = upright::seen(&difference).unwrap_or_default();
+        // The light of a GelSlim tells how its picture lay; nothing is known of other sensors' light.
+        let tells = self.rig.color().is_some_and(|sensor| sensor.key == lab::GELSLIM.key);
+        let turn = tells.then(|| upright::seen(&difference)).flatten().unwrap_or_default();
         Ok(Some((turn.undo(&difference), turn)))
     }
 
@@ -169,19 +202,20 @@ impl Pictures {
         Ok(Some((0..3).any(|channel| matches!(mode(&tile, channel), 0 | 255))))
     }
 
-    /// The pair as the right finger's touch: which finger it was is not known.
+    /// The pair as the first pad's touch: which one it was is not known.
     pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
         let mut notes = Vec::new();
-        let mut touch = FingerTouch::default();
+        let mut touch = PadTouch::default();
         let mut scale = Scale::Assumed;
         let mut laid = Turn::default();
+        // A picture of a kind that the rig does not have is kept behind its sensors.
+        let place = |kind| self.rig.first(kind).unwrap_or(SensorId(self.rig.sensors.len() as u8));
+        let (color_id, depth_id) = (place(SensorKind::Color), place(SensorKind::Depth));
         if let (Some(touched), Some(reference)) = (self.file(id, TOUCH)?, self.file(id, REFERENCE)?) {
             let (raw, untouched) = (images::read_rgb(touched)?, images::read_rgb(reference)?);
             let sizes = [raw.size(), untouched.size()];
-            touch.gelslim = GelSlimTouch::from_images(raw, untouched);
-            if touch.gelslim.is_none() {
-                return Err(LoadError::Sizes { file: touched.to_owned(), sizes });
-            }
+            let color = ColorTouch::from_images(raw, untouched);
+            touch.set(color_id, color.ok_or_else(|| LoadError::Sizes { file: touched.to_owned(), sizes })?);
             // The model's metres are its own; only a bubble picture has none.
             scale = Scale::Measured;
         } else if let Some((difference, turn)) = self.difference(id)? {
@@ -190,7 +224,7 @@ impl Pictures {
             if difference.as_slice().iter().all(|p| *p == [0.0; 3]) {
                 notes.push(problem(path, "the picture is a single colour", "check that the right picture was saved"));
             }
-            touch.gelslim = Some(GelSlimTouch { images: None, difference });
+            touch.set(color_id, ColorTouch { images: None, difference });
         }
         if let Some(tile) = self.tile(id, BUBBLE, laid)? {
             let [w, h] = tile.size();
@@ -205,10 +239,12 @@ impl Pictures {
             if tile.as_slice().windows(2).all(|v| v[0] == v[1]) {
                 notes.push(problem(path, "the picture is a single grey", "check that the right picture was saved"));
             }
-            touch.bubble = Some(BubbleTouch { imprint: imprint_from_tile(&tile), camera: None, truth: None });
+            let imprint = imprint_from_tile(&tile, &self.rig);
+            touch.set(depth_id, DepthTouch { imprint, camera: None, truth: None });
             scale = Scale::Assumed;
         }
-        let sample = Sample { fingers: [Some(touch), None], grasp_from_object: None, scale, laid, notes };
+        let pads = self.rig.pads().map(|pad| (pad.index() == 0).then(|| touch.clone())).collect();
+        let sample = Sample { rig: self.rig.clone(), pads, grasp_from_object: None, scale, laid, notes };
         Ok(Loaded { sample, invalid: Default::default() })
     }
 }
@@ -219,11 +255,12 @@ pub fn assumed_metres(tile: &Grid<f32>) -> DepthMap {
     tile.map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32)
 }
 
-/// Assumed metres, turned back by 180 degrees, at the lab's size.
-pub(super) fn imprint_from_tile(tile: &Grid<f32>) -> DepthMap {
-    let metres = assumed_metres(&tile.rotated_180());
+/// Assumed metres, turned back to how the depth sensor's picture lies, at its size.
+pub(super) fn imprint_from_tile(tile: &Grid<f32>, rig: &Rig) -> DepthMap {
+    let sensor = rig.depth().unwrap_or(&lab::BUBBLE);
+    let turned = if sensor.rotation_deg == 180 { tile.rotated_180() } else { tile.clone() };
     // The lab made these pictures with torchvision's resize, so they are undone with the same one.
-    resample::bilinear(&metres, bubble::WIDTH, bubble::HEIGHT)
+    resample::bilinear(&assumed_metres(&turned), sensor.width, sensor.height)
 }
 
 /// The most frequent level of a channel.
@@ -266,7 +303,7 @@ mod tests {
     #[test]
     fn a_tile_is_turned_back_and_scaled() {
         let tile = Grid::from_fn(128, 128, |x, y| if x < 10 && y < 10 { 255.0 } else { 0.0 });
-        let imprint = imprint_from_tile(&tile);
+        let imprint = imprint_from_tile(&tile, &Rig::lab());
         assert_eq!(imprint.size(), [175, 140]);
         assert!((imprint[(174, 139)] - 0.018).abs() < 1e-6);
         assert!((imprint[(0, 0)] + 0.0063).abs() < 1e-6);

@@ -8,8 +8,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use super::{Loaded, problem};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::DepthMap;
-use crate::domain::sample::{BubbleCamera, Sample};
-use crate::domain::sensor::{Finger, bubble};
+use crate::domain::sample::{DepthCamera, Sample};
 
 /// No bubble is pushed in further; the released data reach 26 mm.
 const MAX_IMPRINT_M: f64 = 0.08;
@@ -36,13 +35,14 @@ const ROUND_TRIP_PX: f64 = 1e-6;
 /// Adds to the sample's notes what cannot be right about it; `file` is its bubble's file.
 pub(super) fn notes(loaded: &mut Loaded, file: &Path) {
     let mut problems = std::mem::take(&mut loaded.sample.notes);
-    for finger in Finger::BOTH {
-        let bubble = loaded.sample.finger(finger).and_then(|t| t.bubble.as_ref());
-        let (Some(bubble), invalid) = (bubble, loaded.invalid[finger.index()]) else { continue };
+    for (finger, touch) in loaded.sample.pads.entries() {
+        let Some(bubble) = touch.depth() else { continue };
+        let invalid = loaded.invalid[finger].unwrap_or_default();
         let pixels = bubble.imprint.len();
         if invalid.are_many(pixels) {
             let share = 100.0 * invalid.total() as f64 / pixels as f64;
-            let (name, nan, infinite, dropped) = (finger.name(), invalid.nan, invalid.infinite, invalid.dropped);
+            let (name, nan, infinite, dropped) =
+                (loaded.sample.rig.pad_key(finger), invalid.nan, invalid.infinite, invalid.dropped);
             problems.push(problem(
                 file,
                 format!(
@@ -79,11 +79,11 @@ fn sample(sample: &Sample, file: &Path, problems: &mut Vec<Problem>) {
     let mut add = |what: String, hint: &str| {
         problems.push(Problem { file: file.to_owned(), what, hint: hint.into() });
     };
-    let mut sides = [None, None];
-    for finger in Finger::BOTH {
-        let Some(touch) = sample.finger(finger) else { continue };
-        let name = finger.name();
-        if let Some(gel) = &touch.gelslim
+    let mut sides = Vec::new();
+    for finger in sample.rig.pads() {
+        let Some(touch) = sample.pad(finger) else { continue };
+        let name = &*sample.rig.pad_key(finger);
+        if let Some(gel) = touch.color()
             && let Some(images) = &gel.images
         {
             let brightest = images.raw.as_slice().iter().flatten().copied().fold(0f32, f32::max);
@@ -94,14 +94,14 @@ fn sample(sample: &Sample, file: &Path, problems: &mut Vec<Problem>) {
                 );
             }
         }
-        let Some(touch) = &touch.bubble else { continue };
+        let Some(touch) = touch.depth() else { continue };
         imprint(&touch.imprint, name, &mut add);
         if let Some(camera) = &touch.camera {
-            sides[finger.index()] = Some(camera.grasp_from_camera.translation.x);
+            sides.push(camera.grasp_from_camera.translation.x);
             self::camera(camera, &touch.imprint, name, &mut add);
         }
     }
-    if let [Some(right), Some(left)] = sides
+    if let [right, left] = sides[..]
         && right * left > 0.0
     {
         add(
@@ -142,11 +142,11 @@ fn imprint(imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
     }
 }
 
-fn camera(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
+fn camera(camera: &DepthCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
     let k = camera.intrinsics;
     let focal_ok = |f: f64| (FOCAL_RANGE_PX[0]..=FOCAL_RANGE_PX[1]).contains(&f);
     let inside = |c: f64, size: usize| (CENTRE_RANGE[0]..=CENTRE_RANGE[1]).contains(&(c / size as f64));
-    let centre_ok = inside(k.cx, bubble::FULL_WIDTH) && inside(k.cy, bubble::FULL_HEIGHT);
+    let centre_ok = inside(k.cx, camera.crop.full[0]) && inside(k.cy, camera.crop.full[1]);
     let square = (k.fx / k.fy).max(k.fy / k.fx) <= MAX_ASPECT;
     if !(focal_ok(k.fx) && focal_ok(k.fy) && centre_ok && square) {
         add(
@@ -169,7 +169,8 @@ fn camera(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut impl 
         );
     }
     // What the middle of the crop sees is the membrane, and that is near the tool.
-    let seen = k.lift(bubble::WIDTH as f64 / 2.0, bubble::HEIGHT as f64 / 2.0, typical);
+    let [width, height] = camera.depth_reference.size();
+    let seen = camera.lift(width as f64 / 2.0, height as f64 / 2.0, typical);
     let distance = camera.grasp_from_camera.transform_point3(seen).length();
     if distance > NEAR_GRASP_M {
         let w_first = reordered(&camera.grasp_from_camera).transform_point3(seen).length() < NEAR_GRASP_M;
@@ -190,7 +191,7 @@ fn reordered(a: &DAffine3) -> DAffine3 {
 }
 
 /// Depth to cloud to pixel: every measured pixel must come back to itself.
-fn round_trip(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
+fn round_trip(camera: &DepthCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
     let camera_from_grasp = camera.grasp_from_camera.inverse();
     let mut lost = 0usize;
     for v in 0..imprint.height() {
@@ -199,9 +200,8 @@ fn round_trip(camera: &BubbleCamera, imprint: &DepthMap, name: &str, add: &mut i
             if !depth.is_finite() {
                 continue;
             }
-            let in_grasp: DVec3 =
-                camera.grasp_from_camera.transform_point3(camera.intrinsics.lift(u as f64, v as f64, depth));
-            let back = camera.intrinsics.project(camera_from_grasp.transform_point3(in_grasp));
+            let in_grasp: DVec3 = camera.grasp_from_camera.transform_point3(camera.lift(u as f64, v as f64, depth));
+            let back = camera.project(camera_from_grasp.transform_point3(in_grasp));
             let missed =
                 back.is_none_or(|(x, y)| (x - u as f64).abs() > ROUND_TRIP_PX || (y - v as f64).abs() > ROUND_TRIP_PX);
             lost += usize::from(missed);

@@ -4,6 +4,8 @@ use std::collections::HashSet;
 
 use sha2::Digest as _;
 
+use crate::domain::rig::Rig;
+
 use super::{ExportConfig, ExportEntry, ExportError};
 
 fn hash(seed: u64, text: &str) -> [u8; 32] {
@@ -45,7 +47,7 @@ pub(super) fn parts(entries: &[ExportEntry], config: &ExportConfig) -> Result<Ve
 
 /// File stems: the tool, the pair's name and the finger, in characters that no glob and no `splitext` interprets.
 /// Names that become equal get a hash, so that each stem is used once.
-pub(super) fn stems(entries: &[ExportEntry]) -> Vec<String> {
+pub(super) fn stems(entries: &[ExportEntry], rig: &Rig) -> Vec<String> {
     let plain = |text: &str| -> String {
         text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' }).collect()
     };
@@ -59,11 +61,12 @@ pub(super) fn stems(entries: &[ExportEntry]) -> Vec<String> {
                 stem = format!("{tool}_{stem}");
             }
             stem.truncate(150);
-            stem = format!("{stem}_{}", entry.finger.name());
+            let finger = rig.pad_key(entry.finger);
+            stem = format!("{stem}_{finger}");
             let mut round = 0;
             // Lower case, because some file systems do not tell capitals apart.
             while !used.insert(stem.to_lowercase()) {
-                let digest = hash(round, &format!("{}|{}", entry.pair, entry.finger.name()));
+                let digest = hash(round, &format!("{}|{finger}", entry.pair));
                 let short: String = digest[..4].iter().map(|b| format!("{b:02x}")).collect();
                 stem = format!("{stem}_{short}");
                 round += 1;
@@ -76,12 +79,12 @@ pub(super) fn stems(entries: &[ExportEntry]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::sensor::Finger;
+    use crate::domain::rig::lab;
 
     fn entries(n: usize) -> Vec<ExportEntry> {
         (0..n)
             .flat_map(|i| {
-                Finger::BOTH.map(|finger| ExportEntry {
+                lab::PADS.map(|finger| ExportEntry {
                     pair: format!("pattern_0{}/data_{i}", i % 2),
                     tool: Some(format!("pattern_0{}", i % 2)),
                     finger,
@@ -117,9 +120,9 @@ mod tests {
     #[test]
     fn stems_hold_the_tool_and_are_unique() {
         let entry =
-            |pair: &str, tool: &str| ExportEntry { pair: pair.into(), tool: Some(tool.into()), finger: Finger::Right };
+            |pair: &str, tool: &str| ExportEntry { pair: pair.into(), tool: Some(tool.into()), finger: lab::RIGHT };
         let list = [entry("a/data_1", "a"), entry("a_data_1", "a"), entry("x[1].*", "b.c"), entry("A/data_1", "A")];
-        let out = stems(&list);
+        let out = stems(&list, &Rig::lab());
         assert_eq!(out[0], "a_data_1_right");
         assert!(out[1].starts_with("a_data_1_right_") && out[2] == "b_c_x_1____right");
         assert!(out[3].starts_with("A_data_1_right_"));

@@ -7,7 +7,6 @@ use glam::{DAffine3, DVec3};
 
 use super::{layers, steps};
 use crate::app::keys::{CloudKey, ImprintSource};
-use crate::domain::sensor::Finger;
 use crate::gpu::guides;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
@@ -36,7 +35,7 @@ pub(super) fn update_cloud(cx: &mut Cx<'_>, source: ImprintSource, key: CloudKey
     };
     let convert = |f: &FingerCloud| [part(f, false), part(f, true)];
     cx.local.revision += 1;
-    let fingers = [clouds.fingers[0].as_ref().map(convert), clouds.fingers[1].as_ref().map(convert)];
+    let fingers = clouds.fingers.as_ref().map(|cloud| cloud.map(convert));
     *held = Some(SceneCloud { key, revision: cx.local.revision, fingers });
 }
 
@@ -67,14 +66,13 @@ pub(super) fn scene_of(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Scen
 /// Membrane and contact points of both fingers.
 fn clouds(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
     if let Some(cloud) = &cx.local.scene_clouds[source as usize] {
-        for finger in Finger::BOTH {
-            let Some(parts) = &cloud.fingers[finger.index()] else { continue };
+        for (finger, parts) in cloud.fingers.entries() {
             // The membrane recedes, the contact stands out.
             let rest = theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
             let looks = [(PointSize::Px(1.2), rest, "membrane"), (PointSize::Metres(0.000_3), CONTACT, "contact")];
             for (part, (size, color, name)) in parts.iter().zip(looks) {
                 let mut item = CloudItem {
-                    name: format!("{name} {}", finger.name()),
+                    name: format!("{name} {}", cx.state.finger_name(finger)),
                     revision: cloud.revision,
                     points: part.clone(),
                     colors: PointColors::One,
@@ -99,10 +97,9 @@ fn other_cloud(cx: &Cx<'_>, other: ImprintSource, scene: &mut SceneData) {
     if cx.state.cloud_key(other) != Ok(Some(cloud.key.clone())) {
         return;
     }
-    for finger in Finger::BOTH {
-        let Some([_, contact]) = &cloud.fingers[finger.index()] else { continue };
+    for (finger, [_, contact]) in cloud.fingers.entries() {
         scene.clouds.push(CloudItem {
-            name: format!("other contact {}", finger.name()),
+            name: format!("other contact {}", cx.state.finger_name(finger)),
             revision: cloud.revision,
             points: contact.clone(),
             colors: PointColors::One,

@@ -12,7 +12,7 @@ use crate::domain::align::Observability;
 use crate::domain::align::reason::Reason;
 use crate::domain::colormap::Range;
 use crate::domain::frames::PlanarPose;
-use crate::domain::sensor::Finger;
+use crate::domain::rig::{PadId, PerPad};
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::points::{CloudItem, PointColors, PointSize};
 use crate::ui::cx::Cx;
@@ -30,7 +30,7 @@ pub(in crate::ui) struct LayerColors {
     key: (PoseKey, Layer),
     revision: u64,
     range: Range,
-    fingers: [PointColors; 2],
+    fingers: PerPad<PointColors>,
 }
 
 /// Makes the colours of a side's contact points, where a layer is on and its figures are there.
@@ -56,18 +56,19 @@ pub(super) fn update(cx: &mut Cx<'_>, source: ImprintSource) {
         key,
         revision: cx.local.revision,
         range: Range { lo: 0.0, hi: layers.range_m as f32 },
-        fingers: layers.fits.each_ref().map(colors),
+        fingers: layers.fits.as_ref().map(|fits| fits.map(colors)),
     });
 }
 
 /// Colours the contact points of one finger, if the layer is of this very cloud.
-pub(super) fn paint(cx: &Cx<'_>, source: ImprintSource, finger: Finger, item: &mut CloudItem) {
+pub(super) fn paint(cx: &Cx<'_>, source: ImprintSource, finger: PadId, item: &mut CloudItem) {
     let Some(colors) = &cx.local.layer_colors[source as usize] else { return };
     let same = cx.local.scene_clouds[source as usize].as_ref().is_some_and(|cloud| cloud.key == colors.key.0.cloud);
     if !same {
         return;
     }
-    item.colors = colors.fingers[finger.index()].clone();
+    let Some(own) = colors.fingers.get(finger) else { return };
+    item.colors = own.clone();
     item.revision = colors.revision;
     item.style.map = RESIDUAL_MAP;
     item.style.range = colors.range;

@@ -100,7 +100,7 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
     let mm = |v: Option<f32>| v.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| units::text_mm(f64::from(v)));
     let fit = layer.and_then(|(_, fit)| fit);
     let lines = [
-        ("Pixel", format!("{} ({x}, {y})", picked.finger.name())),
+        ("Pixel", format!("{} ({x}, {y})", state.finger_name(picked.finger))),
         ("Depth", mm(depth)),
         ("Imprint", mm(imprint)),
         ("Residual", mm(fit.map(|f| f.residual_m))),

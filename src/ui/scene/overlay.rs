@@ -267,7 +267,7 @@ fn legend(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
     {
         // The reasons of the points that are drawn, with their counts.
         for reason in Reason::iter().filter(|r| !matches!(r, Reason::OutsideMask | Reason::InvalidDepth)) {
-            let count = layers.counts[0][reason as usize] + layers.counts[1][reason as usize];
+            let count: usize = layers.counts.iter().flatten().map(|counts| counts[reason as usize]).sum();
             if count > 0 {
                 let [r, g, b] = reason_rgb(reason);
                 entries.push((Color32::from_rgb(r, g, b), format!("{reason}: {count}")));

@@ -92,7 +92,7 @@ fn load(dataset: &Dataset, id: PairId) -> Result<Case, Skipped> {
     let skip = |why: String| Skipped { what: entry.name.clone(), method: String::new(), why };
     let fail = |err: crate::io::dataset::LoadError| skip(format!("{err} ({})", err.hint()));
     let sample = dataset.load(id).map_err(fail)?;
-    if sample.fingers.iter().flatten().all(|t| t.gelslim.is_none() || t.bubble.is_none()) {
+    if sample.pads.iter().flatten().all(|t| t.color().is_none() || t.depth().is_none()) {
         return Err(skip("no finger has both a GelSlim image and a measured imprint".into()));
     }
     let pictures = sample.scale == Scale::Assumed;

@@ -1,6 +1,7 @@
 //! The models of an evaluation, and what each method makes of a few touches.
 
 use std::collections::BTreeMap;
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
@@ -10,10 +11,10 @@ use super::{MaskBy, Setup, WHAT};
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
-use crate::domain::postprocess::{RawPrediction, ShiftMode};
-use crate::domain::resample::bilinear;
+use crate::domain::postprocess::{Picture, RawPrediction, ShiftMode};
+use crate::domain::resample::{bilinear, bilinear_rgb};
+use crate::domain::rig::{PadId, PerPad, SensorId, SensorKind};
 use crate::domain::sample::Scale;
-use crate::domain::sensor::Finger;
 use crate::domain::upright::Turn;
 use crate::infer::bundle::Bundle;
 use crate::infer::classifier::ToolClassifier;
@@ -40,12 +41,16 @@ pub(super) struct GeneratorMethod {
     name: String,
     generator: Generator,
     config: GenerateConfig,
+    /// The sensor that it starts from.
+    input: SensorId,
 }
 
 /// What a method makes of one touch.
 pub(super) struct Made {
     /// Imprints in metres, raw orientation, by finger.
-    pub(super) imprints: [Option<DepthMap>; 2],
+    pub(super) imprints: PerPad<DepthMap>,
+    /// Differences of a color sensor, 0..255 scale, by finger.
+    pub(super) colors: PerPad<RgbGrid>,
     /// A picture in the orientation and size of its file, where that is all there is.
     pub(super) tile: Option<Grid<f32>>,
     /// Time per image, seconds.
@@ -84,6 +89,8 @@ impl Models {
         let mut names: Vec<String> = Vec::new();
         for folder in &setup.bundles {
             let (generator, name) = open(folder, |bundle| Generator::open(bundle, setup.runtime))?;
+            let ends = generator.spec().sensors().ends(&name, &dataset.rig);
+            let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
             let defaults = generator.spec().defaults;
             let config = GenerateConfig {
                 steps: setup.steps.filter(|_| defaults.steps > 1).unwrap_or(defaults.steps),
@@ -96,7 +103,7 @@ impl Models {
             let folder = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
             let name = if names.contains(&name) { format!("{name} ({folder})") } else { name };
             names.push(name.clone());
-            methods.push(Method::Generator(Box::new(GeneratorMethod { name, generator, config })));
+            methods.push(Method::Generator(Box::new(GeneratorMethod { name, generator, config, input })));
         }
         let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id), Turn::default()), Ok(Some(_)));
         if pictures && (0..LOOKED_AT).any(stored) {
@@ -136,6 +143,17 @@ impl Models {
         } else {
             "images of the right finger only; one angle per grasp, from the contact of both".to_owned()
         }];
+        for method in &self.methods {
+            if let Method::Generator(method) = method
+                && method.generator.spec().output.sensor.kind == SensorKind::Color
+            {
+                notes.push(format!(
+                    "{}: predicts a color picture; PSNR and SSIM are of the difference image on the 0..255 scale, peak \
+                     and range 255; no angle, tool or Fréchet distance, which need depth",
+                    method.name
+                ));
+            }
+        }
         if scale == Scale::Assumed {
             notes.push("pictures have no camera, pose or tool: no angle, tool or Fréchet distance".into());
             return notes;
@@ -175,43 +193,58 @@ impl Method {
 }
 
 fn measured(case: &Case) -> Made {
-    let imprint = |f: Finger| Some(case.sample.finger(f)?.bubble.as_ref()?.imprint.clone());
-    Made { imprints: Finger::BOTH.map(imprint), tile: None, seconds: None }
+    let imprint = |f: PadId| Some(case.sample.pad(f)?.depth()?.imprint.clone());
+    Made {
+        imprints: case.sample.rig.pads().map(imprint).collect(),
+        colors: PerPad::default(),
+        tile: None,
+        seconds: None,
+    }
 }
 
 fn stored(case: &Case) -> Result<Made, String> {
     let tile = case.lab.clone().ok_or("no stored prediction (NAME_vqvae.png) lies by this picture")?;
-    Ok(Made { imprints: [None, None], tile: Some(tile), seconds: None })
+    Ok(Made { imprints: PerPad::default(), colors: PerPad::default(), tile: Some(tile), seconds: None })
 }
 
 impl GeneratorMethod {
     fn make(&mut self, cases: &[Case], shift: ShiftMode, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
-        let touches: Vec<(usize, Finger, &RgbGrid)> = cases
+        let input = self.input;
+        let touches: Vec<(usize, PadId, Cow<'_, RgbGrid>)> = cases
             .iter()
             .enumerate()
             .flat_map(|(at, case)| {
-                Finger::BOTH
-                    .into_iter()
-                    .filter_map(move |f| Some((at, f, &case.sample.finger(f)?.gelslim.as_ref()?.difference)))
+                case.sample.pads.entries().filter_map(move |(f, touch)| Some((at, f, touch.picture(input)?)))
             })
             .collect();
-        let images: Vec<&RgbGrid> = touches.iter().map(|t| t.2).collect();
+        let images: Vec<&RgbGrid> = touches.iter().map(|t| &*t.2).collect();
         let start = Instant::now();
         let raws = self.generate(&images, cx)?;
         let seconds = start.elapsed().as_secs_f64() / images.len().max(1) as f64;
-        let mut made: Vec<Result<Made, String>> =
-            cases.iter().map(|_| Ok(Made { imprints: [None, None], tile: None, seconds: Some(seconds) })).collect();
+        let mut made: Vec<Result<Made, String>> = cases
+            .iter()
+            .map(|_| {
+                Ok(Made { imprints: PerPad::default(), colors: PerPad::default(), tile: None, seconds: Some(seconds) })
+            })
+            .collect();
         for ((at, finger, _), raw) in touches.into_iter().zip(raws) {
-            let depth = raw.and_then(|raw| {
-                let depth = self.generator.depth(&raw, shift).map_err(|err| err.to_string())?;
-                let bubble = cases[at].sample.finger(finger).and_then(|t| t.bubble.as_ref());
-                Ok(match bubble.map(|b| b.imprint.size()) {
-                    Some([w, h]) if depth.size() != [w, h] && w * h > 0 => bilinear(&depth, w, h),
-                    _ => depth,
-                })
-            });
-            match (depth, &mut made[at]) {
-                (Ok(depth), Ok(made)) => made.imprints[finger.index()] = Some(depth),
+            let picture = raw.and_then(|raw| self.generator.picture(&raw, shift).map_err(|err| err.to_string()));
+            let touch = cases[at].sample.pad(finger);
+            match (picture, &mut made[at]) {
+                (Ok(Picture::Depth(depth)), Ok(made)) => {
+                    let bubble = touch.and_then(|t| t.depth());
+                    made.imprints[finger] = Some(match bubble.map(|b| b.imprint.size()) {
+                        Some([w, h]) if depth.size() != [w, h] && w * h > 0 => bilinear(&depth, w, h),
+                        _ => depth,
+                    });
+                }
+                (Ok(Picture::Color(color)), Ok(made)) => {
+                    let measured = touch.and_then(|t| t.color()).map(|c| c.difference.size());
+                    made.colors[finger] = Some(match measured {
+                        Some([w, h]) if color.size() != [w, h] && w * h > 0 => bilinear_rgb(&color, w, h),
+                        _ => color,
+                    });
+                }
                 (Err(why), slot) => *slot = Err(why),
                 (Ok(_), Err(_)) => {}
             }

@@ -10,12 +10,12 @@ use super::methods::{Made, Method, Models};
 use super::{MaskBy, Setup, Skipped};
 use crate::domain::contact::{ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
-use crate::domain::grid::{DepthMap, Grid, Mask};
-use crate::domain::metrics::{SsimRange, ssim_ranges, unit_range};
-use crate::domain::pose::{FingerInput, ToolModel, estimate};
+use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use crate::domain::metrics::{LEVELS, SsimRange, planes, ssim_ranges, unit_range};
+use crate::domain::pose::{FingerInput, Fingers, ToolModel, estimate};
 use crate::domain::resample::bilinear;
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{Sample, Scale};
-use crate::domain::sensor::Finger;
 use crate::domain::sim::pattern_of;
 use crate::domain::units::angle_error;
 use crate::infer::classifier::Verdict;
@@ -83,7 +83,7 @@ impl Tool {
             let mut skip = |case: &Case, why: String| {
                 skipped.push(Skipped { what: case.name.clone(), method: method.name().to_owned(), why });
             };
-            let mut kept: Vec<(&Case, Made, [Option<Mask>; 2])> = Vec::new();
+            let mut kept: Vec<(&Case, Made, PerPad<Mask>)> = Vec::new();
             for (case, made) in cases.iter().zip(made) {
                 let made = match made {
                     Ok(made) => made,
@@ -92,17 +92,19 @@ impl Tool {
                         continue;
                     }
                 };
-                let masks = Finger::BOTH.map(|f| {
+                let masks = case.sample.rig.pads().map(|f| {
                     if self.model.is_none() || case.sample.grasp_from_object.is_none() {
                         return None;
                     }
-                    let imprint = made.imprints[f.index()].as_ref()?;
+                    let imprint = made.imprints[f].as_ref()?;
                     let found = match (setup.mask, mask.as_mut()) {
                         (MaskBy::Unet, Some(model)) => model.contact(imprint).map_err(|err| err.to_string()),
                         (MaskBy::Unet, None) => return None,
                         _ => self.mask(setup.mask, &case.sample, f, imprint),
                     };
-                    let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", f.name())));
+                    let finger = || case.sample.rig.pad_key(f);
+                    let found =
+                        found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
                     let ContactMask { mask, basis } = found.ok()?;
                     let why = match basis {
                         MaskBasis::Source => return Some(mask),
@@ -114,17 +116,24 @@ impl Tool {
                     *made_otherwise.entry((method.name().to_owned(), why)).or_insert(0) += 1;
                     Some(mask)
                 });
+                let masks = masks.collect();
                 kept.push((case, made, masks));
             }
             // Poses on all cores; the models run one by one.
             let with_masks = setup.mask != MaskBy::Unet || mask.is_some();
             let angles: Vec<Option<f64>> = kept
                 .par_iter()
-                .map(|(case, made, masks)| with_masks.then(|| self.angle(setup, &case.sample, made, masks)).flatten())
+                .map(|(case, made, masks)| {
+                    // A color picture has no depth, so there is nothing that could fail.
+                    let posed = with_masks && made.colors.is_empty();
+                    posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()
+                })
                 .collect();
             for ((case, made, _), angle_error_rad) in kept.into_iter().zip(angles) {
                 let mut images = images(case, &made, setup, upper);
-                if let Some(classifier) = classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured) {
+                if let Some(classifier) =
+                    classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured && made.colors.is_empty())
+                {
                     let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
                     match classifier.classify(&pictures) {
                         Ok(verdicts) => images.iter_mut().zip(verdicts).for_each(|(i, v)| i.verdict = Some(v)),
@@ -135,7 +144,8 @@ impl Tool {
                     pair: case.name.clone(),
                     tool: self.pattern.clone(),
                     group: case.group,
-                    scale: case.sample.scale,
+                    // Differences of a color sensor never lost their scale.
+                    scale: if made.colors.is_empty() { case.sample.scale } else { Scale::Measured },
                     images: Vec::new(),
                     angle_error_rad,
                     seconds: made.seconds,
@@ -146,26 +156,26 @@ impl Tool {
     }
 
     /// A mask that needs no model.
-    fn mask(&self, by: MaskBy, sample: &Sample, finger: Finger, imprint: &DepthMap) -> Result<ContactMask, String> {
+    fn mask(&self, by: MaskBy, sample: &Sample, finger: PadId, imprint: &DepthMap) -> Result<ContactMask, String> {
         let recipe = match by {
             MaskBy::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
             MaskBy::Threshold(m) => MaskRecipe::Threshold(m.into()),
             MaskBy::Truth | MaskBy::Unet => MaskRecipe::Truth,
         };
-        mask::mask(&recipe, imprint, sample.finger(finger), self.model.as_ref(), sample.grasp_from_object)
+        mask::mask(&recipe, imprint, sample.pad(finger), self.model.as_ref(), sample.grasp_from_object)
             .map_err(|err| err.to_string())
     }
 
     /// The error of the angle from both fingers: NaN without a pose, `None` where there can be none.
-    fn angle(&self, setup: &Setup, sample: &Sample, made: &Made, masks: &[Option<Mask>; 2]) -> Option<f64> {
+    fn angle(&self, setup: &Setup, sample: &Sample, made: &Made, masks: &PerPad<Mask>) -> Option<f64> {
         let (model, truth) = (self.model.as_ref()?, sample.grasp_from_object?);
-        let fingers = Finger::BOTH.map(|f| {
-            let camera = sample.finger(f)?.bubble.as_ref()?.camera.as_ref()?;
-            let mask = Some(masks[f.index()].as_ref()?);
-            Some(FingerInput { imprint: made.imprints[f.index()].as_ref()?, camera, mask })
+        let fingers = Fingers::new(&sample.rig, |f| {
+            let camera = sample.pad(f)?.depth()?.camera.as_ref()?;
+            let mask = Some(masks[f].as_ref()?);
+            Some(FingerInput { imprint: made.imprints[f].as_ref()?, camera, mask })
         });
-        if Finger::BOTH.iter().all(|f| {
-            let bubble = sample.finger(*f).and_then(|t| t.bubble.as_ref());
+        if sample.rig.pads().all(|f| {
+            let bubble = sample.pad(f).and_then(|t| t.depth());
             bubble.is_none_or(|b| b.camera.is_none())
         }) {
             return None;
@@ -211,12 +221,19 @@ impl Tool {
 
 /// The compared images of a grasp: in metres, or stretched to 0..1 where the scale was lost.
 fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
-    let image = |finger: Finger| {
-        let bubble = case.sample.finger(finger)?.bubble.as_ref()?;
+    let image = |finger: PadId| {
+        if let Some(color) = made.colors.get(finger) {
+            // On the scale on which the peak of the depth stands for that of the color: one pooled figure serves both.
+            let levels = |picture: &RgbGrid| planes(picture, PEAK_M / LEVELS);
+            let truth = Some(levels(&case.sample.pad(finger)?.color()?.difference));
+            let prediction = levels(color);
+            return Some(Image { finger: finger.index(), prediction, truth, noise_free: None, verdict: None });
+        }
+        let bubble = case.sample.pad(finger)?.depth()?;
         if case.sample.scale == Scale::Assumed {
             // On the picture's own pixels and in its orientation, so that stored predictions are not resampled.
             let tile = case.tile.as_ref()?;
-            let prediction = match (&made.tile, &made.imprints[finger.index()]) {
+            let prediction = match (&made.tile, &made.imprints[finger]) {
                 (Some(stored), _) => stored.clone(),
                 (None, Some(imprint)) => bilinear(&imprint.rotated_180(), tile.width(), tile.height()),
                 (None, None) => return None,
@@ -230,13 +247,13 @@ fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
                 verdict: None,
             });
         }
-        let prediction = made.imprints[finger.index()].clone()?;
+        let prediction = made.imprints[finger].clone()?;
         let truth = (!upper).then(|| bubble.imprint.clone());
         let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
         Some(Image { finger: finger.index(), prediction, truth, noise_free, verdict: None })
     };
-    let present = |f: &&Finger| case.sample.finger(**f).is_some();
-    fingers(setup.both_fingers).iter().filter(present).filter_map(|f| image(*f)).collect()
+    let present = |f: &PadId| case.sample.pad(*f).is_some();
+    fingers(&case.sample.rig, setup.both_fingers).filter(present).filter_map(image).collect()
 }
 
 /// Largest minus smallest value of some images.

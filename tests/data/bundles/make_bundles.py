@@ -57,11 +57,11 @@ class Graph:
         return {"path": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}
 
 
-def condition_encoder(path):
+def condition_encoder(path, sensor="gelslim", channels=3):
     g = Graph()
-    x = g.silu(g.conv("gelslim", 3, 6, stride=2))
+    x = g.silu(g.conv(sensor, channels, 6, stride=2))
     g.conv(x, 6, 5, stride=2, out="condition")
-    return g.save(path, [("gelslim", T.FLOAT, [3, 16, 16])], [("condition", T.FLOAT, [5, 4, 4])])
+    return g.save(path, [(sensor, T.FLOAT, [channels, 16, 16])], [("condition", T.FLOAT, [5, 4, 4])])
 
 
 def denoiser(path):
@@ -130,8 +130,8 @@ def reference():
     (HERE / "reference.json").write_text(text + "\n")
 
 
-def write(folder, manifest):
-    manifest = {"format": "touch2touch-bundle", "format_version": 1, **manifest,
+def write(folder, manifest, version=1):
+    manifest = {"format": "touch2touch-bundle", "format_version": version, **manifest,
                 "provenance": {"made_by": f"tests/data/bundles/make_bundles.py with onnx {onnx.__version__}"}}
     (HERE / folder / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
 
@@ -161,3 +161,28 @@ write("classifier", {
     "input": {"sensor": "bubble", "size": [18, 14], "range_m": [0.0, 0.01], "rotation_deg": 180},
     "output": {"classes": ["pattern_31_rod", "pattern_35", "pattern_36"], "features": 4}})
 reference()
+
+
+def between(folder, name, source, target, output):
+    """A generator of manifest version 2, which declares its sensors."""
+    d, color = HERE / folder, source["kind"] == "color"
+    write(folder, {
+        "kind": "generator", "name": name,
+        "files": {"condition_encoder": condition_encoder(d / "condition_encoder.onnx", source["key"], 3 if color else 1),
+                  "denoiser": denoiser(d / "denoiser.onnx"), "decoder": decoder(d / "decoder.onnx")},
+        "input": {"sensor": source, "size": [16, 16], "resampling": "bilinear", "rotation_deg": 0 if color else 180,
+                  **({"scale": "0..255", "mean": [0, 0, 0], "std": [20, 20, 20]} if color else
+                     {"scale": "m", "mean": [0.003], "std": [0.004]})},
+        "condition": {"shape": [5, 4, 4]}, "latent": {"shape": [4, 4, 4], "scale_factor": 0.8},
+        "schedule": {"kind": "scaled_linear", "steps": 1000, "beta_start": 0.0015, "beta_end": 0.0155},
+        "prediction": "v",
+        "output": {"sensor": target, "size": [16, 16], "channels": 3, "imprint_size": target["size"], **output},
+        "defaults": {"steps": 4, "sampler": "ddim", "spacing": "trailing", "eta": 0.0, "seed": 42}}, version=2)
+
+
+gelslim = {"key": "gelslim", "kind": "color", "size": [427, 320]}
+bubble = {"key": "bubble", "kind": "depth", "size": [175, 140]}
+digit = {"key": "digit", "kind": "color", "size": [240, 320]}
+between("bubble_to_gelslim", "Tiny generator from Soft Bubble to GelSlim", bubble, gelslim, {"range": [-120, 120]})
+between("digit_to_bubble", "Tiny generator from DIGIT to Soft Bubble", digit, bubble,
+        {"range_m": [-0.0116, 0.0225], "reduction": "mean", "rotation_deg": 180})

@@ -3,11 +3,11 @@
 use rayon::prelude::*;
 
 use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::DepthMap;
 use crate::domain::metrics::{self, AngleSummary};
-use crate::domain::pose::{Engine, FingerInput, ToolModel, estimate};
-use crate::domain::sample::{BubbleTouch, Sample};
-use crate::domain::sensor::Finger;
+use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, estimate};
+use crate::domain::rig::{PadId, lab};
+use crate::domain::sample::{DepthTouch, Sample};
 use crate::domain::sim::{self, SimConfig};
 use crate::domain::units::angle_error;
 use crate::infer::mask::MaskModel;
@@ -55,8 +55,8 @@ pub(super) fn simulate(count: usize, seed: u64, wanted: impl Fn(bool) -> bool) -
         .collect()
 }
 
-fn bubble(sample: &Sample, finger: Finger) -> anyhow::Result<&BubbleTouch> {
-    let touch = sample.finger(finger).and_then(|touch| touch.bubble.as_ref());
+fn bubble(sample: &Sample, finger: PadId) -> anyhow::Result<&DepthTouch> {
+    let touch = sample.pad(finger).and_then(|touch| touch.depth());
     touch.ok_or_else(|| anyhow::anyhow!("a simulated grasp has both bubbles"))
 }
 
@@ -74,16 +74,16 @@ impl Judge {
     pub(super) fn measured(&mut self, cases: &[Case]) -> anyhow::Result<AngleSummary> {
         let mut errors = Vec::new();
         for case in cases {
-            let imprints = [bubble(&case.sample, Finger::Right)?, bubble(&case.sample, Finger::Left)?];
+            let imprints = [bubble(&case.sample, lab::RIGHT)?, bubble(&case.sample, lab::LEFT)?];
             errors.push(self.error_rad(case, &imprints.map(|b| b.imprint.clone()))?.unwrap_or(f64::NAN));
         }
         Ok(AngleSummary::from_errors(&errors))
     }
 
-    /// Predicted imprints by [`Finger::index`], metres.
+    /// Predicted imprints by [`PadId`], metres.
     pub(super) fn score(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Score> {
         let (mut mse, mut psnr_db) = (0.0, [None, None]);
-        for finger in Finger::BOTH {
+        for finger in lab::PADS {
             let truth = bubble(&case.sample, finger)?.truth.as_ref();
             let truth = &truth.ok_or_else(|| anyhow::anyhow!("a simulated grasp knows its truth"))?.imprint;
             let imprint = &imprints[finger.index()];
@@ -95,14 +95,11 @@ impl Judge {
 
     fn error_rad(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Option<f64>> {
         let masks = [self.masks.contact(&imprints[0])?.mask, self.masks.contact(&imprints[1])?.mask];
-        let mut fingers: [Option<FingerInput<'_>>; 2] = [None, None];
-        for finger in Finger::BOTH {
-            let camera = bubble(&case.sample, finger)?.camera.as_ref();
-            let camera = camera.ok_or_else(|| anyhow::anyhow!("a simulated bubble has a camera"))?;
-            let mask: &Mask = &masks[finger.index()];
-            fingers[finger.index()] =
-                Some(FingerInput { imprint: &imprints[finger.index()], camera, mask: Some(mask) });
-        }
+        let fingers = Fingers::new(&case.sample.rig, |finger| {
+            let camera = case.sample.pad(finger)?.camera()?;
+            let (imprint, mask) = (&imprints[finger.index()], &masks[finger.index()]);
+            Some(FingerInput { imprint, camera, mask: Some(mask) })
+        });
         // Too few contact points are no pose; that is counted.
         let report = estimate(&fingers, &case.tool, Engine::default(), false).ok();
         Ok(report.map(|r| angle_error(r.grasp_from_object.theta_rad, case.truth.theta_rad)))

@@ -9,7 +9,7 @@ use super::cases::Case;
 use crate::domain::diffusion::{GaussianNoise, GenerateConfig, Progress, Tensor};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{RawPrediction, ShiftMode};
-use crate::domain::sensor::Finger;
+use crate::domain::rig::lab;
 use crate::headless::bench::figures::quantile;
 use crate::infer::bundle::{Bundle, TimestepType};
 use crate::infer::engine::{EngineChoice, EngineKind, Input};
@@ -52,10 +52,10 @@ pub(super) struct First {
 
 fn differences(case: &Case) -> anyhow::Result<[&RgbGrid; 2]> {
     let of = |finger| {
-        let touch = case.sample.finger(finger).and_then(|touch| touch.gelslim.as_ref());
+        let touch = case.sample.pad(finger).and_then(|touch| touch.color());
         touch.map(|g| &g.difference).ok_or_else(|| anyhow::anyhow!("a simulated grasp has both GelSlim images"))
     };
-    Ok([of(Finger::Right)?, of(Finger::Left)?])
+    Ok([of(lab::RIGHT)?, of(lab::LEFT)?])
 }
 
 fn ms_since(begin: Instant) -> f64 {

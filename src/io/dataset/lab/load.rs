@@ -7,15 +7,16 @@ use glam::DAffine3;
 use crate::domain::dataset::Problem;
 use crate::domain::frames::{PlanarPose, affine_from_xyz_quat};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
-use crate::domain::sample::{BubbleCamera, BubbleTouch, BubbleTruth, FingerTouch, GelSlimTouch, Sample};
-use crate::domain::sensor::{Finger, Intrinsics, bubble, gelslim};
+use crate::domain::rig::{PadId, Rig, lab};
+use crate::domain::sample::{ColorTouch, DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
+use crate::domain::sensor::Intrinsics;
 use crate::io::dataset::{InvalidPixels, LoadError, Loaded, most_invalid, plausible, problem};
 use crate::io::pt::{PtDict, PtError, read_dict};
 
 use super::mirrored::{UNIT_TOLERANCE, recover};
 
-const BUBBLE_SHAPE: [usize; 4] = [2, 1, bubble::HEIGHT, bubble::WIDTH];
-const GELSLIM_SHAPE: [usize; 4] = [2, 3, gelslim::HEIGHT, gelslim::WIDTH];
+const BUBBLE_SHAPE: [usize; 4] = [2, 1, lab::BUBBLE.height, lab::BUBBLE.width];
+const GELSLIM_SHAPE: [usize; 4] = [2, 3, lab::GELSLIM.height, lab::GELSLIM.width];
 /// A depth this close to the lens is the camera's way of saying "nothing measured".
 const NO_DEPTH_M: f32 = 1e-4;
 /// Two halves of one grasp store the same pose; this allows for 32-bit copies of it.
@@ -25,19 +26,19 @@ const SAME_POSE: f64 = 1e-5;
 pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> Result<Loaded, LoadError> {
     let mut notes = Vec::new();
     let mut invalid = [InvalidPixels::default(); 2];
-    let mut fingers = [FingerTouch::default(), FingerTouch::default()];
+    let mut fingers = [PadTouch::default(), PadTouch::default()];
     let mut poses: Vec<(&Path, [f64; 3])> = Vec::new();
     if let Some(path) = bubble_file {
         let dict = read_dict(path)?;
         for (finger, touch) in fingers.iter_mut().zip(bubble_touches(&dict, &mut notes, &mut invalid)?) {
-            finger.bubble = Some(touch);
+            finger.set(lab::BUBBLE_ID, touch);
         }
         poses.extend(pose(&dict, &mut notes)?.map(|p| (path, p)));
     }
     if let Some(path) = gelslim_file {
         let dict = read_dict(path)?;
         for (finger, touch) in fingers.iter_mut().zip(gelslim_touches(&dict, &mut notes)?) {
-            finger.gelslim = Some(touch);
+            finger.set(lab::GELSLIM_ID, touch);
         }
         // Where the bubble file has a pose, that one counts and this one is only compared.
         let mut ignored = Vec::new();
@@ -55,8 +56,8 @@ pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> R
     }
     let grasp_from_object =
         poses.first().map(|(_, [theta, x, y])| PlanarPose::object_from_grasp_of_lab(*theta, *x, *y).inverse());
-    let sample = Sample { fingers: fingers.map(Some), grasp_from_object, notes, ..Sample::default() };
-    Ok(Loaded { sample, invalid })
+    let sample = Sample { pads: fingers.map(Some).into(), grasp_from_object, notes, ..Sample::default() };
+    Ok(Loaded { sample, invalid: invalid.map(Some).into() })
 }
 
 /// A value that the sample can do without: absent is a note, wrong is an error.
@@ -100,14 +101,14 @@ fn halves<T>(values: &[T]) -> [&[T]; 2] {
 }
 
 fn depth_map(values: &[f32]) -> DepthMap {
-    Grid::from_vec(bubble::WIDTH, bubble::HEIGHT, values.to_vec()).expect("the shape was checked")
+    Grid::from_vec(lab::BUBBLE.width, lab::BUBBLE.height, values.to_vec()).expect("the shape was checked")
 }
 
 fn bubble_touches(
     dict: &PtDict,
     notes: &mut Vec<Problem>,
     invalid: &mut [InvalidPixels; 2],
-) -> Result<[BubbleTouch; 2], LoadError> {
+) -> Result<[DepthTouch; 2], LoadError> {
     let imprint = dict.f32s("bubble_imprint", &[&BUBBLE_SHAPE])?;
     let without = "points cannot be lifted to the grasp frame";
     let reference = optional(dict, dict.f32s("bubble_depth_ref", &[&BUBBLE_SHAPE]), without, notes)?;
@@ -118,38 +119,38 @@ fn bubble_touches(
     } else {
         None
     };
-    let mut touch = |finger: Finger| -> Result<BubbleTouch, LoadError> {
+    let mut touch = |finger: PadId| -> Result<DepthTouch, LoadError> {
         let index = finger.index();
         let mut map = depth_map(halves(&imprint)[index]);
         let reference = reference.as_ref().map(|r| depth_map(halves(r)[index]));
         invalid[index] = invalid_to_nan(&mut map, reference.as_ref());
         let pixels = map.len();
         most_invalid(dict.file(), invalid[index].total(), pixels, || {
-            format!("pixels of the {} imprint", finger.name())
+            format!("pixels of the {} imprint", Rig::lab().pad_key(finger))
         })?;
         let bad = reference.as_ref().map_or(0, |r| r.as_slice().iter().filter(|v| !v.is_finite()).count());
         if bad > 0 {
             let percent = 100.0 * bad as f64 / pixels as f64;
             let what = format!(
                 "key \"bubble_depth_ref\", {} finger: {bad} pixels ({percent:.2} %) are NaN or infinite",
-                finger.name()
+                Rig::lab().pad_key(finger)
             );
             notes.push(problem(dict.file(), what, "these pixels are left out of every cloud"));
         }
-        most_invalid(dict.file(), bad, pixels, || format!("pixels of the {} reference depth", finger.name()))?;
+        most_invalid(dict.file(), bad, pixels, || format!("pixels of the {} reference depth", Rig::lab().pad_key(finger)))?;
         let camera = match (reference, cameras[index]) {
             (Some(depth_reference), Some((intrinsics, grasp_from_camera))) => {
-                Some(BubbleCamera { depth_reference, intrinsics, grasp_from_camera })
+                Some(DepthCamera { depth_reference, intrinsics, crop: lab::BUBBLE.crop, grasp_from_camera })
             }
             _ => None,
         };
-        let truth = truth.as_ref().map(|(contact, clean)| BubbleTruth {
+        let truth = truth.as_ref().map(|(contact, clean)| DepthTruth {
             imprint: depth_map(halves(clean)[index]),
             contact: depth_map(halves(contact)[index]).map(|&v| v > 0.5),
         });
-        Ok(BubbleTouch { imprint: map, camera, truth })
+        Ok(DepthTouch { imprint: map, camera, truth })
     };
-    Ok([touch(Finger::Right)?, touch(Finger::Left)?])
+    Ok([touch(lab::RIGHT)?, touch(lab::LEFT)?])
 }
 
 /// Everything that is no measurement becomes NaN, and is counted.
@@ -191,12 +192,13 @@ fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Op
     notes.extend(plausible::rounded_place(dict.file(), "bubbles_tr_quat", &bubbles));
     let mut out = [None, None];
     let mut repaired: Option<(f64, &str)> = None;
-    for finger in Finger::BOTH {
+    for finger in lab::PADS {
         let i = finger.index();
         let m = halves(&k)[i];
         let intrinsics = Intrinsics { fx: m[0], fy: m[4], cx: m[2], cy: m[5] };
         if !intrinsics.is_plausible() {
-            let what = format!("key \"K\", {} finger: {intrinsics:?} is no camera: {without}", finger.name());
+            let what =
+                format!("key \"K\", {} finger: {intrinsics:?} is no camera: {without}", Rig::lab().pad_key(finger));
             notes.push(problem(dict.file(), what, "expected 3 x 3 pinhole matrices in pixels of the 224 x 171 image"));
             continue;
         }
@@ -239,13 +241,13 @@ fn not_unit(dict: &PtDict, key: &str, length: f64, how: &str) -> Problem {
     problem(dict.file(), what, "expected x y z qx qy qz qw of a rotation; check how the frames were converted")
 }
 
-fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[GelSlimTouch; 2], LoadError> {
+fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[ColorTouch; 2], LoadError> {
     let mut raw = dict.f32s("gelslim", &[&GELSLIM_SHAPE])?;
     let mut reference = dict.f32s("gelslim_ref", &[&GELSLIM_SHAPE])?;
     let half = raw.len() / 2;
     let mut bad = 0usize;
     let fingers = raw.chunks_exact_mut(half).zip(reference.chunks_exact_mut(half));
-    for ((raw, reference), finger) in fingers.zip(Finger::BOTH) {
+    for ((raw, reference), finger) in fingers.zip(lab::PADS) {
         let before = bad;
         for (a, b) in raw.iter_mut().zip(reference) {
             if !(a.is_finite() && b.is_finite()) {
@@ -253,7 +255,7 @@ fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[GelSlimTo
                 (*a, *b) = (0.0, 0.0);
             }
         }
-        most_invalid(dict.file(), bad - before, half, || format!("values of the {} GelSlim image", finger.name()))?;
+        most_invalid(dict.file(), bad - before, half, || format!("values of the {} GelSlim image", Rig::lab().pad_key(finger)))?;
     }
     if bad > 0 {
         let percent = 100.0 * bad as f64 / raw.len() as f64;
@@ -261,14 +263,14 @@ fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[GelSlimTo
         notes.push(problem(dict.file(), what, "these values count as no difference"));
     }
     let picture = |values: &[f32]| -> RgbGrid {
-        let plane = gelslim::WIDTH * gelslim::HEIGHT;
-        Grid::from_fn(gelslim::WIDTH, gelslim::HEIGHT, |x, y| {
-            let at = y * gelslim::WIDTH + x;
+        let plane = lab::GELSLIM.width * lab::GELSLIM.height;
+        Grid::from_fn(lab::GELSLIM.width, lab::GELSLIM.height, |x, y| {
+            let at = y * lab::GELSLIM.width + x;
             [values[at], values[plane + at], values[2 * plane + at]]
         })
     };
     let touch = |i: usize| {
-        GelSlimTouch::from_images(picture(halves(&raw)[i]), picture(halves(&reference)[i]))
+        ColorTouch::from_images(picture(halves(&raw)[i]), picture(halves(&reference)[i]))
             .expect("both have the checked shape")
     };
     Ok([touch(0), touch(1)])

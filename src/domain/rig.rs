@@ -1,0 +1,295 @@
+//! [`Rig`]: which sensors sit on which pads of the gripper, and where one sensor's view lies in the other's.
+//!
+//! Sensors are data: loader, simulator, generator, metrics and panes read sizes, scales and windows from the rig of the
+//! data set. The lab's GelSlim and Soft Bubble are one value of it, [`Rig::lab`].
+
+pub mod lab;
+mod per_pad;
+
+use std::borrow::Cow;
+use std::sync::{Arc, LazyLock};
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+use super::grid::{Grid, Mask};
+use super::sensor::Intrinsics;
+pub use per_pad::{PadId, PerPad};
+
+/// Names and keys: fixed for the lab's rig, owned for one that was read from a file.
+pub type Text = Cow<'static, str>;
+
+/// The sensors of a gripper.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rig {
+    /// The name for people.
+    pub name: Text,
+    /// What each pad carries, indexed by [`SensorId`]. The first one's pictures count as upright.
+    pub sensors: Vec<Sensor>,
+    /// The pads (fingers), indexed by [`PadId`].
+    pub pads: Vec<Pad>,
+    /// Where one sensor's view lies in another's.
+    #[serde(default)]
+    pub windows: Vec<Window>,
+}
+
+/// The position of a sensor in [`Rig::sensors`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct SensorId(pub u8);
+
+/// What a sensor's picture holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, strum::IntoStaticStr)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum SensorKind {
+    /// A camera behind a gel: red, green and blue.
+    Color,
+    /// A depth camera behind a membrane: metres.
+    Depth,
+}
+
+/// One kind of sensor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensor {
+    /// The name in manifests and file names, such as `gelslim`.
+    pub key: Text,
+    /// The name for people.
+    pub name: Text,
+    /// What its picture holds.
+    pub kind: SensorKind,
+    /// Columns of the stored picture.
+    pub width: usize,
+    /// Rows of the stored picture.
+    pub height: usize,
+    /// Scale on the touched surface, pixels per metre.
+    pub px_per_m: f64,
+    /// Which part of the camera's picture is stored; without it all of it is.
+    #[serde(default)]
+    pub crop: Crop,
+    /// Turn that lays the stored picture as the first sensor's lies: 0 or 180 degrees.
+    #[serde(default)]
+    pub rotation_deg: u32,
+}
+
+/// Where the stored picture lies in the camera's full one, which the intrinsics belong to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Crop {
+    /// Columns and rows of the full picture; zero where only the stored one is known.
+    pub full: [usize; 2],
+    /// Column and row of the full picture at which the stored one starts.
+    pub offset: [usize; 2],
+}
+
+/// One pad (finger) of the gripper.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pad {
+    /// The name in files, such as `right`.
+    pub key: Text,
+    /// The name on screen.
+    pub name: Text,
+}
+
+/// The area of a pad that one sensor sees, as an upright rectangle in the stored pixels of another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Window {
+    /// The pad.
+    pub pad: PadId,
+    /// The sensor that sees the area.
+    pub of: SensorId,
+    /// The sensor in whose pixels it is given.
+    pub within: SensorId,
+    /// Its center, pixels from the center of the first one.
+    pub center_px: [f64; 2],
+    /// Its width and height, pixels.
+    pub size_px: [f64; 2],
+}
+
+impl Crop {
+    /// Lifts stored pixel `(u, v)` at depth `z` (metres) to a point in the camera frame, metres.
+    ///
+    /// Source: the lab's `ICP_dataset_cal.py` lines 426-433: the crop offset is added before the pinhole model.
+    pub fn lift(&self, intrinsics: &Intrinsics, u: f64, v: f64, z: f64) -> DVec3 {
+        intrinsics.lift(u + self.offset[0] as f64, v + self.offset[1] as f64, z)
+    }
+
+    /// Projects a point in the camera frame to stored pixel coordinates `(u, v)`; `None` behind the camera.
+    pub fn project(&self, intrinsics: &Intrinsics, p_in_camera: DVec3) -> Option<(f64, f64)> {
+        let (u, v) = intrinsics.project(p_in_camera)?;
+        Some((u - self.offset[0] as f64, v - self.offset[1] as f64))
+    }
+}
+
+impl Sensor {
+    /// Columns and rows of the stored picture.
+    pub fn size(&self) -> [usize; 2] {
+        [self.width, self.height]
+    }
+}
+
+impl Window {
+    /// `[center x, center y, width, height]`.
+    pub fn rectangle(&self) -> [f64; 4] {
+        let ([x, y], [width, height]) = (self.center_px, self.size_px);
+        [x, y, width, height]
+    }
+}
+
+impl Rig {
+    /// The lab's gripper: a GelSlim and a Soft Bubble for each of two fingers.
+    pub fn lab() -> Arc<Self> {
+        static LAB: LazyLock<Arc<Rig>> = LazyLock::new(|| Arc::new(lab::rig()));
+        LAB.clone()
+    }
+
+    /// A rig declared in JSON.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn parse(json: &[u8]) -> Result<Self, String> {
+        let rig: Self = serde_json::from_slice(json).map_err(|err| err.to_string())?;
+        let twice = |keys: Vec<&Text>| (1..keys.len()).any(|at| keys[..at].contains(&keys[at]));
+        let plain = |key: &Text| !key.is_empty() && key.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit());
+        let sensors: Vec<&Text> = rig.sensors.iter().map(|sensor| &sensor.key).collect();
+        let pads: Vec<&Text> = rig.pads.iter().map(|pad| &pad.key).collect();
+        if sensors.is_empty() || pads.is_empty() || sensors.len() > 100 || pads.len() > 100 {
+            return Err("it needs 1 to 100 sensors and 1 to 100 pads".into());
+        }
+        if !sensors.iter().chain(&pads).all(|key| plain(key)) || twice(sensors) || twice(pads) {
+            return Err("each key must be its own, of small letters and digits".into());
+        }
+        let fine = |s: &Sensor| {
+            s.size().iter().all(|n| (1..=4096).contains(n))
+                && s.px_per_m > 0.0
+                && s.px_per_m.is_finite()
+                && matches!(s.rotation_deg, 0 | 180)
+        };
+        if let Some(sensor) = rig.sensors.iter().find(|sensor| !fine(sensor)) {
+            return Err(format!(
+                "sensor {}: width and height must be 1 to 4096, px_per_m positive, rotation_deg 0 or 180",
+                sensor.key
+            ));
+        }
+        let known =
+            |w: &Window| w.pad.index() < rig.pads.len() && [w.of, w.within].iter().all(|id| rig.sensor(*id).is_some());
+        if !rig.windows.iter().all(known) {
+            return Err("a window names a pad or a sensor that is not there; they count from 0".into());
+        }
+        Ok(rig)
+    }
+
+    /// The pads in order.
+    pub fn pads(&self) -> impl ExactSizeIterator<Item = PadId> + DoubleEndedIterator + Clone + use<> {
+        (0..self.pads.len()).map(PadId::new)
+    }
+
+    /// The pads in order, as a list.
+    pub fn pad_list(&self) -> Vec<PadId> {
+        self.pads().collect()
+    }
+
+    /// The pad's name in files, such as `right`; its number where the rig has no such pad.
+    pub fn pad_key(&self, pad: PadId) -> Text {
+        self.pads.get(pad.index()).map_or_else(|| Cow::Owned(pad.index().to_string()), |pad| pad.key.clone())
+    }
+
+    /// The pad's name on screen.
+    pub fn pad_name(&self, pad: PadId) -> &str {
+        self.pads.get(pad.index()).map_or("?", |pad| &pad.name)
+    }
+
+    /// The pad of a name in files.
+    pub fn pad_of_key(&self, key: &str) -> Option<PadId> {
+        self.pads().find(|pad| self.pads[pad.index()].key == key)
+    }
+
+    /// The sensor at a position.
+    pub fn sensor(&self, id: SensorId) -> Option<&Sensor> {
+        self.sensors.get(usize::from(id.0))
+    }
+
+    /// The position of the sensor with this key.
+    pub fn sensor_of_key(&self, key: &str) -> Option<SensorId> {
+        self.sensors.iter().position(|sensor| sensor.key == key).map(|at| SensorId(at as u8))
+    }
+
+    /// The first sensor of a kind.
+    pub fn first(&self, kind: SensorKind) -> Option<SensorId> {
+        self.sensors.iter().position(|sensor| sensor.kind == kind).map(|at| SensorId(at as u8))
+    }
+
+    /// The first color sensor.
+    pub fn color(&self) -> Option<&Sensor> {
+        self.sensor(self.first(SensorKind::Color)?)
+    }
+
+    /// The first depth sensor.
+    pub fn depth(&self) -> Option<&Sensor> {
+        self.sensor(self.first(SensorKind::Depth)?)
+    }
+
+    /// Where `of` looks in the picture of `within`, if the rig says.
+    pub fn window(&self, pad: PadId, of: SensorId, within: SensorId) -> Option<&Window> {
+        self.windows.iter().find(|w| (w.pad, w.of, w.within) == (pad, of, within))
+    }
+
+    /// Where the first color sensor looks in the picture of the first depth sensor.
+    pub fn color_window(&self, pad: PadId) -> Option<&Window> {
+        self.window(pad, self.first(SensorKind::Color)?, self.first(SensorKind::Depth)?)
+    }
+
+    /// Whether the pictures of the first color and the first depth sensor lie turned by 180 degrees to each other.
+    pub fn turned(&self) -> bool {
+        let turn = |sensor: Option<&Sensor>| sensor.map(|sensor| sensor.rotation_deg);
+        turn(self.color()).zip(turn(self.depth())).is_some_and(|(color, depth)| color != depth)
+    }
+
+    /// Which pixels of a depth picture of `size` (`[width, height]`, raw orientation; other sizes than the sensor's stand
+    /// for the same area) the pad's color sensor sees; `None` where the rig does not say.
+    pub fn seen_mask(&self, pad: PadId, size: [usize; 2]) -> Option<Mask> {
+        let sensor = self.depth()?;
+        let [cx, cy, width, height] = self.color_window(pad)?.rectangle();
+        let full = |at: usize, from: usize, to: usize| (at as f64 + 0.5) * to as f64 / from.max(1) as f64 - 0.5;
+        Some(Grid::from_fn(size[0], size[1], |x, y| {
+            let (x, y) = (full(x, size[0], sensor.width), full(y, size[1], sensor.height));
+            (x - cx).abs() <= width / 2.0 && (y - cy).abs() <= height / 2.0
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pixel_survives_depth_to_cloud_to_pixel() {
+        let k = Intrinsics { fx: 212.0, fy: 211.0, cx: 112.3, cy: 86.1 };
+        let crop = lab::BUBBLE.crop;
+        for v in 0..lab::BUBBLE.height {
+            for u in 0..lab::BUBBLE.width {
+                let z = 0.07 + 1e-4 * ((u * 7 + v * 13) % 200) as f64;
+                let (u2, v2) = crop.project(&k, crop.lift(&k, u as f64, v as f64, z)).unwrap();
+                assert!((u2 - u as f64).abs() < 1e-9 && (v2 - v as f64).abs() < 1e-9);
+            }
+        }
+        assert_eq!(crop.project(&k, DVec3::new(0.0, 0.0, 0.0)), None);
+        assert_eq!(crop.project(&k, DVec3::new(0.0, 0.0, f64::NAN)), None);
+    }
+
+    #[test]
+    fn the_labs_rig_is_written_and_read() {
+        let rig = Rig::lab();
+        let text = serde_json::to_string(&*rig).unwrap();
+        assert_eq!(serde_json::from_str::<Rig>(&text).unwrap(), *rig);
+        assert_eq!(rig.pads().map(|pad| rig.pad_key(pad)).collect::<Vec<_>>(), ["right", "left"]);
+        assert_eq!(rig.pad_of_key("left"), Some(lab::LEFT));
+        assert_eq!((rig.sensor_of_key("bubble"), rig.sensor_of_key("digit")), (Some(lab::BUBBLE_ID), None));
+        assert_eq!(rig.window(lab::LEFT, lab::BUBBLE_ID, lab::GELSLIM_ID), None);
+        assert_eq!(rig.color_window(PadId::new(7)), None);
+        assert_eq!((rig.pad_name(PadId::new(7)), &*rig.pad_key(PadId::new(7))), ("?", "7"));
+    }
+}

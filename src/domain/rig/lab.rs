@@ -1,0 +1,59 @@
+//! The lab's rig: a GelSlim and a Soft Bubble on the right and on the left finger.
+//!
+//! Source of the numbers: the Touch2Touch paper (px/mm), the lab's `point_cloud_utils.py` lines 5-10 (crop), the lab's
+//! CTTP repository, `utils/dataset_management.py` lines 11-50 (windows).
+
+use std::borrow::Cow;
+
+use super::{Crop, Pad, PadId, Rig, Sensor, SensorId, SensorKind, Window};
+
+/// The right finger: index 0 in the lab's files.
+pub const RIGHT: PadId = PadId::new(0);
+/// The left finger: index 1 in the lab's files.
+pub const LEFT: PadId = PadId::new(1);
+/// Both fingers in the order of the lab's files.
+pub const PADS: [PadId; 2] = [RIGHT, LEFT];
+/// The GelSlim's place in the rig.
+pub const GELSLIM_ID: SensorId = SensorId(0);
+/// The Soft Bubble's place in the rig.
+pub const BUBBLE_ID: SensorId = SensorId(1);
+
+/// The GelSlim: a color camera behind a gel.
+pub static GELSLIM: Sensor = Sensor {
+    key: Cow::Borrowed("gelslim"),
+    name: Cow::Borrowed("GelSlim"),
+    kind: SensorKind::Color,
+    width: 427,
+    height: 320,
+    px_per_m: 23_720.0,
+    crop: Crop { full: [427, 320], offset: [0, 0] },
+    rotation_deg: 0,
+};
+
+/// The Soft Bubble: a depth camera behind an air-filled membrane.
+pub static BUBBLE: Sensor = Sensor {
+    key: Cow::Borrowed("bubble"),
+    name: Cow::Borrowed("Soft Bubble"),
+    kind: SensorKind::Depth,
+    width: 175,
+    height: 140,
+    px_per_m: 2360.0,
+    crop: Crop { full: [224, 171], offset: [25, 20] },
+    rotation_deg: 180,
+};
+
+/// Centers of what the GelSlims see, in raw bubble pixels: right, left.
+const WINDOW_CENTERS_PX: [[f64; 2]; 2] = [[73.3, 67.0], [62.6, 70.3]];
+
+/// The whole rig; the windows are as large as the GelSlim's view (18.0 x 13.5 mm) at the bubble's scale.
+pub(super) fn rig() -> Rig {
+    let pad = |key, name| Pad { key: Cow::Borrowed(key), name: Cow::Borrowed(name) };
+    let size_px = GELSLIM.size().map(|side| side as f64 / GELSLIM.px_per_m * BUBBLE.px_per_m);
+    let window = |pad, center_px| Window { pad, of: GELSLIM_ID, within: BUBBLE_ID, center_px, size_px };
+    Rig {
+        name: Cow::Borrowed("GelSlim and Soft Bubble"),
+        sensors: vec![GELSLIM.clone(), BUBBLE.clone()],
+        pads: vec![pad("right", "Right"), pad("left", "Left")],
+        windows: vec![window(RIGHT, WINDOW_CENTERS_PX[0]), window(LEFT, WINDOW_CENTERS_PX[1])],
+    }
+}

@@ -1,0 +1,207 @@
+//! Sensors are data: the reverse direction, from Soft Bubble to GelSlim, and a gripper that this program never saw.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command as Process, Output};
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::keys::{ImprintSource, ShiftMode};
+use touch2touch::app::library::{BundleKind, Place};
+use touch2touch::app::runtime::Runtime;
+use touch2touch::app::services::Services as _;
+use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::settings::Settings;
+use touch2touch::app::state::{Absent, Lookup, State};
+use touch2touch::app::tasks::Level;
+use touch2touch::domain::grid::{Grid, RgbGrid};
+use touch2touch::domain::postprocess::Picture;
+use touch2touch::domain::rig::{PadId, Rig, SensorKind, lab};
+use touch2touch::infer::bundle::{Bundle, Ends};
+use touch2touch::infer::engine::EngineChoice;
+use touch2touch::infer::generator::Generator;
+use touch2touch::io::dataset::{Dataset, RIG_JSON};
+use touch2touch::io::images;
+
+fn bundle(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name)
+}
+
+fn run(args: &[&str], home: &Path) -> Output {
+    Process::new(env!("CARGO_BIN_EXE_touch2touch"))
+        .args(args)
+        .env("TOUCH2TOUCH_DATA", home)
+        .env("XDG_DATA_HOME", home)
+        .env("XDG_CONFIG_HOME", home)
+        .env("TOUCH2TOUCH_CACHE", home)
+        .output()
+        .unwrap()
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn report(output: &Output) -> Value {
+    assert!(output.status.success(), "{}", text(output));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The studio on a place, with the bundles of a folder beside the shipped ones; waits until `done`.
+fn studio(place: Place, named: &str, home: &Path, mut done: impl FnMut(&State) -> bool) -> State {
+    let services = LiveServices::with_config_folder(Some(home.to_owned()));
+    let mut settings = Settings { bundle_folders: vec![bundle("")], ..Settings::default() };
+    settings.generate.bundle = Some(named.to_owned());
+    services.save_settings(&settings).unwrap();
+    let mut runtime = Runtime::threads(Arc::new(services), Arc::new(|| {}));
+    let mut state = State::default();
+    runtime.start(&mut state, Some(place));
+    let panes = [Pane::Predicted, Pane::Measured, Pane::GelDifference, Pane::Error, Pane::Metrics];
+    runtime.tick(&mut state, vec![Command::ShowPanes(panes.into_iter().collect())]);
+    let begin = std::time::Instant::now();
+    let mut asked = false;
+    while !done(&state) {
+        assert!(begin.elapsed().as_secs() < 120, "{:?}", state.log.entries);
+        let ready = !asked && state.sample().ready().is_some() && !state.library.bundles.is_empty();
+        asked |= ready;
+        runtime.tick(&mut state, if ready { vec![Command::Generate] } else { Vec::new() });
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    state
+}
+
+#[test]
+fn the_reverse_direction_goes_through_every_verb() {
+    let dir = tempfile::tempdir().unwrap();
+    let (home, set, out) = (dir.path().join("home"), dir.path().join("set"), dir.path().join("out"));
+    let reverse = bundle("bubble_to_gelslim");
+    let [set, out, reverse] = [&set, &out, &reverse].map(|p| p.to_str().unwrap());
+    assert!(run(&["bundle", "check", reverse], &home).status.success());
+    let made = run(&["simulate", "--out", set, "--tools", "pattern_36", "--grasps", "1", "--seed", "3"], &home);
+    assert!(made.status.success(), "{}", text(&made));
+
+    let generate = ["generate", "--input", set, "--out", out, "--finger", "both", "--runtime", "rten", "--json"];
+    let found = report(&run(&[&generate[..], &["--bundle", reverse]].concat(), &home));
+    let pairs = found["pairs"].as_array().unwrap();
+    assert_eq!(pairs.len(), 2, "both fingers");
+    for pair in pairs {
+        assert!(pair["psnr_db"].as_f64().unwrap() > 0.0 && pair["ssim"].is_number(), "{pair}");
+        assert!(
+            pair["seen"].is_null() && pair["invented"].is_null(),
+            "there is no footprint in a color picture: {pair}"
+        );
+    }
+    assert!(found["convention"].as_str().unwrap().contains("left out"), "{}", found["convention"]);
+    let pictures: Vec<PathBuf> = std::fs::read_dir(out).unwrap().map(|f| f.unwrap().path()).collect();
+    let picture = pictures.iter().find(|f| f.to_string_lossy().ends_with("_left.png")).unwrap();
+    assert_eq!(images::read_rgb(picture).unwrap().size(), lab::GELSLIM.size());
+
+    // What needs depth says so.
+    let pose = run(&["pose", set, "--imprint", "predicted", "--bundle", reverse, "--runtime", "rten"], &home);
+    assert!(!pose.status.success() && text(&pose).contains("predicts a color picture"), "{}", text(&pose));
+    let args = ["evaluate", "--input", set, "--bundle", reverse, "--resamples", "0", "--runtime", "rten", "--json"];
+    let table = report(&run(&[&args[..], &["--mask", "truth"]].concat(), &home));
+    let row = &table["rows"][1]["groups"][0];
+    assert!(row["psnr_db"]["value"].as_f64().unwrap() > 0.0 && row["ssim"]["value"].is_number(), "{row}");
+    assert!(row["angle_deg"].is_null() && row["frechet"].is_null() && row["tool_accuracy"].is_null(), "{row}");
+    let notes = table["notes"].to_string();
+    assert!(notes.contains("no angle, tool or Fréchet distance, which need depth"), "{notes}");
+    assert!(table["rows"][0]["groups"][0]["angle_deg"].is_object(), "the measured imprints have depth");
+}
+
+#[test]
+fn the_studio_shows_a_predicted_color_picture() {
+    let home = tempfile::tempdir().unwrap();
+    let name = "Tiny generator from Soft Bubble to GelSlim";
+    let shown = |state: &State| state.predicted_color(lab::RIGHT).is_some_and(|lookup| lookup.ready().is_some());
+    let state = studio(Place::Demo, name, home.path(), shown);
+    let picture = state.predicted_color(lab::RIGHT).unwrap().ready().unwrap();
+    assert_eq!(picture.size(), lab::GELSLIM.size());
+    // The same as the generator itself makes of the imprint.
+    let mut generator =
+        Generator::open(&Bundle::open(&bundle("bubble_to_gelslim")).unwrap(), EngineChoice::Auto).unwrap();
+    let condition = state.touch(lab::RIGHT).ready().unwrap().picture(lab::BUBBLE_ID).unwrap();
+    let config = state.chosen(lab::RIGHT).unwrap().config();
+    let raw = generator.generate(&condition, &config, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
+    assert_eq!(generator.picture(&raw, ShiftMode::default()), Ok(Picture::Color(picture.clone())));
+    for absent in [
+        state.imprint(ImprintSource::Predicted, lab::RIGHT).without::<()>(),
+        state.comparison(lab::RIGHT).without(),
+        state.ledger(lab::RIGHT).without(),
+    ] {
+        assert!(matches!(absent, Lookup::Absent(Absent::PredictsColor)), "{absent:?}");
+    }
+    assert_eq!(state.log.entries.iter().filter(|e| e.level == Level::Error).count(), 0, "{:?}", state.log.entries);
+}
+
+/// A gripper of one finger with one DIGIT, and a touch taken with it.
+fn digit_folder(dir: &Path) -> Rig {
+    let rig = json!({
+        "name": "One DIGIT",
+        "sensors": [{ "key": "digit", "name": "DIGIT", "kind": "color", "width": 240, "height": 320, "px_per_m": 16_000.0 }],
+        "pads": [{ "key": "thumb", "name": "Thumb" }],
+    });
+    std::fs::write(dir.join(RIG_JSON), rig.to_string()).unwrap();
+    let picture = |touched: bool| {
+        RgbGrid::from_fn(240, 320, |x, y| {
+            let bar = if touched && (100..140).contains(&x) { 60.0 } else { 0.0 };
+            [90.0 + bar, 100.0 + (y % 20) as f32, 120.0 - bar]
+        })
+    };
+    images::write_rgb8(&dir.join("reference.png"), &picture(false)).unwrap();
+    images::write_rgb8(&dir.join("a_touch.png"), &picture(true)).unwrap();
+    Rig::parse(rig.to_string().as_bytes()).unwrap()
+}
+
+#[test]
+fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let (home, set, out) = (dir.path().join("home"), dir.path().join("set"), dir.path().join("out"));
+    std::fs::create_dir(&set).unwrap();
+    let rig = digit_folder(&set);
+    let dataset = Dataset::open(&set).unwrap();
+    assert_eq!((&*dataset.rig, dataset.problems.len()), (&rig, 0), "{:?}", dataset.problems);
+    let sample = dataset.load(touch2touch::domain::dataset::PairId(0)).unwrap();
+    let thumb = PadId::default();
+    assert_eq!(sample.pads.entries().map(|(pad, _)| pad).collect::<Vec<_>>(), [thumb]);
+    let touch = sample.pad(thumb).unwrap();
+    assert_eq!(touch.color().unwrap().difference[(120, 7)], [60.0, 0.0, -60.0]);
+    assert!(touch.depth().is_none() && rig.first(SensorKind::Depth).is_none());
+    let tiny = Bundle::open(&bundle("digit_to_bubble")).unwrap();
+    assert_eq!(tiny.ends(&rig).unwrap(), Ok(Ends { input: rig.sensor_of_key("digit").unwrap(), output: None }));
+
+    let [set, out, tiny] = [&set, &out, &bundle("digit_to_bubble")].map(|p| p.to_str().unwrap().to_owned());
+    let generate = ["generate", "--input", &set, "--out", &out, "--runtime", "rten", "--json", "--bundle"];
+    let found = report(&run(&[&generate[..], &[&tiny]].concat(), &home));
+    assert_eq!(found["pairs"][0]["finger"], "thumb");
+    let depth: Grid<u16> = images::read_grey16(&Path::new(&out).join("a_thumb.png")).unwrap();
+    assert_eq!(depth.size(), [175, 140]);
+    // A bundle for other sensors says so, and what would fit; without a name the fitting one is looked for.
+    let lab = bundle("generator");
+    let refused = run(&[&generate[..], &[lab.to_str().unwrap()]].concat(), &home);
+    for part in ["from gelslim (color, 427 x 320)", "sensors of this data are digit (color, 240 x 320)", "names digit"]
+    {
+        assert!(text(&refused).contains(part), "{part}: {}", text(&refused));
+    }
+    // The studio takes the one bundle that fits, though another is named, and shows the prediction.
+    let name = "Tiny generator of the tests";
+    let shown = |state: &State| state.imprint(ImprintSource::Predicted, thumb).ready().is_some();
+    let state = studio(Place::Path(PathBuf::from(&set)), name, &home, shown);
+    assert_eq!(state.bundle(BundleKind::Generator).unwrap().name, "Tiny generator from DIGIT to Soft Bubble");
+    let misfits = state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator && !b.fits(&state.rig()));
+    assert!(misfits.count() >= 2, "those of the lab's sensors");
+    assert_eq!((state.finger_name(thumb).as_ref(), state.fingers()), ("thumb", vec![thumb]));
+    assert_eq!(state.imprint(ImprintSource::Predicted, thumb).ready().unwrap().size(), [175, 140]);
+}
+
+#[test]
+fn a_rig_that_makes_no_sense_is_a_problem_of_the_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    digit_folder(dir.path());
+    for bad in ["{", "{}", r#"{"name": "x", "sensors": [], "pads": []}"#] {
+        std::fs::write(dir.path().join(RIG_JSON), bad).unwrap();
+        let dataset = Dataset::open(dir.path()).unwrap();
+        assert!(dataset.problems.iter().any(|p| p.file.ends_with(RIG_JSON)), "{bad}: {:?}", dataset.problems);
+        assert_eq!(*dataset.rig, *Rig::lab());
+    }
+}
