@@ -2,9 +2,6 @@
 
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-use strum::EnumIter;
-
 pub use crate::domain::bits::Bits;
 pub use crate::domain::diffusion::{Preset, Sampler, Spacing};
 pub use crate::domain::postprocess::ShiftMode;

@@ -150,7 +150,7 @@ fn read_pt(_: &Path, file: &Path) -> Outcome {
 /// A pair of whatever dataset `dir` is.
 fn read_pair(dir: &Path, file: &Path) -> Outcome {
     let dataset = Dataset::open(dir).map_err(|err| format!("{err}: {}", file.display()))?;
-    let loaded = dataset.load_with_notes(PairId(0)).map_err(said)?;
+    let loaded = dataset.load_with_counts(PairId(0)).map_err(said)?;
     dataset.bubble_tile(PairId(0), loaded.sample.laid).map_err(said)?;
     dataset.gelslim_is_clipped(PairId(0)).map_err(said)?;
     Ok(())
@@ -231,7 +231,7 @@ fn read_unit(dir: &Path, file: &Path) -> Outcome {
 }
 
 fn read_picture(_: &Path, file: &Path) -> Outcome {
-    drop((images::read_grey8(file), images::read_grey16(file)));
+    drop(images::read_grey8(file));
     images::read_grey(file).map_err(said)?;
     images::read_rgb(file).map(drop).map_err(said)
 }
