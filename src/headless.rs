@@ -19,6 +19,7 @@ mod predict;
 mod seeds;
 mod simulate;
 mod stats;
+mod version;
 mod watch;
 
 use std::path::PathBuf;
@@ -34,7 +35,7 @@ use crate::io::dataset::ToolScale;
 ///
 /// Without a verb the studio opens, on PATH or on the built-in demo.
 #[derive(Debug, Parser)]
-#[command(name = "touch2touch", version, args_conflicts_with_subcommands = true)]
+#[command(name = "touch2touch", args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     verb: Option<Verb>,
@@ -43,6 +44,12 @@ struct Cli {
     /// Start the studio with its default layout and settings.
     #[arg(long)]
     reset_ui: bool,
+    /// Print the version.
+    #[arg(short = 'V', exclusive = true)]
+    short_version: bool,
+    /// Print the version, the commit, the model engines and the graphics device.
+    #[arg(long, exclusive = true)]
+    version: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -105,6 +112,7 @@ pub fn main() -> ExitCode {
     output::start_log();
     let cli = Cli::parse();
     let result = match cli.verb {
+        None if cli.short_version || cli.version => version::run(cli.version),
         None => studio(cli.path, cli.reset_ui),
         Some(Verb::Simulate(args)) => simulate::run(&args),
         Some(Verb::Generate(args)) => generate::run(&args),

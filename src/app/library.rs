@@ -14,6 +14,7 @@ use super::keys::{DatasetSeq, PairKey};
 use super::services::DataSource;
 use crate::domain::dataset::{Index, PairEntry, PairId};
 use crate::domain::diffusion::GenerateConfig;
+use crate::infer::bundle::Origin;
 
 /// What can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -101,8 +102,8 @@ pub struct BundleInfo {
     pub name: String,
     /// What it does.
     pub kind: BundleKind,
-    /// Its folder.
-    pub folder: PathBuf,
+    /// Where it lies.
+    pub origin: Origin,
     /// What can be chosen, if it is a generator.
     pub generator: Option<GeneratorInfo>,
 }

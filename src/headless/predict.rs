@@ -13,7 +13,7 @@ use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::postprocess::{RawPrediction, RefitShift, ShiftMode};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
-use crate::infer::bundle::{Bundle, default_roots, find};
+use crate::infer::bundle::{Bundle, find_all};
 use crate::infer::engine::EngineChoice;
 use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
@@ -150,7 +150,7 @@ pub(super) fn find_bundle(named: Option<&PathBuf>, kind: &str, fits: fn(&Bundle)
     if let Some(dir) = named {
         return Ok(Bundle::open(dir)?);
     }
-    let found = find(&default_roots());
+    let found = find_all(&[]);
     found.bundles.into_iter().find(fits).ok_or_else(|| {
         let refused: Vec<String> =
             found.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();

@@ -25,6 +25,7 @@ use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPredi
 use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
 use touch2touch::domain::sim;
+use touch2touch::infer::bundle::Origin;
 
 /// `[width, height]` of the imprints of [`Source`].
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];
@@ -235,7 +236,7 @@ impl Services for Double {
             id: id.into(),
             name: id.into(),
             kind,
-            folder: PathBuf::from(id),
+            origin: Origin::Folder(id.into()),
             generator: (kind == BundleKind::Generator).then(|| GeneratorInfo {
                 defaults: GenerateConfig { steps: 20, ..GenerateConfig::default() },
                 training_steps: 1000,

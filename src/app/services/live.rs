@@ -312,9 +312,7 @@ impl Services for LiveServices {
     }
 
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
-        let mut roots = bundle::default_roots();
-        roots.extend_from_slice(folders);
-        let found = bundle::find(&roots);
+        let found = bundle::find_all(folders);
         let problems = found
             .problems
             .into_iter()
@@ -451,7 +449,7 @@ pub fn info(bundle: &Bundle) -> BundleInfo {
             BundleSpec::MaskUnet(_) => BundleKind::Mask,
             BundleSpec::ToolClassifier(_) => BundleKind::Classifier,
         },
-        folder: bundle.dir().to_owned(),
+        origin: bundle.origin().clone(),
         generator: bundle.generator().map(|spec| GeneratorInfo {
             defaults: spec.defaults,
             training_steps: spec.schedule.training_steps(),
@@ -462,11 +460,11 @@ pub fn info(bundle: &Bundle) -> BundleInfo {
 
 /// Opens a bundle that was found before. It must still be the same: its identity is part of the recipe.
 pub(super) fn open_bundle(what: &str, bundle: &BundleInfo) -> Result<Bundle, TaskError> {
-    let checked = Bundle::open(&bundle.folder).map_err(|err| TaskError::from_error(what, &err))?;
+    let checked = Bundle::open(&bundle.origin).map_err(|err| TaskError::from_error(what, &err))?;
     if checked.hash() == &*bundle.id {
         return Ok(checked);
     }
-    let why = format!("the bundle was changed since it was found ({})", bundle.folder.display());
+    let why = format!("the bundle was changed since it was found ({})", bundle.origin);
     Err(TaskError::new(what, why).with_hint("Start the program again."))
 }
 
