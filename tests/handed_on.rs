@@ -57,7 +57,8 @@ fn a_copied_program_predicts_and_poses_the_demo() {
     let generate = ["generate", "--input", "demo", "--limit", "1", "--runtime", "rten", "--out", "out", "--json"];
     let report = json(&alone(home.path(), &generate));
     assert!(report["mean"]["psnr_db"].as_f64().unwrap() > 15.0, "{report}");
-    let pose = ["pose", "demo", "--limit", "1", "--imprint", "predicted", "--mask", "unet", "--runtime", "rten", "--json"];
+    let pose =
+        ["pose", "demo", "--limit", "1", "--imprint", "predicted", "--mask", "unet", "--runtime", "rten", "--json"];
     let report = json(&alone(home.path(), &pose));
     assert!(report["cases"][0]["error_deg"].as_f64().unwrap().abs() < 10.0, "{report}");
     let check = alone(home.path(), &["bundle", "check", "built-in:generator_ldm", "--json"]);

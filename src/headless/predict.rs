@@ -14,7 +14,7 @@ use crate::domain::postprocess::{RawPrediction, RefitShift, ShiftMode};
 use crate::domain::sample::Sample;
 use crate::domain::sensor::Finger;
 use crate::infer::bundle::{Bundle, find_all};
-use crate::infer::engine::EngineChoice;
+use crate::infer::engine::{EngineChoice, resolve};
 use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
 use crate::infer::recipe::{Recipe, input_digest};
@@ -151,11 +151,13 @@ pub(super) fn find_bundle(named: Option<&PathBuf>, kind: &str, fits: fn(&Bundle)
         return Ok(Bundle::open(dir)?);
     }
     let found = find_all(&[]);
-    found.bundles.into_iter().find(fits).ok_or_else(|| {
-        let refused: Vec<String> =
-            found.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
-        anyhow::anyhow!("no {kind} bundle was found; name one with an option{}", refused.concat())
-    })
+    if let Some(bundle) = found.bundles.into_iter().find(fits) {
+        return Ok(bundle);
+    }
+    // A build that cannot run models says that, and not that it found none.
+    resolve(EngineChoice::Auto)?;
+    let refused: Vec<String> = found.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
+    anyhow::bail!("no {kind} bundle was found; name one with an option{}", refused.concat())
 }
 
 /// The models of one run of the program.

@@ -15,6 +15,7 @@ const PREFIX: &str = "built-in:";
 /// A file's name and content.
 type Embedded = (&'static str, &'static [u8]);
 
+#[cfg(feature = "onnx")]
 macro_rules! embedded {
     ($($bundle:literal: [$($file:literal),+],)+) => {
         &[$(($bundle, &[$((
@@ -25,11 +26,16 @@ macro_rules! embedded {
 }
 
 /// The bundles of `assets/models`; a test holds this list against the folder.
+#[cfg(feature = "onnx")]
 static EMBEDDED: &[(&str, &[Embedded])] = embedded! {
     "generator_ldm": ["manifest.json", "condition_encoder.onnx", "denoiser.onnx", "decoder.onnx"],
     "mask_unet": ["manifest.json", "mask_unet.onnx"],
     "tool_classifier": ["manifest.json", "tool_classifier.onnx"],
 };
+
+/// Nothing: a build without engines is spared the copying of what it cannot run.
+#[cfg(not(feature = "onnx"))]
+static EMBEDDED: &[(&str, &[Embedded])] = &[];
 
 /// Where a bundle lies. As text a folder's path, or `built-in:` and a name; both are understood where a folder is
 /// named.
@@ -144,6 +150,7 @@ fn embedded(bundle: &str) -> Option<&'static [Embedded]> {
 mod tests {
     use super::*;
 
+    #[cfg(feature = "onnx")]
     #[test]
     fn the_program_holds_all_that_ships() {
         let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models");
