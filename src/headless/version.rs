@@ -1,6 +1,5 @@
 //! `touch2touch --version`: what has to be known of a program and its machine before a result can be made again.
 
-use std::fmt::Write as _;
 #[cfg(feature = "gui")]
 use std::{sync::mpsc, thread, time::Duration};
 
@@ -35,9 +34,8 @@ fn describe() -> String {
     });
     let graphics = graphics();
     let models: Vec<String> = Origin::built_in().map(|origin| origin.to_string()).collect();
-    let mut text = format!("{SHORT}\ncommit    {commit}\nengines   {}", engines());
-    let _ = write!(text, "\nmodels    {}\ngraphics  {graphics}", models.join(", "));
-    text
+    let (engines, models) = (engines(), models.join(", "));
+    format!("{SHORT}\ncommit    {commit}\nengines   {engines}\nmodels    {models}\ngraphics  {graphics}")
 }
 
 fn engines() -> String {
