@@ -22,5 +22,7 @@ mod stability;
 mod generating;
 #[cfg(feature = "gui")]
 mod gpu;
+#[cfg(feature = "onnx")]
+mod handed_on;
 #[cfg(feature = "ui-test")]
 mod ui;

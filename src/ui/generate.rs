@@ -59,7 +59,7 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
             for bundle in bundles {
                 let chosen = bundle.name == current;
                 let option = ui.selectable_label(chosen, &bundle.name);
-                if option.on_hover_text(bundle.folder.display().to_string()).clicked() {
+                if option.on_hover_text(bundle.origin.to_string()).clicked() {
                     new.bundle = Some(bundle.name.clone());
                 }
             }

@@ -23,6 +23,7 @@ use touch2touch::domain::postprocess::{DepthChain, DepthRange, Mapping, RawPredi
 use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::sample::{BubbleTouch, FingerTouch, GelSlimTouch, Sample};
 use touch2touch::domain::sim;
+use touch2touch::infer::bundle::Origin;
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
@@ -245,7 +246,7 @@ impl Services for Double {
             id: id.into(),
             name: id.into(),
             kind,
-            folder: PathBuf::from(id),
+            origin: Origin::Folder(id.into()),
             generator: (kind == BundleKind::Generator).then(|| GeneratorInfo {
                 defaults: GenerateConfig { steps: 20, ..GenerateConfig::default() },
                 training_steps: 1000,

@@ -11,6 +11,7 @@ use touch2touch::app::settings::GenerateSettings;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::DepthMap;
 use touch2touch::domain::sensor::Finger;
+use touch2touch::infer::bundle::Origin;
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
@@ -145,7 +146,7 @@ fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
         id: "x".into(),
         name: "x".into(),
         kind: BundleKind::Generator,
-        folder: "x".into(),
+        origin: Origin::Folder("x".into()),
         generator: Some(GeneratorInfo { defaults, training_steps: 1000, guided }),
     };
     let own = GenerateSettings { preset: None, guidance: 4.0, sampler: Sampler::Ddpm, ..GenerateSettings::default() };

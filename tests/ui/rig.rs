@@ -20,6 +20,7 @@ use touch2touch::domain::postprocess::{
 use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::sensor::bubble;
 use touch2touch::domain::sim;
+use touch2touch::infer::bundle::Origin;
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch::io::statistics::ShiftStatistics;
@@ -84,7 +85,7 @@ impl Services for QuickGenerator {
             id: "quick".into(),
             name: "quick double".into(),
             kind: BundleKind::Generator,
-            folder: PathBuf::new(),
+            origin: Origin::Folder(PathBuf::new()),
             generator: Some(GeneratorInfo {
                 defaults: GenerateConfig { steps: 4, ..GenerateConfig::default() },
                 training_steps: 1000,
