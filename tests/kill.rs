@@ -39,7 +39,8 @@ use touch2touch::io::masks::{FOLDER, MaskStore};
 use touch2touch::work::bundles::BundleInfo;
 use touch2touch::work::error::TaskError;
 use touch2touch::work::job::JobCx;
-use touch2touch::work::models::{Prediction, Wanted};
+use touch2touch::work::models::Wanted;
+use touch2touch::work::prediction::Prediction;
 
 /// What the child plays: `FOLDER` and the script's seed.
 const ROLE: &str = "TOUCH2TOUCH_KILL_TEST";

@@ -657,7 +657,7 @@ mod trial {
         let dir = copy("mask");
         std::fs::remove_file(dir.path().join("mask_unet.onnx")).unwrap();
         std::fs::create_dir(dir.path().join("mask_unet.onnx")).unwrap();
-        assert!(refusal(dir.path()).contains("not an ordinary file"));
+        assert!(refusal(dir.path()).contains("it is a folder, not a file"));
         #[cfg(unix)]
         {
             let dir = copy("mask");

@@ -137,7 +137,8 @@ impl Graph {
     /// # Errors
     /// See [`EngineError`].
     pub fn load(engine: EngineKind, role: Role, file: &BundleFile) -> Result<Self, EngineError> {
-        let bytes = file.read(files::MODEL).map_err(|source| EngineError::Read { path: file.path().to_owned(), source })?;
+        let bytes =
+            file.read(files::MODEL).map_err(|source| EngineError::Read { path: file.path().to_owned(), source })?;
         load_session(engine, bytes)
             .map(|session| Self { role, runs: 0, session })
             .map_err(|err| err.unwrap_or_else(|reason| EngineError::Load { engine, role, reason }))

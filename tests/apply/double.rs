@@ -28,7 +28,8 @@ use touch2touch::infer::engine::EngineChoice;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::job::JobCx;
-use touch2touch::work::models::{Prediction, Wanted};
+use touch2touch::work::models::Wanted;
+use touch2touch::work::prediction::Prediction;
 
 /// `[width, height]` of the imprints of [`Source`].
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];

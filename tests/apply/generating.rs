@@ -18,7 +18,7 @@ use super::panes;
 use touch2touch::app::jobs::Onlooker;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::job::{JobCx, PreviewPicture};
-use touch2touch::work::models::Prediction;
+use touch2touch::work::prediction::Prediction;
 
 const RIGHT: Finger = Finger::Right;
 const LEFT: Finger = Finger::Left;

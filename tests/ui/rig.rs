@@ -29,7 +29,8 @@ use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::imprint::in_metres;
 use touch2touch::work::job::{JobCx, PreviewPicture};
-use touch2touch::work::models::{Prediction, Wanted};
+use touch2touch::work::models::Wanted;
+use touch2touch::work::prediction::Prediction;
 
 /// The program's services with a generator that answers at once.
 struct QuickGenerator {

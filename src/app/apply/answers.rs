@@ -19,7 +19,7 @@ use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
 use crate::work::bundles::BundleKind;
 use crate::work::error::{TaskError, TaskErrorKind};
-use crate::work::models::Prediction;
+use crate::work::prediction::Prediction;
 
 pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
     match command {
