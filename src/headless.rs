@@ -22,6 +22,7 @@ mod report;
 mod seeds;
 mod simulate;
 mod stats;
+mod version;
 mod watch;
 
 use std::ffi::OsString;
@@ -40,7 +41,7 @@ use crate::io::dataset::ToolScale;
 ///
 /// Without a verb the studio opens, on PATH or on the built-in demo.
 #[derive(Debug, Parser)]
-#[command(name = "touch2touch", version, args_conflicts_with_subcommands = true)]
+#[command(name = "touch2touch", args_conflicts_with_subcommands = true)]
 struct Cli {
     #[command(subcommand)]
     verb: Option<Verb>,
@@ -49,6 +50,12 @@ struct Cli {
     /// Start the studio with its default layout and settings.
     #[arg(long)]
     reset_ui: bool,
+    /// Print the version.
+    #[arg(short = 'V', exclusive = true)]
+    short_version: bool,
+    /// Print the version, the commit, the model engines and the graphics device.
+    #[arg(long, exclusive = true)]
+    version: bool,
 }
 
 #[derive(Debug, Subcommand)]
@@ -195,6 +202,7 @@ fn check_studio_path(path: &Path) -> anyhow::Result<()> {
 fn run(cli: Option<Cli>) -> VerbResult {
     let Some(cli) = cli else { return Ok(true) };
     match cli.verb {
+        None if cli.short_version || cli.version => version::run(cli.version),
         None => {
             if let Some(path) = &cli.path {
                 check_studio_path(path)?;

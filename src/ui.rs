@@ -49,6 +49,11 @@ const WINDOW: [f32; 2] = [1600.0, 960.0];
 /// Smallest size that every workspace can be used in, points.
 const SMALLEST: [f32; 2] = [960.0, 600.0];
 
+/// The program's icon; without it where the picture cannot be read.
+fn icon() -> egui::IconData {
+    eframe::icon_data::from_png_bytes(include_bytes!("../assets/icon/touch2touch.png")).unwrap_or_default()
+}
+
 /// Opens the window and returns when it was closed. `open` is a folder or a file in one; `None` opens what was open
 /// last, else the demo. `reset` starts with default preferences and layouts.
 ///
@@ -59,6 +64,7 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
         viewport: egui::ViewportBuilder::default()
             .with_title("Touch2Touch Studio")
             .with_app_id("touch2touch")
+            .with_icon(icon())
             .with_inner_size(WINDOW)
             .with_min_inner_size(SMALLEST)
             .with_clamp_size_to_monitor_size(true)

@@ -25,5 +25,6 @@ pub mod ledger;
 pub mod mask;
 pub mod models;
 pub mod pose;
+pub mod prediction;
 pub mod statistics;
 pub mod tool;

@@ -160,7 +160,7 @@ fn progress_is_the_latest() {
     bench.send(Command::Generate);
     let (ticket, _) = bench.state.tasks.running.iter().next().unwrap();
     let ticket = *ticket;
-    bench.send(Command::Progressed(ticket, touch2touch::app::tasks::Progress { done: 3, total: 4, text: "x".into() }));
+    bench.send(Command::Progressed(ticket, touch2touch::work::job::Progress { done: 3, total: 4, text: "x".into() }));
     assert_eq!(bench.state.tasks.running[&ticket].progress.fraction(), Some(0.75));
     bench.settle();
     assert!(bench.state.tasks.running.is_empty());

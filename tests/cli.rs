@@ -294,7 +294,7 @@ fn the_five_faults_are_written_and_told_apart() {
     assert_eq!(json(&made)["faults"].as_object().unwrap().len(), 5);
 
     let doctor = json(&run(&["doctor", set_text, "--json"], dir.path())).to_string();
-    assert!(doctor.contains("multiply by 0.001") && doctor.contains("left imprint is 0 everywhere"), "{doctor}");
+    assert!(doctor.contains("scale it by 0.001") && doctor.contains("left imprint is 0 everywhere"), "{doctor}");
 
     let pose = run(&["pose", set_text, "--mask", "truth", "--json"], dir.path());
     assert_eq!(pose.status.code(), Some(1), "one tool cannot be aligned");

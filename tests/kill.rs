@@ -19,22 +19,28 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use touch2touch::app::command::{Command, Opened, Pane};
 use touch2touch::app::document::{PairLabels, Review};
-use touch2touch::app::error::TaskError;
-use touch2touch::app::jobs::JobCx;
 use touch2touch::app::keys::ImprintSource;
-use touch2touch::app::library::{BundleInfo, Place};
+use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::{LiveSource, open_source};
-use touch2touch::app::services::{DataSource, GenerateItem, Generated, Services};
-use touch2touch::app::settings::{RuntimeChoice, Settings};
+use touch2touch::app::services::{DataSource, Services};
+use touch2touch::app::settings::Settings;
 use touch2touch::app::state::{Lookup, State};
+use touch2touch::domain::contact::ContactMask;
 use touch2touch::domain::dataset::{Index, PairId, Problem};
+use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::{DepthMap, Grid, Mask};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::sample::Sample;
 use touch2touch::domain::rig::{PerPad, lab};
+use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::images;
 use touch2touch::io::masks::{FOLDER, MaskStore};
+use touch2touch::work::bundles::BundleInfo;
+use touch2touch::work::error::TaskError;
+use touch2touch::work::job::JobCx;
+use touch2touch::work::models::Wanted;
+use touch2touch::work::prediction::Prediction;
 
 /// What the child plays: `FOLDER` and the script's seed.
 const ROLE: &str = "TOUCH2TOUCH_KILL_TEST";
@@ -104,10 +110,17 @@ impl Services for Files {
     fn find_bundles(&self, _: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
         Default::default()
     }
-    fn generate(&self, _: &BundleInfo, _: &[GenerateItem<'_>], _: &JobCx) -> Result<Vec<Generated>, TaskError> {
+    fn predict(
+        &self,
+        _: &BundleInfo,
+        _: EngineChoice,
+        _: &GenerateConfig,
+        _: &[Wanted<'_>],
+        _: &JobCx,
+    ) -> Result<Vec<Prediction>, TaskError> {
         Err(TaskError::new("Generate", "there is no model"))
     }
-    fn mask_by_model(&self, _: &BundleInfo, _: RuntimeChoice, _: &DepthMap) -> Result<Mask, TaskError> {
+    fn mask_by_model(&self, _: &BundleInfo, _: EngineChoice, _: &DepthMap) -> Result<ContactMask, TaskError> {
         Err(TaskError::new("Mask", "there is no model"))
     }
     fn load_settings(&self) -> (Settings, Option<TaskError>) {

@@ -1,5 +1,6 @@
 //! The rules of ARCHITECTURE.md that the compiler cannot check: who may name whom, and how long a file may be.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// What must not be named in the code of a layer, each with the reason.
@@ -28,21 +29,52 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
     ),
     (
         "io",
-        &["eframe", "egui", "wgpu", "crate::infer", "crate::app", "crate::gpu", "crate::ui"],
+        &[
+            "eframe",
+            "egui",
+            "wgpu",
+            "crate::infer",
+            "crate::work",
+            "crate::app",
+            "crate::gpu",
+            "crate::ui",
+            "crate::headless",
+        ],
         "files know no model and no window",
     ),
-    ("infer", &["eframe", "egui", "wgpu", "crate::app", "crate::gpu", "crate::ui"], "models know no window"),
+    (
+        "infer",
+        &["eframe", "egui", "wgpu", "crate::work", "crate::app", "crate::gpu", "crate::ui", "crate::headless"],
+        "models know no window",
+    ),
+    (
+        "work",
+        &["eframe", "egui", "wgpu", "rten::", "ort::", "crate::app", "crate::gpu", "crate::ui", "crate::headless"],
+        "the job knows neither the studio nor the command line",
+    ),
     (
         "app",
-        &["eframe", "egui", "wgpu", "rten::", "ort::", "crate::gpu", "crate::ui"],
+        &["eframe", "egui", "wgpu", "rten::", "ort::", "crate::gpu", "crate::ui", "crate::headless"],
         "the application model has no window",
     ),
     (
         "gpu",
-        &["egui::", "rfd", "rten", "ort::", "crate::app", "crate::ui", "crate::io", "crate::infer"],
+        &[
+            "egui::",
+            "rfd",
+            "rten",
+            "ort::",
+            "crate::app",
+            "crate::ui",
+            "crate::io",
+            "crate::infer",
+            "crate::work",
+            "crate::headless",
+        ],
         "the renderer knows domain types only",
     ),
-    ("ui", &["std::fs", "rten::", "ort::", "kiddo"], "panes look up, format and draw"),
+    ("headless", &["eframe", "egui", "wgpu", "rten::", "ort::"], "verbs have no window"),
+    ("ui", &["std::fs", "rten::", "ort::", "kiddo", "crate::headless"], "panes look up, format and draw"),
 ];
 
 /// Longest file, in lines, tests included.
@@ -59,10 +91,50 @@ fn rust_files(dir: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// The code of a file: no comment lines, nothing from the first test module on.
+/// The code of a file: no comment lines, and nothing that is only compiled for tests, wherever it stands.
 fn code(text: &str) -> String {
-    let end = text.find("#[cfg(test)]").unwrap_or(text.len());
-    text[..end].lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n")
+    let mut out = Vec::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if line.trim() == "#[cfg(test)]" {
+            // The item after it: one line, or up to the brace that closes it.
+            let mut depth = 0i32;
+            for line in lines.by_ref() {
+                let attribute = depth == 0 && line.trim_start().starts_with("#[");
+                depth += line.matches('{').count() as i32 - line.matches('}').count() as i32;
+                if depth <= 0 && !attribute {
+                    break;
+                }
+            }
+        } else if !line.trim_start().starts_with("//") {
+            out.push(line);
+        }
+    }
+    out.join("\n")
+}
+
+/// The code with each `super::` spelt out: `super::super::keys` in `src/app/jobs/prepare.rs` is `crate::app::keys`.
+fn spelt_out(file: &Path, code: &str) -> String {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let module = file.strip_prefix(&src).unwrap().with_extension("");
+    let module: Vec<String> = module.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+    let mut out = String::new();
+    let mut rest = code;
+    while let Some(at) = rest.find("super::") {
+        out += &rest[..at];
+        rest = &rest[at..];
+        let mut up = 0;
+        while let Some(after) = rest.strip_prefix("super::") {
+            (up, rest) = (up + 1, after);
+        }
+        let parents = &module[..module.len().saturating_sub(up)];
+        out += "crate::";
+        for parent in parents {
+            out += parent;
+            out += "::";
+        }
+    }
+    out + rest
 }
 
 /// Whether `name` stands in the code as a name of its own: `Sort::` does not name `ort::`.
@@ -81,13 +153,82 @@ fn layers_only_point_downwards() {
             rust_files(&src.join(layer), &mut files);
         }
         for file in files {
-            let code = code(&std::fs::read_to_string(&file).unwrap());
+            if file.ends_with("tests.rs") {
+                continue;
+            }
+            let code = spelt_out(&file, &code(&std::fs::read_to_string(&file).unwrap()));
             for name in names.iter().filter(|n| is_named(&code, n)) {
                 broken.push(format!("{} names {name}: {why}", file.display()));
             }
         }
     }
     assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+/// Which modules of `layer` name which, by the names directly below it.
+fn uses(layer: &str) -> BTreeMap<String, BTreeSet<String>> {
+    let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(layer);
+    let mut files = Vec::new();
+    rust_files(&dir, &mut files);
+    let top = |file: &Path| {
+        let below = file.strip_prefix(&dir).unwrap().with_extension("");
+        below.iter().next().unwrap().to_string_lossy().into_owned()
+    };
+    let modules: BTreeSet<String> = files.iter().map(|file| top(file)).collect();
+    let mut uses: BTreeMap<String, BTreeSet<String>> = modules.iter().map(|m| (m.clone(), BTreeSet::new())).collect();
+    for file in files.iter().filter(|file| !file.ends_with("tests.rs")) {
+        let code = spelt_out(file, &code(&std::fs::read_to_string(file).unwrap()));
+        let own = top(file);
+        let named = modules.iter().filter(|m| **m != own && is_named(&code, &format!("crate::{layer}::{m}::")));
+        uses.get_mut(&own).unwrap().extend(named.cloned());
+    }
+    uses
+}
+
+/// A circle among the modules, if there is one.
+fn circle(uses: &BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
+    fn visit(
+        at: &String,
+        uses: &BTreeMap<String, BTreeSet<String>>,
+        path: &mut Vec<String>,
+        done: &mut BTreeSet<String>,
+    ) -> Option<Vec<String>> {
+        if let Some(from) = path.iter().position(|p| p == at) {
+            return Some(path[from..].to_vec());
+        }
+        if done.contains(at) {
+            return None;
+        }
+        path.push(at.clone());
+        let found = uses[at].iter().find_map(|next| visit(next, uses, path, done));
+        path.pop();
+        done.insert(at.clone());
+        found
+    }
+    let mut done = BTreeSet::new();
+    uses.keys().find_map(|module| visit(module, uses, &mut Vec::new(), &mut done))
+}
+
+#[test]
+fn the_steps_of_the_job_form_no_circle() {
+    let uses = uses("work");
+    assert!(uses.len() > 10 && uses["models"].contains("prediction"), "the scan sees too little: {uses:?}");
+    assert_eq!(circle(&uses), None);
+    // The check itself finds one.
+    let ring = [("a", "b"), ("b", "c"), ("c", "a"), ("d", "a")];
+    let ring = ring.map(|(from, to)| (from.to_owned(), BTreeSet::from([to.to_owned()])));
+    assert_eq!(circle(&ring.into()).map(|c| c.len()), Some(3));
+}
+
+#[test]
+fn what_is_only_for_tests_is_left_out_and_nothing_else() {
+    let text = "#[cfg(test)]\nmod testing;\nuse a::b;\n#[cfg(test)]\nfn c() {\n    d();\n}\nfn e() {}\n// f\n";
+    assert_eq!(code(text), "use a::b;\nfn e() {}");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/app/jobs/prepare.rs");
+    assert_eq!(
+        spelt_out(&file, "use super::super::keys::X; super::y()"),
+        "use crate::app::keys::X; crate::app::jobs::y()"
+    );
 }
 
 /// How a file could be opened without asking what it is.

@@ -23,6 +23,8 @@ mod generating;
 #[cfg(feature = "gui")]
 mod gpu;
 #[cfg(feature = "onnx")]
+mod handed_on;
+#[cfg(feature = "onnx")]
 mod sensors;
 #[cfg(feature = "ui-test")]
 mod ui;

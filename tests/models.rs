@@ -271,7 +271,8 @@ mod running {
         for choice in engines() {
             let engine = resolve(choice).unwrap();
             let load = |role: Role| {
-                Graph::load(engine, role, &fixture("generator").join(format!("{}.onnx", role.key()))).unwrap()
+                let file = fixture("generator").join(format!("{}.onnx", role.key()));
+                Graph::load(engine, role, &file.into()).unwrap()
             };
             let condition = load(Role::ConditionEncoder)
                 .run(&[("gelslim", Input::F32(&gelslim))], "condition", &[2, 5, 4, 4])
@@ -396,10 +397,10 @@ mod running {
         std::fs::write(damaged.path().join("mask_unet.onnx"), b"gone").unwrap();
         for choice in engines() {
             let engine = resolve(choice).unwrap();
-            let load = |path: &Path| Graph::load(engine, Role::MaskUnet, path).unwrap_err().to_string();
-            assert!(load(&damaged.path().join("mask_unet.onnx")).contains("cannot load the graph `mask_unet`"));
-            assert!(load(&damaged.path().join("absent.onnx")).contains("absent.onnx"));
-            let mut graph = Graph::load(engine, Role::MaskUnet, &fixture("mask/mask_unet.onnx")).unwrap();
+            let load = |file: PathBuf| Graph::load(engine, Role::MaskUnet, &file.into()).unwrap_err().to_string();
+            assert!(load(damaged.path().join("mask_unet.onnx")).contains("cannot load the graph `mask_unet`"));
+            assert!(load(damaged.path().join("absent.onnx")).contains("absent.onnx"));
+            let mut graph = Graph::load(engine, Role::MaskUnet, &fixture("mask/mask_unet.onnx").into()).unwrap();
             let wrong = Tensor::filled(vec![1, 1, 3, 3], 0.0);
             assert!(graph.run(&[("imprint", Input::F32(&wrong))], "logits", &[1, 2, 14, 18]).is_err());
             assert!(graph.run(&[], "logits", &[1, 2, 14, 18]).is_err());
@@ -666,7 +667,7 @@ mod trial {
         let dir = copy("mask");
         std::fs::remove_file(dir.path().join("mask_unet.onnx")).unwrap();
         std::fs::create_dir(dir.path().join("mask_unet.onnx")).unwrap();
-        assert!(refusal(dir.path()).contains("not an ordinary file"));
+        assert!(refusal(dir.path()).contains("it is a folder, not a file"));
         #[cfg(unix)]
         {
             let dir = copy("mask");

@@ -65,13 +65,12 @@ impl State {
     /// What an evaluation started now would do; `None` without data or with nothing to score.
     pub fn evaluation_setup(&self) -> Option<Setup> {
         self.library.open.as_ref()?;
-        let folder = |kind| self.bundle(kind).ok().map(|b| b.folder.clone());
-        let bundles: Vec<PathBuf> =
-            self.evaluated().filter(|(_, chosen)| *chosen).map(|(b, _)| b.folder.clone()).collect();
+        let origin = |kind| self.bundle(kind).ok().map(|b| b.origin.clone());
+        let bundles: Vec<_> = self.evaluated().filter(|(_, chosen)| *chosen).map(|(b, _)| b.origin.clone()).collect();
         (!bundles.is_empty()).then(|| Setup {
             bundles,
-            mask_bundle: folder(BundleKind::Mask),
-            classifier: folder(BundleKind::Classifier),
+            mask_bundle: origin(BundleKind::Mask),
+            classifier: origin(BundleKind::Classifier),
             engine: self.settings.pose_engine,
             shift: self.settings.shift,
             runtime: self.settings.runtime.into(),

@@ -67,7 +67,7 @@ pub struct Onlooker {
 
 impl Onlooker {
     /// The same for the predictions of one call, in its order.
-    pub(super) fn of(self, items: Vec<PredictionKey>) -> Arc<dyn Previews> {
+    pub fn of(self, items: Vec<PredictionKey>) -> Arc<dyn Previews> {
         Arc::new(Watched { by: self, items })
     }
 }

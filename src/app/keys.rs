@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-
 pub use crate::domain::bits::Bits;
 pub use crate::domain::diffusion::{Preset, Sampler, Spacing};
 pub use crate::domain::postprocess::ShiftMode;

@@ -20,8 +20,8 @@ use crate::work::ensemble::Ensemble;
 use crate::work::job::PreviewPicture;
 use crate::work::layers::LayerResult;
 use crate::work::ledger::LedgerResult;
-use crate::work::models::Prediction;
 use crate::work::pose::PoseResult;
+use crate::work::prediction::Prediction;
 use crate::work::tool::NamedTool;
 
 /// Values by recipe; the least recently used go first when the budget is exceeded.

@@ -26,7 +26,8 @@ use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::BundleInfo;
 use crate::work::error::TaskError;
 use crate::work::job::JobCx;
-use crate::work::models::{Prediction, Wanted};
+use crate::work::models::Wanted;
+use crate::work::prediction::Prediction;
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {

@@ -573,9 +573,7 @@ impl Wanted<'_> {
 
     fn imprint(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
-        let Some(recipe) = state.results.chosen.get(&touch) else {
-            return;
-        };
+        let Some(recipe) = state.results.chosen.get(&touch) else { return };
         // The sample says how large the bubble image is.
         if state.touch(finger).ready().is_none() || !state.results.predictions.contains(recipe) {
             return;
@@ -587,9 +585,7 @@ impl Wanted<'_> {
 
     fn comparison(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
-        let Some(recipe) = state.results.chosen.get(&touch) else {
-            return;
-        };
+        let Some(recipe) = state.results.chosen.get(&touch) else { return };
         let there = |source| state.imprint(source, finger).ready().is_some();
         if there(ImprintSource::Measured) && there(ImprintSource::Predicted) {
             let key = (recipe.clone(), state.settings.shift);

@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn where_a_model_finds_nothing_depth_decides() {
         let none = Mask::filled(175, 140, false);
-        for (rest, height) in [(0.0, 0.003), (-0.002, 0.005), (0.001, 0.012)] {
+        for (rest, height) in [(0.0, 0.004), (-0.002, 0.005), (0.001, 0.012)] {
             let imprint = bump(rest, height);
             let found = settled_model(&imprint, none.clone());
             let MaskBasis::Depth(min_m) = found.basis else { panic!("{:?}", found.basis) };

@@ -56,12 +56,7 @@ impl Gpu {
     /// # Errors
     /// [`GpuError::NoAdapter`] and [`GpuError::NoDevice`].
     pub fn headless() -> Result<Self, GpuError> {
-        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-        let options = wgpu::RequestAdapterOptions {
-            power_preference: wgpu::PowerPreference::HighPerformance,
-            ..Default::default()
-        };
-        let adapter = block_on(instance.request_adapter(&options)).map_err(|e| GpuError::NoAdapter(e.to_string()))?;
+        let adapter = best_adapter()?;
         let limits = wgpu::Limits::default().or_better_values_from(&adapter.limits());
         let limits = if limits.check_limits(&adapter.limits()) { limits } else { adapter.limits() };
         let descriptor =
@@ -93,6 +88,30 @@ impl Gpu {
         let limits = self.device.limits();
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
     }
+}
+
+/// The best graphics adapter of this machine, in words.
+///
+/// # Errors
+/// [`GpuError::NoAdapter`].
+pub fn adapter_in_words() -> Result<String, GpuError> {
+    let info = best_adapter()?.get_info();
+    let kind = match info.device_type {
+        wgpu::DeviceType::Cpu => "software",
+        wgpu::DeviceType::IntegratedGpu => "integrated",
+        wgpu::DeviceType::DiscreteGpu => "discrete",
+        wgpu::DeviceType::VirtualGpu => "virtual",
+        wgpu::DeviceType::Other => "of unknown kind",
+    };
+    let driver = format!("{} {}", info.driver, info.driver_info);
+    Ok(format!("{}, {kind} ({}; {})", info.name, info.backend, driver.trim()))
+}
+
+fn best_adapter() -> Result<wgpu::Adapter, GpuError> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let power_preference = wgpu::PowerPreference::HighPerformance;
+    let options = wgpu::RequestAdapterOptions { power_preference, ..Default::default() };
+    block_on(instance.request_adapter(&options)).map_err(|e| GpuError::NoAdapter(e.to_string()))
 }
 
 /// Waits for a future. The futures of the native back ends are ready at once; this is all the executor they need.

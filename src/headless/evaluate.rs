@@ -1,6 +1,5 @@
 //! `touch2touch evaluate`: the paper's results table of a dataset.
 
-use crate::infer::bundle::{Bundle, Found, default_roots, find};
 use crate::io::dataset::Dataset;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,6 +15,7 @@ use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Row, paper_rows};
 use crate::domain::pose::Engine;
+use crate::infer::bundle::{Bundle, Found, Origin, find_all};
 use crate::io::atomic;
 use crate::work::evaluate::{Evaluation, MaskBy, Report, Setup, evaluate, rows};
 use crate::work::job::{Cancel, JobCx};
@@ -160,15 +160,16 @@ fn text(evaluation: &Evaluation, rows: &[Row]) -> String {
 
 /// The bundles that the arguments name, and for the rest those that are found.
 fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
-    let Found { bundles, problems } = find(&default_roots());
+    let Found { bundles, problems } = find_all(&[]);
     let first = |named: &Option<PathBuf>, fits: fn(&Bundle) -> bool| {
-        named.clone().or_else(|| bundles.iter().find(|b| fits(b)).map(|b| b.dir().to_owned()))
+        let named = named.as_ref().map(Origin::from);
+        named.or_else(|| bundles.iter().find(|b| fits(b)).map(|b| b.origin().clone()))
     };
-    let generators: Vec<PathBuf> = if args.bundles.is_empty() {
+    let generators: Vec<Origin> = if args.bundles.is_empty() {
         let fits = |b: &&Bundle| b.ends(&dataset.rig).is_some_and(|ends| ends.is_ok());
-        bundles.iter().filter(fits).map(|b| b.dir().to_owned()).collect()
+        bundles.iter().filter(fits).map(|b| b.origin().clone()).collect()
     } else {
-        args.bundles.clone()
+        args.bundles.iter().map(Origin::from).collect()
     };
     if generators.is_empty() {
         let refused: Vec<String> = problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();

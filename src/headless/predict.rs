@@ -21,7 +21,8 @@ use crate::work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
 use crate::work::error::TaskError;
 use crate::work::imprint::{chain_of, imprint, imprint_of};
 use crate::work::job::JobCx;
-use crate::work::models::{Models, Prediction, Wanted};
+use crate::work::models::{Models, Wanted};
+use crate::work::prediction::Prediction;
 
 /// Which models, and how they are run.
 #[derive(Debug, Clone, Args)]

@@ -19,7 +19,7 @@ use crate::domain::units::angle_error;
 use crate::io::{images, names, npz};
 use crate::work::ensemble::{Ensemble, ensemble};
 use crate::work::imprint::imprint_of;
-use crate::work::models::Prediction;
+use crate::work::prediction::Prediction;
 
 /// How many seeds.
 #[derive(Debug, Clone, Copy, Args)]

@@ -1,4 +1,4 @@
-//! Model bundles: a folder with `manifest.json` and the ONNX graphs it names.
+//! Model bundles: a folder with `manifest.json` and the ONNX graphs it names, on the disk or inside the program.
 //!
 //! [`Bundle::open`] checks everything that can be checked without running a graph: the manifest, the presence and
 //! SHA-256 of every file, and the names, element types and shapes of every graph's inputs and outputs against the
@@ -100,6 +100,7 @@
 pub(super) mod contract;
 mod find;
 mod manifest;
+mod origin;
 mod sensor;
 
 use std::collections::BTreeMap;
@@ -112,12 +113,13 @@ use sha2::{Digest, Sha256};
 use crate::domain::dataset::Problem;
 use crate::io::files;
 
-pub use find::{Found, default_roots, find};
+pub use find::{Found, find, find_all};
 pub use manifest::{
     BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, FileEntry, GeneratorInput, GeneratorSpec,
     GuidanceSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind, ScheduleSpec,
     TensorSpec, TimestepType, Unconditional,
 };
+pub use origin::{BundleFile, Origin};
 pub use sensor::{Ends, Misfit, SensorPair, SensorSpec};
 
 /// The manifest's file name.
@@ -158,8 +160,8 @@ impl Role {
 /// A bundle with everything wrong about it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct BundleError {
-    /// The folder.
-    pub dir: PathBuf,
+    /// Where it lies.
+    pub origin: Origin,
     /// All that was found, at least one.
     pub problems: Vec<Problem>,
 }
@@ -167,9 +169,10 @@ pub struct BundleError {
 impl fmt::Display for BundleError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let count = self.problems.len();
-        write!(f, "the model bundle {} cannot be used: {count} problem{}", self.dir.display(), plural(count))?;
+        write!(f, "the model bundle {} cannot be used: {count} problem{}", self.origin, plural(count))?;
+        let dir = self.origin.path();
         for problem in &self.problems {
-            let file = problem.file.strip_prefix(&self.dir).unwrap_or(&problem.file);
+            let file = problem.file.strip_prefix(&dir).unwrap_or(&problem.file);
             write!(f, "\n- {}: {} ({})", file.display(), problem.what, problem.hint)?;
         }
         Ok(())
@@ -183,17 +186,17 @@ fn plural(count: usize) -> &'static str {
 /// A checked bundle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bundle {
-    dir: PathBuf,
+    origin: Origin,
     name: String,
     hash: String,
-    files: BTreeMap<Role, PathBuf>,
+    files: BTreeMap<Role, BundleFile>,
     bytes: u64,
     spec: BundleSpec,
     provenance: serde_json::Value,
 }
 
 impl Bundle {
-    /// Opens and checks the bundle in the folder `dir`.
+    /// Opens and checks the bundle at `origin`, mostly a folder.
     ///
     /// # Errors
     /// [`BundleError`] with everything that is wrong: the manifest's JSON, version, keys and values, missing files,
@@ -201,10 +204,12 @@ impl Bundle {
     ///
     /// # Cost
     /// Reads and hashes every file once, about 0.1 s for 20 MB.
-    pub fn open(dir: &Path) -> Result<Self, BundleError> {
-        let refuse = |problems| BundleError { dir: dir.to_path_buf(), problems };
-        let path = dir.join(MANIFEST);
-        let text = files::read(&path, MAX_MANIFEST).map_err(|err| {
+    pub fn open(origin: impl Into<Origin>) -> Result<Self, BundleError> {
+        let origin = origin.into();
+        let refuse = |problems| BundleError { origin: origin.clone(), problems };
+        let file = origin.file(MANIFEST);
+        let path = file.path().to_owned();
+        let text = file.read(MAX_MANIFEST).map_err(|err| {
             refuse(vec![Problem {
                 file: path.clone(),
                 what: format!("cannot be read: {err}"),
@@ -218,15 +223,16 @@ impl Bundle {
         let mut files = BTreeMap::new();
         let mut size = 0;
         for (&role, entry) in &manifest.files {
-            let Some(file) = inside(dir, &entry.path) else {
+            if !stays_inside(&entry.path) {
                 let what = format!("files.{}.path: \"{}\" leads out of the folder", role.key(), entry.path);
                 problems.add(what, "name a file inside the bundle's folder");
                 continue;
-            };
-            match files::read(&file, files::MODEL) {
+            }
+            let file = origin.file(&entry.path);
+            match file.read(files::MODEL) {
                 Ok(bytes) => {
                     size += bytes.len() as u64;
-                    let mut at_file = Problems { file: file.clone(), list: Vec::new() };
+                    let mut at_file = Problems { file: file.path().to_owned(), list: Vec::new() };
                     if !sha256(&bytes).eq_ignore_ascii_case(&entry.sha256) {
                         at_file.add(
                             "its SHA-256 is not the manifest's: the file is damaged or was replaced",
@@ -239,7 +245,7 @@ impl Bundle {
                     problems.list.append(&mut at_file.list);
                 }
                 Err(err) => problems.list.push(Problem {
-                    file: file.clone(),
+                    file: file.path().to_owned(),
                     what: format!("cannot be read: {err}"),
                     hint: "copy the bundle again".into(),
                 }),
@@ -247,22 +253,17 @@ impl Bundle {
             files.insert(role, file);
         }
         match (manifest.spec, problems.list.is_empty()) {
-            (Some(spec), true) => Ok(Self {
-                dir: dir.to_path_buf(),
-                name: manifest.name,
-                hash: sha256(&text),
-                files,
-                bytes: size,
-                spec,
-                provenance: manifest.provenance,
-            }),
+            (Some(spec), true) => {
+                let (name, provenance) = (manifest.name, manifest.provenance);
+                Ok(Self { hash: sha256(&text), origin, name, files, bytes: size, spec, provenance })
+            }
             _ => Err(refuse(problems.list)),
         }
     }
 
-    /// The folder.
-    pub fn dir(&self) -> &Path {
-        &self.dir
+    /// Where it lies.
+    pub fn origin(&self) -> &Origin {
+        &self.origin
     }
 
     /// The name for people.
@@ -304,14 +305,14 @@ impl Bundle {
         }
     }
 
-    /// Where a graph lies.
-    pub fn file(&self, role: Role) -> Option<&Path> {
-        self.files.get(&role).map(PathBuf::as_path)
+    /// The file of a graph.
+    pub fn file(&self, role: Role) -> Option<&BundleFile> {
+        self.files.get(&role)
     }
 
     /// The graphs with their roles.
-    pub fn files(&self) -> impl Iterator<Item = (Role, &Path)> {
-        self.files.iter().map(|(role, file)| (*role, file.as_path()))
+    pub fn files(&self) -> impl Iterator<Item = (Role, &BundleFile)> {
+        self.files.iter().map(|(role, file)| (*role, file))
     }
 
     /// The size of all graphs together, bytes.
@@ -337,11 +338,10 @@ impl Problems {
     }
 }
 
-/// `name` inside `dir`; `None` if it is absolute, empty, or climbs.
-fn inside(dir: &Path, name: &str) -> Option<PathBuf> {
-    let path = Path::new(name);
-    let plain = path.components().all(|c| matches!(c, std::path::Component::Normal(_)));
-    (plain && !name.is_empty()).then(|| dir.join(path))
+/// Whether `name` is that of a file inside the bundle: neither absolute nor empty, and climbing nowhere.
+fn stays_inside(name: &str) -> bool {
+    let plain = Path::new(name).components().all(|c| matches!(c, std::path::Component::Normal(_)));
+    plain && !name.is_empty()
 }
 
 /// SHA-256 in lower-case hex.

@@ -11,11 +11,12 @@ mod ort_engine;
 #[cfg(feature = "onnx")]
 mod rten_engine;
 
-use std::path::{Path, PathBuf};
+use std::borrow::Cow;
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::bundle::Role;
+use super::bundle::{BundleFile, Role};
 use crate::domain::diffusion::{ModelError, Tensor};
 use crate::io::files;
 
@@ -131,13 +132,13 @@ impl std::fmt::Debug for Graph {
 }
 
 impl Graph {
-    /// Loads the ONNX file `path` into `engine`, which must be one that [`resolve`] gave.
+    /// Loads the ONNX graph `file` into `engine`, which must be one that [`resolve`] gave.
     ///
     /// # Errors
     /// See [`EngineError`].
-    pub fn load(engine: EngineKind, role: Role, path: &Path) -> Result<Self, EngineError> {
+    pub fn load(engine: EngineKind, role: Role, file: &BundleFile) -> Result<Self, EngineError> {
         let bytes =
-            files::read(path, files::MODEL).map_err(|source| EngineError::Read { path: path.to_path_buf(), source })?;
+            file.read(files::MODEL).map_err(|source| EngineError::Read { path: file.path().to_owned(), source })?;
         load_session(engine, bytes)
             .map(|session| Self { role, runs: 0, session })
             .map_err(|err| err.unwrap_or_else(|reason| EngineError::Load { engine, role, reason }))
@@ -182,7 +183,7 @@ impl LoadFailure {
 }
 
 #[cfg(feature = "onnx")]
-fn load_session(engine: EngineKind, bytes: Vec<u8>) -> Result<Box<dyn Session>, LoadFailure> {
+fn load_session(engine: EngineKind, bytes: Cow<'static, [u8]>) -> Result<Box<dyn Session>, LoadFailure> {
     let session: Result<Box<dyn Session>, String> = match engine {
         EngineKind::Rten => rten_engine::load(bytes).map(|s| Box::new(s) as Box<dyn Session>),
         EngineKind::Ort => ort_engine::load(&bytes).map(|s| Box::new(s) as Box<dyn Session>),
@@ -191,7 +192,7 @@ fn load_session(engine: EngineKind, bytes: Vec<u8>) -> Result<Box<dyn Session>, 
 }
 
 #[cfg(not(feature = "onnx"))]
-fn load_session(_: EngineKind, _: Vec<u8>) -> Result<Box<dyn Session>, LoadFailure> {
+fn load_session(_: EngineKind, _: Cow<'static, [u8]>) -> Result<Box<dyn Session>, LoadFailure> {
     Err(LoadFailure(Ok(EngineError::NotInThisBuild)))
 }
 

@@ -97,7 +97,7 @@ pub(super) fn admit(bundle: &Bundle, choice: EngineChoice) -> Result<EngineKind,
             Ok(seen) => judge(bundle, engine, &seen),
             // The program was moved, say: no reason to give the bundle up.
             Err(err) => {
-                log::warn!("the model bundle {} could not be tried: {err}", bundle.dir().display());
+                log::warn!("the model bundle {} could not be tried: {err}", bundle.origin());
                 return Ok(engine);
             }
         },
@@ -175,14 +175,17 @@ fn start(program: &Path, bundle: &Bundle, engine: EngineKind) -> std::io::Result
         EngineKind::Rten => "rten",
         EngineKind::Ort => "ort",
     };
-    let folder = std::path::absolute(bundle.dir())?;
+    let place = match bundle.origin() {
+        Origin::Folder(folder) => std::path::absolute(folder)?,
+        built_in => built_in.path(),
+    };
     let [group, verb] = VERB.map(AsRef::as_ref);
-    let args = [group, verb, "--engine".as_ref(), name.as_ref(), "--".as_ref(), folder.as_os_str()];
+    let args = [group, verb, "--engine".as_ref(), name.as_ref(), "--".as_ref(), place.as_os_str()];
     watch::watch(program, &args, Limits { memory: memory_limit(bundle), time: TIME })
 }
 
 fn refusal(bundle: &Bundle, engine: EngineKind, reason: impl Into<String>) -> Refusal {
-    Refusal { bundle: bundle.name().to_owned(), folder: bundle.dir().to_path_buf(), engine, reason: reason.into() }
+    Refusal { bundle: bundle.name().to_owned(), folder: bundle.origin().path(), engine, reason: reason.into() }
 }
 
 /// What the second process said and how it ended, in words.

@@ -63,7 +63,7 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
                 let option = ui.add_enabled(misfit.is_none(), label);
                 let option = match misfit {
                     Some(misfit) => option.on_disabled_hover_text(misfit.to_string()),
-                    None => option.on_hover_text(bundle.folder.display().to_string()),
+                    None => option.on_hover_text(bundle.origin.to_string()),
                 };
                 if option.clicked() {
                     new.bundle = Some(bundle.name.clone());

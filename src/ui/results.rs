@@ -57,7 +57,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         for (bundle, chosen) in bundles {
             let mut on = chosen;
-            let tip = format!("Give this generator a row ({})", bundle.folder.display());
+            let tip = format!("Give this generator a row ({})", bundle.origin);
             if ui.checkbox(&mut on, &bundle.name).on_hover_text(tip).changed() {
                 cx.push(Command::Evaluate(EvaluateCommand::Choose(bundle.id.clone(), on)));
             }

@@ -7,7 +7,7 @@ use super::error::TaskError;
 use crate::domain::dataset::Problem;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::rig::Rig;
-use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, SensorPair};
+use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, SensorPair};
 use crate::infer::generator::GenerateError;
 
 /// A model bundle that was found.
@@ -19,8 +19,8 @@ pub struct BundleInfo {
     pub name: String,
     /// What it does.
     pub kind: BundleKind,
-    /// Its folder.
-    pub folder: PathBuf,
+    /// Where it lies.
+    pub origin: Origin,
     /// What can be chosen, if it is a generator.
     pub generator: Option<GeneratorInfo>,
 }
@@ -71,7 +71,7 @@ impl BundleInfo {
                 BundleSpec::MaskUnet(_) => BundleKind::Mask,
                 BundleSpec::ToolClassifier(_) => BundleKind::Classifier,
             },
-            folder: bundle.dir().to_owned(),
+            origin: bundle.origin().clone(),
             generator: bundle.generator().map(|spec| GeneratorInfo {
                 defaults: spec.defaults,
                 training_steps: spec.schedule.training_steps(),
@@ -110,11 +110,11 @@ impl BundleInfo {
     /// # Errors
     /// If it cannot be opened, or was changed since it was found.
     pub fn open(&self, what: &str) -> Result<Bundle, TaskError> {
-        let checked = Bundle::open(&self.folder).map_err(|err| TaskError::from_error(what, &err))?;
+        let checked = Bundle::open(&self.origin).map_err(|err| TaskError::from_error(what, &err))?;
         if checked.hash() == &*self.id {
             return Ok(checked);
         }
-        let why = format!("the bundle was changed since it was found ({})", self.folder.display());
+        let why = format!("the bundle was changed since it was found ({})", self.origin);
         Err(TaskError::new(what, why).with_hint("Start the program again."))
     }
 }
@@ -128,11 +128,9 @@ pub struct FoundBundles {
     pub problems: Vec<Problem>,
 }
 
-/// The bundles that ship with the program, and those in `folders`.
+/// All bundles there are: those of the user, those in the program, and those in `folders`.
 pub fn find(folders: &[PathBuf]) -> FoundBundles {
-    let mut roots = bundle::default_roots();
-    roots.extend_from_slice(folders);
-    let found = bundle::find(&roots);
+    let found = bundle::find_all(folders);
     FoundBundles { bundles: found.bundles.iter().map(BundleInfo::of).collect(), problems: found.problems }
 }
 

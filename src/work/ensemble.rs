@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::error::TaskError;
 use super::imprint::chain;
-use super::models::Prediction;
+use super::prediction::Prediction;
 use crate::domain::ensemble::{Spread, channel_spread};
 use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::postprocess::{DepthChain, ShiftMode};

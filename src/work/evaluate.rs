@@ -8,7 +8,6 @@ mod methods;
 mod tool;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::time::Instant;
 
 use serde::Serialize;
@@ -20,6 +19,7 @@ use crate::domain::findings::{Finding, Findings};
 use crate::domain::pose::Engine;
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::sample::Scale;
+use crate::infer::bundle::Origin;
 use crate::infer::engine::{EngineChoice, threads};
 use crate::io::dataset::Dataset;
 use crate::work::error::TaskError;
@@ -49,12 +49,12 @@ pub enum MaskBy {
 /// What to evaluate, and how.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setup {
-    /// Folders of generator bundles: a row each.
-    pub bundles: Vec<PathBuf>,
-    /// Folder of the mask model; without it there are no angles by [`MaskBy::Unet`].
-    pub mask_bundle: Option<PathBuf>,
-    /// Folder of the tool classifier; without it neither accuracy nor Fréchet distance.
-    pub classifier: Option<PathBuf>,
+    /// Generator bundles: a row each.
+    pub bundles: Vec<Origin>,
+    /// The mask model; without it there are no angles by [`MaskBy::Unet`].
+    pub mask_bundle: Option<Origin>,
+    /// The tool classifier; without it neither accuracy nor Fréchet distance.
+    pub classifier: Option<Origin>,
     /// Where the contact masks come from.
     pub mask: MaskBy,
     /// The registration.

@@ -1,7 +1,7 @@
 //! A decoder's picture to metres: [`imprint`].
 
 use super::error::TaskError;
-use super::models::{Chains, Prediction};
+use super::prediction::{Chains, Prediction};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{DepthChain, PostprocessError, RawPrediction, ShiftMode};
 use crate::domain::resample::{bilinear, bilinear_rgb};

@@ -3,7 +3,7 @@
 use super::compare::LAB_PEAK_M;
 use super::error::TaskError;
 use super::imprint::chain;
-use super::models::Prediction;
+use super::prediction::Prediction;
 use crate::domain::grid::DepthMap;
 use crate::domain::postprocess::{ChainReading, DepthChain, Ledger, Mapping, Shift, ShiftMode, ledger, readings};
 

@@ -11,10 +11,11 @@ use super::bundles::BundleInfo;
 use super::error::TaskError;
 use super::imprint::in_metres;
 use super::job::{JobCx, PreviewPicture};
+use super::prediction::{Chains, Prediction};
 use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GenerateConfig, Progress};
 use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::postprocess::{ColorChain, DepthChain, RawPrediction, ShiftMode};
+use crate::domain::postprocess::{ColorChain, RawPrediction, ShiftMode};
 use crate::infer::bundle::GeneratorSpec;
 use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
@@ -24,28 +25,6 @@ use crate::infer::store::Store;
 
 /// Predictions of one touch that are read back; older ones stay on the disk.
 const LISTED: usize = 16;
-
-/// Per range mapping the steps to metres, or why it cannot be done.
-pub type Chains = Arc<BTreeMap<ShiftMode, Result<DepthChain, String>>>;
-
-/// A prediction: the decoder's picture, with the ways to metres.
-#[derive(Clone, Debug)]
-pub struct Prediction {
-    /// The decoder's picture.
-    pub raw: RawPrediction,
-    /// The ways to metres that its bundle offers.
-    pub chains: Chains,
-    /// The steps to a color sensor's picture; `None` where it is depth that was predicted.
-    pub color: Option<ColorChain>,
-    /// The identity of the generator's bundle.
-    pub bundle: Arc<str>,
-    /// The engine that made it, for people.
-    pub engine: String,
-    /// Time that making it took, seconds; what was made together shares its time.
-    pub seconds: f64,
-    /// Whether it was made earlier and only read now.
-    pub kept: bool,
-}
 
 /// A prediction to be made.
 #[derive(Clone, Copy, Debug)]

@@ -24,12 +24,14 @@ use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch::domain::sim;
+use touch2touch::infer::bundle::Origin;
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::job::JobCx;
-use touch2touch::work::models::{Prediction, Wanted};
 use touch2touch::infer::bundle::SensorPair;
+use touch2touch::work::models::Wanted;
+use touch2touch::work::prediction::Prediction;
 
 /// `[width, height]` of the imprints of [`Source`].
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];
@@ -245,7 +247,7 @@ impl Services for Double {
             id: id.into(),
             name: id.into(),
             kind,
-            folder: PathBuf::from(id),
+            origin: Origin::Folder(id.into()),
             generator: (kind == BundleKind::Generator).then(|| GeneratorInfo {
                 defaults: GenerateConfig { steps: 20, ..GenerateConfig::default() },
                 training_steps: 1000,

@@ -1,6 +1,5 @@
 //! Which predictions are made, what is shown on the way, and what is found again.
 
-use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
@@ -12,19 +11,21 @@ use touch2touch::app::settings::GenerateSettings;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::DepthMap;
 use touch2touch::domain::rig::{PadId, lab};
-use touch2touch::infer::bundle::SensorPair;
+use touch2touch::infer::bundle::{Origin, SensorPair};
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
+use touch2touch::app::jobs::Onlooker;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
-use touch2touch::work::job::{Cancel, JobCx};
-use touch2touch::work::models::Prediction;
+use touch2touch::work::job::{JobCx, PreviewPicture};
+use touch2touch::work::prediction::Prediction;
 
 const RIGHT: PadId = lab::RIGHT;
 const LEFT: PadId = lab::LEFT;
 
 fn preview(recipe: &PredictionKey, step: u32) -> Arc<Preview> {
-    Arc::new(Preview { recipe: recipe.clone(), step, of: recipe.steps, depth: DepthMap::filled(4, 3, 0.001) })
+    let picture = PreviewPicture { step, of: recipe.steps, depth: DepthMap::filled(4, 3, 0.001) };
+    Arc::new(Preview { recipe: recipe.clone(), picture })
 }
 
 #[test]
@@ -68,57 +69,21 @@ fn previews_are_wanted_where_somebody_looks_and_end_with_the_result() {
     assert!(bench.state.preview_wish().touches.is_empty(), "no predicted imprint is on screen");
     bench.send(panes(&[Pane::Predicted]));
     let touch = bench.state.touch_key(RIGHT).unwrap();
-    let wish = bench.state.preview_wish();
-    assert_eq!(wish.touches, BTreeSet::from([touch]));
-    let after: Vec<u32> = (1..=10).filter(|step| wish.wants(touch, *step)).collect();
-    assert_eq!(after, [1, 4, 8]);
-    assert!(!wish.wants(touch.pair.finger(LEFT), 4));
-    let never = GenerateSettings { preview_every: 0, ..bench.state.settings.generate.clone() };
-    bench.send(Command::SetGenerate(never));
-    assert!(!bench.state.preview_wish().wants(touch, 1));
-
-    bench.send(Command::Generate);
-    let (&ticket, task) = bench.state.tasks.running.iter().next().unwrap();
-    let recipe = task.recipes[0].clone();
-    bench.send(Command::Previewed(ticket, preview(&recipe, 4)));
-    assert_eq!(bench.state.preview(RIGHT).unwrap().step, 4);
-    assert!(bench.state.preview(LEFT).is_none());
-    bench.settle();
-    assert!(bench.state.preview(RIGHT).is_none() && bench.state.chosen(RIGHT) == Some(&recipe));
-    // One that comes after its result is too late.
-    bench.send(Command::Previewed(ticket, preview(&recipe, 8)));
-    assert!(bench.state.preview(RIGHT).is_none());
-    // With Cancel it goes at once, and none comes after it.
-    bench.send(Command::GenerateNewSeed);
-    let (&ticket, task) = bench.state.tasks.running.iter().next().unwrap();
-    let recipe = task.recipes[0].clone();
-    bench.send(Command::Previewed(ticket, preview(&recipe, 1)));
-    assert!(bench.state.preview(RIGHT).is_some());
-    bench.send(Command::CancelAll);
-    bench.send(Command::Previewed(ticket, preview(&recipe, 2)));
-    bench.tick();
-    assert!(bench.state.preview(RIGHT).is_none() && bench.state.tasks.running.is_empty());
-}
-
-#[test]
-fn a_job_sees_at_once_that_nobody_looks_any_more() {
-    let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Predicted]));
-    bench.settle();
-    let touch = bench.state.touch_key(RIGHT).unwrap();
     let wish = Arc::new(Mutex::new(bench.state.preview_wish()));
     let shown: Arc<Mutex<Vec<u32>>> = Arc::default();
-    let sink = shown.clone();
-    let cx = JobCx::new(Cancel::default(), Arc::new(|_| {}))
-        .with_previews(wish.clone(), Arc::new(move |p: Preview| sink.lock().unwrap().push(p.step)));
-    assert!(cx.wants_preview(touch, 1).is_some() && cx.wants_preview(touch, 2).is_none());
+    let seen = shown.clone();
+    let sink = Arc::new(move |p: Preview| seen.lock().unwrap().push(p.picture.step));
     let recipe = bench.state.recipe(touch).unwrap();
-    cx.preview((*preview(&recipe, 1)).clone());
+    let onlooker = Onlooker { wish: wish.clone(), sink };
+    let cx = JobCx::unwatched().with_previews(onlooker.of(vec![recipe.clone()]));
+    let previews = cx.previews().unwrap();
+    assert!(previews.wants(0, 1).is_some() && previews.wants(0, 2).is_none() && previews.wants(1, 1).is_none());
+    previews.show(0, preview(&recipe, 1).picture.clone());
     bench.send(panes(&[Pane::Log]));
     *wish.lock().unwrap() = bench.state.preview_wish();
-    assert!(cx.wants_preview(touch, 4).is_none());
+    assert!(previews.wants(0, 4).is_none());
     assert_eq!(*shown.lock().unwrap(), [1]);
-    assert!(JobCx::unwatched().wants_preview(touch, 1).is_none());
+    assert!(JobCx::unwatched().previews().is_none());
 }
 
 #[test]
@@ -181,7 +146,7 @@ fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
         id: "x".into(),
         name: "x".into(),
         kind: BundleKind::Generator,
-        folder: "x".into(),
+        origin: Origin::Folder("x".into()),
         generator: Some(GeneratorInfo {
             defaults,
             training_steps: 1000,

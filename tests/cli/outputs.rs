@@ -84,9 +84,9 @@ fn a_killed_run_is_known_by_its_report_and_its_leftovers_go() {
         ["generate", "demo", "--out", out_text, "--bundle", bundle, "--runtime", "rten", "--no-cache", "--limit", limit]
             .map(str::to_owned)
     };
-    let words = |limit| args(limit).iter().map(String::as_str).collect::<Vec<_>>().join("\n");
-    let first = words("1");
-    let done = run(&first.split('\n').collect::<Vec<_>>(), dir.path());
+    let first = args("1");
+    let first: Vec<&str> = first.iter().map(String::as_str).collect();
+    let done = run(&first, dir.path());
     assert!(done.status.success(), "{}", error_text(&done));
     let report = || -> Value { serde_json::from_slice(&std::fs::read(out.join("generate.json")).unwrap()).unwrap() };
     assert_eq!(report()["finished"], true);
@@ -107,7 +107,7 @@ fn a_killed_run_is_known_by_its_report_and_its_leftovers_go() {
     assert_eq!(report()["finished"], false, "the images are newer than the last report");
     // Half a file, as a run killed in the middle of a write leaves it.
     std::fs::write(out.join(".tmp-killed.part"), "half").unwrap();
-    let again = run(&first.split('\n').collect::<Vec<_>>(), dir.path());
+    let again = run(&first, dir.path());
     assert!(again.status.success(), "{}", error_text(&again));
     assert_eq!((&report()["finished"], ending(&out, ".part").len()), (&Value::from(true), 0));
 }

@@ -139,7 +139,7 @@ pub(super) fn bubble() -> Vec<Seed> {
     let image = [2, 1, 140, 175];
     let whole: Vec<(&str, PtItem)> = vec![
         ("bubble_imprint", zeros(&image)),
-        ("bubble_depth_ref", zeros(&image)),
+        ("bubble_depth_ref", Tensor::f32(&image, vec![0.09; 2 * 140 * 175]).into()),
         ("K", Tensor::f64(&[2, 3, 3], [212.0, 0.0, 112.0, 0.0, 211.0, 86.0, 0.0, 0.0, 1.0].repeat(2)).into()),
         ("bubbles_tr_quat", Tensor::f64(&[2, 7], [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0].repeat(2)).into()),
         ("grasp_frame_quat", Tensor::f64(&[1, 7], vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]).into()),

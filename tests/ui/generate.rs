@@ -23,7 +23,7 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     rig.shoot("generate-preview");
     let state = rig.harness.state().state();
     assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_none());
-    assert_eq!(state.preview(lab::RIGHT).unwrap().step, 4);
+    assert_eq!(state.preview(lab::RIGHT).unwrap().picture.step, 4);
     gate.open();
     rig.until("the result", |state| state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
     for _ in 0..3 {

@@ -20,6 +20,7 @@ use touch2touch::domain::postprocess::{
 use touch2touch::domain::resample::Resampling;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
+use touch2touch::infer::bundle::Origin;
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::infer::bundle::SensorPair;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
@@ -29,7 +30,8 @@ use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::imprint::in_metres;
 use touch2touch::work::job::{JobCx, PreviewPicture};
-use touch2touch::work::models::{Prediction, Wanted};
+use touch2touch::work::models::Wanted;
+use touch2touch::work::prediction::Prediction;
 
 /// The program's services with a generator that answers at once.
 struct QuickGenerator {
@@ -85,7 +87,7 @@ impl Services for QuickGenerator {
             id: "quick".into(),
             name: "quick double".into(),
             kind: BundleKind::Generator,
-            folder: PathBuf::new(),
+            origin: Origin::Folder(PathBuf::new()),
             generator: Some(GeneratorInfo {
                 defaults: GenerateConfig { steps: 4, ..GenerateConfig::default() },
                 training_steps: 1000,

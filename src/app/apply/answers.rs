@@ -19,8 +19,8 @@ use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
 use crate::work::bundles::BundleKind;
 use crate::work::error::{TaskError, TaskErrorKind};
-use crate::work::models::Prediction;
 use crate::domain::rig::PerPad;
+use crate::work::prediction::Prediction;
 
 pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
     match command {

@@ -13,7 +13,8 @@ use crate::domain::sample::Sample;
 use crate::work::bundles::BundleInfo;
 use crate::work::error::TaskError;
 use crate::work::job::JobCx;
-use crate::work::models::{Prediction, Wanted};
+use crate::work::models::Wanted;
+use crate::work::prediction::Prediction;
 
 /// Predictions with their keys.
 pub type Keyed = Vec<(PredictionKey, Arc<Prediction>)>;

@@ -30,7 +30,8 @@ use crate::work::error::TaskError;
 use crate::work::export::{ExportSetup, HandMasks, export_masks};
 use crate::work::job::JobCx;
 use crate::work::labels::Labels;
-use crate::work::models::{KeptPrediction, Models, Prediction, Wanted};
+use crate::work::models::{KeptPrediction, Models, Wanted};
+use crate::work::prediction::Prediction;
 
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";

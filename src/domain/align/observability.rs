@@ -7,6 +7,7 @@ use super::field::batch::{Cloud, State};
 use super::{ANGLE_SCALE_M, DistanceField};
 use crate::domain::frames::PlanarPose;
 use crate::domain::linear::eigen_symmetric;
+use crate::domain::units::fixed;
 
 /// Smallest eigenvalue below which a pose counts as not determined.
 ///
@@ -46,7 +47,7 @@ impl Observability {
             // One of the two opposite signs, always the same one.
             let sign = if z < 0.0 || (z == 0.0 && y < 0.0) { -1.0 } else { 1.0 };
             let along = DVec2::new(y, z) * (sign / y.hypot(z));
-            format!("slides along (y {:.2}, z {:.2})", along.x, along.y)
+            format!("slides along (y {}, z {})", fixed(along.x, 2), fixed(along.y, 2))
         }
     }
 

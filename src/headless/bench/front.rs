@@ -60,7 +60,7 @@ const OURS: RGBColor = RGBColor(28, 100, 200);
 const PEER: RGBColor = RGBColor(205, 95, 20);
 const FRONT: RGBColor = RGBColor(60, 150, 90);
 /// Height of the letters.
-const LETTERS: f64 = 13.5;
+const LETTERS: f64 = 16.0;
 
 /// What stands around the picture.
 pub(super) struct Axis<'a> {
@@ -97,7 +97,7 @@ impl Picture<'_> {
 
     /// The title and what the colors and marks mean, above the plot.
     fn heading<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
-        paper.text([80.0, 16.0], &paper.letters(16.0, INK), self.axis.title)?;
+        paper.text([80.0, 16.0], &paper.letters(19.0, INK), self.axis.title)?;
         let style = paper.letters(LETTERS, MUTED).pos(Pos::new(HPos::Left, VPos::Center));
         let mut x = paper.px(80.0);
         let marks = self.axis.legend.iter().map(|(color, text)| (Some(color), *text));
@@ -119,22 +119,26 @@ impl Drawing for Picture<'_> {
     fn draw<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
         self.heading(paper)?;
         let ([low, high], most) = self.ends();
-        let [left, right] = [low, high].map(|decade| 10f64.powf(decade));
+        // A little before the first decade, so that rounding does not take its number away.
+        let [left, right] = [low - 1e-6, high].map(|decade| 10f64.powf(decade));
         let mut chart = ChartBuilder::on(paper.area)
             .margin_top(paper.px(70.0))
+            .margin_left(paper.px(10.0))
             .margin_right(paper.px(30.0))
             .margin_bottom(paper.px(10.0))
             .x_label_area_size(paper.px(60.0))
-            .y_label_area_size(paper.px(80.0))
+            .y_label_area_size(paper.px(70.0))
             .build_cartesian_2d((left..right).log_scale(), 0.0..most)?;
         chart
             .configure_mesh()
             .bold_line_style(paper.stroke(FAINT, 1.0))
             .light_line_style(paper.stroke(FAINT, 0.4))
-            .max_light_lines(10)
+            .x_max_light_lines(10)
+            .y_max_light_lines(1)
+            .y_labels(8)
             .axis_style(paper.stroke(INK, 1.5))
             .label_style(paper.letters(LETTERS, INK))
-            .axis_desc_style(paper.letters(15.0, INK))
+            .axis_desc_style(paper.letters(18.0, INK))
             .x_desc(self.axis.time)
             .y_desc("error")
             .x_label_formatter(&|ms| format!("{ms}"))
@@ -213,7 +217,7 @@ impl Labels {
     fn place(&mut self, [w, h]: [i32; 2], point: (i32, i32)) -> [i32; 4] {
         let (gap, step) = (13 * self.unit, 16 * self.unit);
         let mut places = (0..14).flat_map(|i: i32| {
-            let top = point.1 - h / 2 + step * (i + 1) / 2 * if i % 2 == 1 { -1 } else { 1 };
+            let top = point.1 - h / 2 + step * ((i + 1) / 2) * if i % 2 == 1 { -1 } else { 1 };
             [point.0 + gap, point.0 - gap - w].map(|left| [left, top, left + w, top + h])
         });
         let first = [point.0 + gap, point.1 - h / 2, point.0 + gap + w, point.1 - h / 2 + h];
@@ -263,6 +267,7 @@ mod tests {
             super::super::canvas::svg(&Picture { axis, points, default: "one" }).unwrap()
         };
         let svg = text(&pareto(vec![point("one", 0.1, 0.7), point("two", 200.0, 5.0)]));
+        assert_eq!(labels.place([50, 12], (100, 100))[1], 94, "beside its point, where nothing is in the way");
         assert!(svg.contains("one (default)") && svg.contains("\ntwo\n") && svg.contains("1.0 mm"), "{svg}");
         // No engine at all is a picture, too.
         assert!(text(&[]).contains("</svg>"));

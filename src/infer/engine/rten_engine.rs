@@ -1,5 +1,6 @@
 //! rten behind [`Session`].
 
+use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
 use rten::{Model, RunOptions, ThreadPool, Value, ValueOrView, ValueView};
@@ -17,9 +18,12 @@ pub(super) struct RtenSession {
     model: Model,
 }
 
-pub(super) fn load(bytes: Vec<u8>) -> Result<RtenSession, String> {
-    let model = Model::load(bytes).map_err(|err| err.to_string())?;
-    Ok(RtenSession { model })
+pub(super) fn load(bytes: Cow<'static, [u8]>) -> Result<RtenSession, String> {
+    let model = match bytes {
+        Cow::Borrowed(bytes) => Model::load_static_slice(bytes),
+        Cow::Owned(bytes) => Model::load(bytes),
+    };
+    Ok(RtenSession { model: model.map_err(|err| err.to_string())? })
 }
 
 impl Session for RtenSession {

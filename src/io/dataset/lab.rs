@@ -18,6 +18,8 @@ use std::path::{Path, PathBuf};
 use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
 use crate::domain::sample::DepthCamera;
 use crate::domain::rig::{PerPad, Rig};
+use crate::io::caught::caught;
+use crate::io::pt::read_dict;
 
 use super::{LoadError, Loaded, Scan, Source, SourceKind, is_output, last_integer, problem, same_name};
 
@@ -155,8 +157,11 @@ pub(super) fn scan_flat(folder: &Path) -> Option<Scan> {
     let scan = scan_flat_again(folder)?;
     let Source::Lab(lab) = &scan.source else { return None };
     let files = lab.pairs.iter().filter_map(|pair| pair.gelslim.as_ref());
-    let is_touch =
-        |file: &FileRef| super::super::pt::read_dict(&lab.path(file)).map_or(true, |dict| dict.has("gelslim"));
+    // What cannot be read, or makes the reader fail, may be a touch that is still being written.
+    let is_touch = |file: &FileRef| {
+        let read = caught(|| read_dict(&lab.path(file)));
+        read.map_or(true, |read| read.map_or(true, |dict| dict.has("gelslim")))
+    };
     files.take(MOST_TRIED).any(is_touch).then_some(scan)
 }
 

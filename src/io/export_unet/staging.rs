@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use crate::io::atomic;
+use crate::io::{atomic, files};
 
 /// How the folder's name begins.
 const PREFIX: &str = ".touch2touch-export-";
@@ -66,7 +66,7 @@ pub(super) fn sweep(parent: &Path) {
         if !abandoned {
             continue;
         }
-        if let Ok(name) = std::fs::read_to_string(&lock)
+        if let Ok(name) = files::read_to_string(&lock, files::SMALL)
             && let target = parent.join(name)
             && target.parent() == Some(parent)
             && old.is_dir()

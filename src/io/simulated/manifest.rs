@@ -1,7 +1,6 @@
 //! What a simulated dataset says about itself: that it was begun, what was asked for, and, last of all, that it is whole.
 
 use std::collections::BTreeMap;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -11,7 +10,7 @@ use super::{Layout, WriteError, make_parent, write_models, write_pair, write_spl
 use crate::domain::dataset::Problem;
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
-use crate::io::atomic;
+use crate::io::{atomic, files};
 
 /// The manifest's name, in the root of the dataset.
 pub const MANIFEST: &str = "simulated.json";
@@ -131,11 +130,7 @@ impl Layout {
 fn read(root: &Path) -> Option<Manifest> {
     let file = root.join(MANIFEST);
     // A pipe or a device of that name must not hold anybody up.
-    if !std::fs::metadata(&file).ok()?.is_file() {
-        return None;
-    }
-    let mut text = Vec::new();
-    std::fs::File::open(&file).ok()?.take(MOST_BYTES).read_to_end(&mut text).ok()?;
+    let text = files::read(&file, MOST_BYTES).ok()?;
     let manifest: Manifest = serde_json::from_slice(&text).ok()?;
     (manifest.format == FORMAT && manifest.version == VERSION).then_some(manifest)
 }

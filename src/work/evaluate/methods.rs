@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::time::Instant;
 
 use super::load::Case;
@@ -16,7 +15,7 @@ use crate::domain::resample::{bilinear, bilinear_rgb};
 use crate::domain::rig::{PadId, PerPad, SensorId, SensorKind};
 use crate::domain::sample::Scale;
 use crate::domain::upright::Turn;
-use crate::infer::bundle::Bundle;
+use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::generator::{GenerateError, Generator};
 use crate::infer::mask::MaskModel;
@@ -68,11 +67,11 @@ pub(super) struct Models {
 }
 
 fn open<T, E: std::error::Error>(
-    folder: &Path,
+    origin: &Origin,
     load: impl FnOnce(&Bundle) -> Result<T, E>,
 ) -> Result<(T, String), TaskError> {
-    let what = format!("{WHAT}: {}", folder.display());
-    let bundle = Bundle::open(folder).map_err(|err| TaskError::from_error(&what, &err))?;
+    let what = format!("{WHAT}: {origin}");
+    let bundle = Bundle::open(origin).map_err(|err| TaskError::from_error(&what, &err))?;
     let model = load(&bundle).map_err(|err| TaskError::from_error(&what, &err))?;
     Ok((model, bundle.name().to_owned()))
 }
@@ -87,8 +86,8 @@ impl Models {
         }
         let mut engine = String::new();
         let mut names: Vec<String> = Vec::new();
-        for folder in &setup.bundles {
-            let (generator, name) = open(folder, |bundle| Generator::open(bundle, setup.runtime))?;
+        for origin in &setup.bundles {
+            let (generator, name) = open(origin, |bundle| Generator::open(bundle, setup.runtime))?;
             let ends = generator.spec().sensors().ends(&name, &dataset.rig);
             let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
             let defaults = generator.spec().defaults;
@@ -100,8 +99,7 @@ impl Models {
             };
             engine = generator.engine().label().to_owned();
             // Two runs of one trainer have the same name: their folders tell them apart.
-            let folder = folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-            let name = if names.contains(&name) { format!("{name} ({folder})") } else { name };
+            let name = if names.contains(&name) { format!("{name} ({})", origin.short_name()) } else { name };
             names.push(name.clone());
             methods.push(Method::Generator(Box::new(GeneratorMethod { name, generator, config, input })));
         }
@@ -110,13 +108,13 @@ impl Models {
             methods.push(Method::Stored);
         }
         let mask = match (&setup.mask_bundle, setup.mask) {
-            (Some(folder), MaskBy::Unet) if !pictures => {
-                Some(open(folder, |bundle| MaskModel::open(bundle, setup.runtime))?.0)
+            (Some(origin), MaskBy::Unet) if !pictures => {
+                Some(open(origin, |bundle| MaskModel::open(bundle, setup.runtime))?.0)
             }
             _ => None,
         };
         let classifier = match &setup.classifier {
-            Some(folder) if !pictures => Some(open(folder, |bundle| ToolClassifier::open(bundle, setup.runtime))?.0),
+            Some(origin) if !pictures => Some(open(origin, |bundle| ToolClassifier::open(bundle, setup.runtime))?.0),
             _ => None,
         };
         if engine.is_empty() {

@@ -1,0 +1,28 @@
+//! [`Prediction`]: what a generator made of a touch.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::domain::postprocess::{ColorChain, DepthChain, RawPrediction, ShiftMode};
+
+/// Per range mapping the steps to metres, or why it cannot be done.
+pub type Chains = Arc<BTreeMap<ShiftMode, Result<DepthChain, String>>>;
+
+/// A prediction: the decoder's picture, with the ways to metres.
+#[derive(Clone, Debug)]
+pub struct Prediction {
+    /// The decoder's picture.
+    pub raw: RawPrediction,
+    /// The ways to metres that its bundle offers.
+    pub chains: Chains,
+    /// The steps to a color sensor's picture; `None` where it is depth that was predicted.
+    pub color: Option<ColorChain>,
+    /// The identity of the generator's bundle.
+    pub bundle: Arc<str>,
+    /// The engine that made it, for people.
+    pub engine: String,
+    /// Time that making it took, seconds; what was made together shares its time.
+    pub seconds: f64,
+    /// Whether it was made earlier and only read now.
+    pub kept: bool,
+}
