@@ -15,7 +15,7 @@ use super::prediction::{Chains, Prediction};
 use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GenerateConfig, Progress};
 use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::postprocess::{DepthChain, RawPrediction, ShiftMode};
+use crate::domain::postprocess::{RawPrediction, ShiftMode};
 use crate::domain::sensor::gelslim;
 use crate::infer::bundle::GeneratorSpec;
 use crate::infer::engine::{EngineChoice, EngineKind, resolve};
