@@ -22,7 +22,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use super::bundle::contract::promised;
-use super::bundle::{Bundle, TimestepType, sha256};
+use super::bundle::{Bundle, Origin, TimestepType, sha256};
 use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, build, resolve};
 use crate::domain::diffusion::{ModelError, Tensor};
 use watch::{End, Limits, Seen};
