@@ -248,9 +248,7 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     let listed = again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a);
     assert_eq!(listed.iter().map(|(key, _)| key.clone()).collect::<Vec<_>>(), [recipe(lab::RIGHT, 1)]);
     // The same pair and finger with another image (another data set of the same names) is another touch.
-    assert!(
-        again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &image(2.0)).is_empty()
-    );
+    assert!(again.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &image(2.0)).is_empty());
     let another = image(2.0);
     let other = again.predict(&info, EngineChoice::Rten, &config(), &[item(1, &another)], &cx).unwrap();
     assert!(!other[0].kept && other[0].raw != made[0].raw);

@@ -189,8 +189,7 @@ fn error_by_depth(dataset: &Dataset, id: PairId, share: Option<f32>) -> (f64, us
         Some(found.mask)
     };
     let masks: PerPad<Mask> = sample.rig.pads().map(mask).collect();
-    let pose =
-        estimate(&fingers_of(&sample, &masks.as_ref()), &tool, Engine::DistanceField, false);
+    let pose = estimate(&fingers_of(&sample, &masks.as_ref()), &tool, Engine::DistanceField, false);
     let truth = sample.grasp_from_object.unwrap().inverse().theta_rad;
     pose.map_or((f64::NAN, 0), |pose| {
         (angle_error(pose.object_from_grasp.theta_rad, truth).to_degrees(), pose.cloud.points.len())
@@ -211,8 +210,7 @@ fn depth_stands_in_where_the_mask_model_finds_nothing() {
         if std::env::var_os("TOUCH2TOUCH_SHARES").is_some() {
             for id in &ids {
                 let sample = dataset.load(*id).unwrap();
-                let rises =
-                    lab::PADS.map(|f| rest_and_top(&sample.pad(f).unwrap().depth().unwrap().imprint));
+                let rises = lab::PADS.map(|f| rest_and_top(&sample.pad(f).unwrap().depth().unwrap().imprint));
                 eprintln!("{name} {id:?}: rest and top {rises:?}");
             }
             for share in [0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9] {

@@ -7,8 +7,8 @@ use super::jobs::PreviewWish;
 use super::keys::{ImprintSource, PredictionKey, TouchKey};
 use super::results::Preview;
 use super::state::State;
-use crate::work::bundles::BundleKind;
 use crate::domain::rig::PadId;
+use crate::work::bundles::BundleKind;
 
 impl State {
     /// The recipe that the settings give a touch; `None` without a generator.

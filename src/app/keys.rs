@@ -12,8 +12,8 @@ use crate::domain::align::basin::Plane;
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::frames::PlanarPose;
-use crate::infer::engine::EngineChoice;
 use crate::domain::rig::{PadId, PerPad};
+use crate::infer::engine::EngineChoice;
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]

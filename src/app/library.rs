@@ -12,9 +12,9 @@ use super::document::Review;
 use super::keys::{DatasetSeq, PairKey};
 use super::services::DataSource;
 use crate::domain::dataset::{Index, PairEntry, PairId};
+use crate::domain::rig::Rig;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
-use crate::domain::rig::Rig;
 
 /// What can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -5,9 +5,9 @@ use super::keys::{CloudKey, EnsembleKey, ImprintKey, MaskKey, MaskVersion, PoseK
 use super::state::{Absent, Lookup, State};
 use crate::domain::ensemble::seeds;
 use crate::domain::grid::DepthMap;
+use crate::domain::rig::{PadId, PerPad};
 use crate::work::ensemble::Ensemble;
 use crate::work::pose::PoseResult;
-use crate::domain::rig::{PadId, PerPad};
 
 /// Fewest and most seeds of an ensemble.
 pub const COUNT: std::ops::RangeInclusive<usize> = 2..=16;

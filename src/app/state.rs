@@ -19,8 +19,8 @@ use super::settings::Settings;
 use super::tasks::{Log, Tasks};
 use super::workbench::Workbench;
 use crate::domain::dataset::{PairEntry, PairId};
-use crate::work::error::TaskError;
 use crate::domain::rig::{PadId, Rig, Text};
+use crate::work::error::TaskError;
 
 /// Everything the studio shows.
 #[derive(Debug, Default)]

@@ -10,9 +10,9 @@ use super::keys::{ImprintSource, PairKey, PoseKey, Request, RunKey};
 use super::state::{Lookup, State};
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::{AcceptedPose, HandAxis, HandCost, HandPose, PoseDifference};
+use crate::domain::rig::{PadId, PerPad, Rig};
 use crate::work::layers::LayerResult;
 use crate::work::pose::PoseResult;
-use crate::domain::rig::{PadId, PerPad, Rig};
 
 /// What colours the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]

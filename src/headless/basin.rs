@@ -109,11 +109,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let tool = pose::tool_model(&dataset, name)?;
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let predicted = args.imprint == Imprint::Predicted;
-    let imprints = if predicted {
-        predictor.imprints(&sample, &JobCx::unwatched())?
-    } else {
-        pose::measured(&sample)
-    };
+    let imprints = if predicted { predictor.imprints(&sample, &JobCx::unwatched())? } else { pose::measured(&sample) };
     let mut notes = Notes::default();
     notes.take(&output, &sample.notes);
     let FingerMasks { masks, made_of, notes: mask_notes } =

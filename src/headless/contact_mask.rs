@@ -93,7 +93,8 @@ impl FingerMasks {
         let mut keys: Vec<&'static str> = found.iter().flatten().map(|m| m.basis.key(source.key())).collect();
         keys.dedup();
         let made_of = if keys.is_empty() { source.key().to_owned() } else { keys.join(", ") };
-        let note = |(f, found): (PadId, &ContactMask)| Some(format!("{} finger: {}", rig.pad_key(f), found.basis.note()?));
+        let note =
+            |(f, found): (PadId, &ContactMask)| Some(format!("{} finger: {}", rig.pad_key(f), found.basis.note()?));
         let notes = found.entries().filter_map(note).collect();
         Self { masks: found.map(|m| m.map(|m| m.mask)), made_of, notes }
     }

@@ -6,8 +6,8 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::args::DatasetArgs;
-use super::notes::Notes;
 use super::generate::FingerArg;
+use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, ambiguity};

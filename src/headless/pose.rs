@@ -328,11 +328,8 @@ fn pose_cases(
     predictor: &mut Predictor,
 ) -> anyhow::Result<Vec<Case>> {
     let predicted = imprint == "predicted";
-    let imprints: PerPad<DepthMap> = if predicted {
-        predictor.imprints(sample, &JobCx::unwatched())?
-    } else {
-        measured(sample)
-    };
+    let imprints: PerPad<DepthMap> =
+        if predicted { predictor.imprints(sample, &JobCx::unwatched())? } else { measured(sample) };
     let FingerMasks { masks, made_of, notes } = masks(&args.mask, sample, tool, &imprints, predicted, predictor)?;
     let fingers = Fingers::new(&sample.rig, |f| {
         let camera = sample.pad(f)?.camera()?;

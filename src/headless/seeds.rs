@@ -12,7 +12,7 @@ use super::predict::Predictor;
 use crate::domain::contact::MaskBasis;
 use crate::domain::ensemble::{AngleFan, Spread, seeds};
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::pose::{estimate, Engine, FingerInput, Fingers, ToolModel};
+use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, estimate};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::domain::units::angle_error;

@@ -30,7 +30,7 @@ use super::stl::MeshError;
 pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
 pub use grow::{Growth, OUTPUT_MARK, RIG_FILE, cameras_of, is_output};
-pub use pictures::{assumed_metres, ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON};
+pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_metres};
 pub use tool_scale::{ToolFile, ToolScale, UNIT_FILE, read_in_metres, read_tool};
 
 /// Which kind of source a dataset is.

@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::error::TaskError;
 use crate::domain::cloud;
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::sample::{DepthCamera, Sample};
 use crate::domain::rig::{PadId, PerPad};
+use crate::domain::sample::{DepthCamera, Sample};
 
 /// The surface points of both fingers in the grasp frame.
 #[derive(Clone, Debug, Default)]

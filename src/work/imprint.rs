@@ -5,8 +5,8 @@ use super::prediction::{Chains, Prediction};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{DepthChain, PostprocessError, RawPrediction, ShiftMode};
 use crate::domain::resample::{bilinear, bilinear_rgb};
-use crate::domain::sample::{PadTouch, Sample};
 use crate::domain::rig::PadId;
+use crate::domain::sample::{PadTouch, Sample};
 
 /// Longest side of a thumbnail, pixels.
 const THUMBNAIL_PX: usize = 44;

@@ -25,11 +25,11 @@ use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch::domain::sim;
 use touch2touch::infer::bundle::Origin;
+use touch2touch::infer::bundle::SensorPair;
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::job::JobCx;
-use touch2touch::infer::bundle::SensorPair;
 use touch2touch::work::models::Wanted;
 use touch2touch::work::prediction::Prediction;
 

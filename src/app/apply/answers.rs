@@ -17,9 +17,9 @@ use super::{cancel_all, follow, inspect, is_selected, masks, preferences, refit,
 use crate::domain::contact::ContactMask;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
+use crate::domain::rig::PerPad;
 use crate::work::bundles::BundleKind;
 use crate::work::error::{TaskError, TaskErrorKind};
-use crate::domain::rig::PerPad;
 use crate::work::prediction::Prediction;
 
 pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {

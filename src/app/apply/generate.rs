@@ -4,9 +4,9 @@ use super::super::effect::Effect;
 use super::super::keys::PredictionKey;
 use super::super::state::{Absent, State};
 use super::save_settings;
+use crate::domain::rig::{PadId, Text};
 use crate::work::bundles::BundleKind;
 use crate::work::error::TaskError;
-use crate::domain::rig::{PadId, Text};
 
 /// Starts the predictions of the fingers that are looked at, in one go; one that exists is shown instead.
 pub(super) fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {

@@ -14,8 +14,8 @@ use super::{reorder, save_labels};
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{self, Patch};
-use crate::work::error::TaskError;
 use crate::domain::rig::PadId;
+use crate::work::error::TaskError;
 
 /// Whether the selected pair may be edited; says why not.
 pub(super) fn check_editable(state: &mut State, what: &str) -> bool {

@@ -292,9 +292,9 @@ mod tests {
     use crate::domain::frames::PlanarPose;
     use crate::domain::grid::Mask;
     use crate::domain::hand::{AcceptedPose, HandPose};
+    use crate::domain::rig::lab;
     use crate::io::masks::MaskStore;
     use crate::work::labels::{HandMask, Revision};
-    use crate::domain::rig::lab;
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {

@@ -4,8 +4,8 @@ use super::super::keys::{Request, TouchKey};
 use super::super::state::{Absent, Lookup, State};
 use super::Wanted;
 use crate::domain::ambiguity::Ambiguity;
-use crate::work::ledger::LedgerResult;
 use crate::domain::rig::PadId;
+use crate::work::ledger::LedgerResult;
 
 impl State {
     /// The depth chain of the prediction shown for one finger.

@@ -18,12 +18,12 @@ use super::figures::quantile;
 use super::front::{self, Axis, FrontPoint, Picture};
 use crate::domain::diffusion::{GenerateConfig, Sampler, Spacing};
 use crate::domain::metrics::AngleSummary;
+use crate::domain::rig::Rig;
 use crate::headless::{Common, Output, VerbResult};
 use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
 use crate::io::atomic;
-use crate::domain::rig::Rig;
 use crate::work::bundles::{self, BundleKind};
 
 /// What everything is measured against.
@@ -153,7 +153,8 @@ pub(super) fn run(args: &GeneratorArgs) -> VerbResult {
     let bundle = found.take(BundleKind::Generator, args.bundle.as_deref(), &Rig::lab())?.open("Open the generator")?;
     let spec = bundle.generator().ok_or_else(|| anyhow::anyhow!("{} is not a generator", bundle.name()))?;
     let (defaults, training_steps) = (spec.defaults, spec.schedule.training_steps());
-    let mask_bundle = found.take(BundleKind::Mask, args.mask_bundle.as_deref(), &Rig::lab())?.open("Open the mask model")?;
+    let mask_bundle =
+        found.take(BundleKind::Mask, args.mask_bundle.as_deref(), &Rig::lab())?.open("Open the mask model")?;
     let engines = engines(args.engine)?;
     let machine = Machine::now();
     let configs = configs(args, defaults, training_steps);

@@ -8,9 +8,9 @@ use std::sync::{Arc, OnceLock};
 use super::lab::{self, FileRef, Lab};
 use super::{Dataset, LoadError, OpenError, SAME_NAME, Scan, Source, SourceKind, pictures, problem};
 use crate::domain::dataset::{PairId, Problem};
+use crate::domain::rig::PerPad;
 use crate::domain::sample::{DepthCamera, Sample};
 use crate::io::caught::caught;
-use crate::domain::rig::PerPad;
 
 /// What is in the name of every file that is written beside a touch; such files are never taken for touches.
 pub const OUTPUT_MARK: &str = ".t2t.";

@@ -16,8 +16,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
-use crate::domain::sample::DepthCamera;
 use crate::domain::rig::{PerPad, Rig};
+use crate::domain::sample::DepthCamera;
 use crate::io::caught::caught;
 use crate::io::pt::read_dict;
 

@@ -1,7 +1,7 @@
 //! The models of an evaluation, and what each method makes of a few touches.
 
-use std::collections::BTreeMap;
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Instant;
 

@@ -103,8 +103,7 @@ impl Tool {
                         _ => self.mask(setup.mask, &case.sample, f, imprint),
                     };
                     let finger = || case.sample.rig.pad_key(f);
-                    let found =
-                        found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
+                    let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
                     let ContactMask { mask, basis } = found.ok()?;
                     let why = match basis {
                         MaskBasis::Source => return Some(mask),

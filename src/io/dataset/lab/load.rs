@@ -137,7 +137,9 @@ fn bubble_touches(
             );
             notes.push(problem(dict.file(), what, "these pixels are left out of every cloud"));
         }
-        most_invalid(dict.file(), bad, pixels, || format!("pixels of the {} reference depth", Rig::lab().pad_key(finger)))?;
+        most_invalid(dict.file(), bad, pixels, || {
+            format!("pixels of the {} reference depth", Rig::lab().pad_key(finger))
+        })?;
         let camera = match (reference, cameras[index]) {
             (Some(depth_reference), Some((intrinsics, grasp_from_camera))) => {
                 Some(DepthCamera { depth_reference, intrinsics, crop: lab::BUBBLE.crop, grasp_from_camera })
@@ -255,7 +257,9 @@ fn gelslim_touches(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<[ColorTouc
                 (*a, *b) = (0.0, 0.0);
             }
         }
-        most_invalid(dict.file(), bad - before, half, || format!("values of the {} GelSlim image", Rig::lab().pad_key(finger)))?;
+        most_invalid(dict.file(), bad - before, half, || {
+            format!("values of the {} GelSlim image", Rig::lab().pad_key(finger))
+        })?;
     }
     if bad > 0 {
         let percent = 100.0 * bad as f64 / raw.len() as f64;
