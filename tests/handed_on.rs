@@ -30,7 +30,7 @@ fn json(output: &Output) -> Value {
 fn the_programs_own_bundles_are_those_that_ship_and_predict_the_same() {
     let demo = Dataset::open(Path::new("demo")).unwrap();
     let sample = demo.load(PairId(0)).unwrap();
-    let touch = sample.fingers[lab::RIGHT.index()].as_ref().unwrap();
+    let touch = sample.pad(lab::RIGHT).unwrap();
     let mut generators = 0;
     for origin in Origin::built_in() {
         let bundle = Bundle::open(&origin).unwrap();

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use touch2touch::app::command::{Command, Pane};
 use touch2touch::app::keys::{ImprintSource, ShiftMode};
-use touch2touch::app::library::{BundleKind, Place};
+use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
@@ -22,6 +22,7 @@ use touch2touch::infer::engine::EngineChoice;
 use touch2touch::infer::generator::Generator;
 use touch2touch::io::dataset::{Dataset, RIG_JSON};
 use touch2touch::io::images;
+use touch2touch::work::bundles::BundleKind;
 
 fn bundle(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name)
@@ -174,7 +175,7 @@ fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
     let generate = ["generate", "--input", &set, "--out", &out, "--runtime", "rten", "--json", "--bundle"];
     let found = report(&run(&[&generate[..], &[&tiny]].concat(), &home));
     assert_eq!(found["pairs"][0]["finger"], "thumb");
-    let depth: Grid<u16> = images::read_grey16(&Path::new(&out).join("a_thumb.png")).unwrap();
+    let depth: Grid<f32> = images::read_grey(&Path::new(&out).join("a_thumb.png")).unwrap();
     assert_eq!(depth.size(), [175, 140]);
     // A bundle for other sensors says so, and what would fit; without a name the fitting one is looked for.
     let lab = bundle("generator");

@@ -6,7 +6,7 @@ use touch2touch::app::evaluation::EvaluateCommand;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 
-use super::rig::Rig;
+use super::rig::{Rig, write_dataset};
 
 #[test]
 fn a_table_is_made_by_a_click_shown_and_exported() {

@@ -10,7 +10,7 @@ use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::workbench::{HandTry, Layer, PoseOf, SceneTool, WorkbenchCommand};
 use touch2touch::domain::align::reason::Reason;
 use touch2touch::domain::hand::{HandAxis, PoseDifference, STEP_M, STEP_RAD};
-use touch2touch::domain::rig::{PadId, lab};
+use touch2touch::domain::rig::lab;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::MaskStore;
 
@@ -272,10 +272,10 @@ fn layers_go_round_and_their_numbers_add_up() {
     let layers = rig.model().layers(MEASURED).ready().expect("the pane shows them");
     for finger in lab::PADS {
         let pixels = rig.model().imprint(MEASURED, finger).ready().unwrap().len();
-        assert_eq!(layers.counts[finger.index()].iter().sum::<usize>(), pixels, "a reason for every pixel");
+        assert_eq!(layers.counts[finger].unwrap().iter().sum::<usize>(), pixels, "a reason for every pixel");
         let mask = rig.model().mask_in_force(MEASURED, finger).unwrap().mask;
         let outside = mask.as_slice().iter().filter(|m| !**m).count();
-        assert_eq!(layers.counts[finger.index()][Reason::OutsideMask as usize], outside);
+        assert_eq!(layers.counts[finger].unwrap()[Reason::OutsideMask as usize], outside);
     }
     let contact = rig.model().cloud(MEASURED).ready().unwrap().contact_points().len();
     assert_eq!(layers.histogram.iter().sum::<u32>() as usize + layers.above as usize, contact);
