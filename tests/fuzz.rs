@@ -7,6 +7,7 @@
 //! * `FUZZ_SECONDS`: how long (30 if unset). Hours are fine.
 //! * `FUZZ_SEED`: another sequence of mutations (1 if unset).
 //! * `FUZZ_ONLY`: the name of one reader.
+#![allow(clippy::print_stdout, reason = "what was tried belongs in the log of the tests")]
 
 mod mutate;
 mod seeds;

@@ -73,7 +73,7 @@ impl State {
             classifier: origin(BundleKind::Classifier),
             engine: self.settings.pose_engine,
             shift: self.settings.shift,
-            runtime: self.settings.runtime.into(),
+            runtime: self.settings.runtime,
             grasps_per_tool: self.table.grasps_per_tool,
             ..Setup::default()
         })

@@ -9,6 +9,7 @@ const MOST_ROUNDS: usize = 10_000;
 /// Eigenvalues (ascending) and unit eigenvectors (as columns) of a symmetric matrix, whose lower triangle is read.
 ///
 /// `None` if an entry is not finite.
+#[allow(clippy::type_complexity, reason = "an alias would have to repeat the bounds")]
 pub(super) fn eigen_symmetric<D: DimSub<U1>>(m: OMatrix<f64, D, D>) -> Option<(OVector<f64, D>, OMatrix<f64, D, D>)>
 where
     DefaultAllocator: Allocator<D, D> + Allocator<D> + Allocator<DimDiff<D, U1>>,

@@ -191,7 +191,7 @@ fn refusal(bundle: &Bundle, engine: EngineKind, reason: impl Into<String>) -> Re
 /// What the second process said and how it ended, in words.
 fn judge(bundle: &Bundle, engine: EngineKind, seen: &Seen) -> Result<(), Refusal> {
     let lines = || seen.output.lines();
-    let at = lines().filter_map(|l| l.strip_prefix(AT)).last().unwrap_or("starting");
+    let at = lines().filter_map(|l| l.strip_prefix(AT)).next_back().unwrap_or("starting");
     let limit = format!("{:.1} GB", memory_limit(bundle) as f64 / 1e9);
     let reason = match &seen.end {
         End::Ended(status) if status.success() && lines().any(|l| l == TAKEN) => return Ok(()),

@@ -84,12 +84,12 @@ fn ways_of(spec: &GeneratorSpec) -> Ways {
 }
 
 /// The model of `key`, loaded by `load` if it is not there; the one used longest ago makes room before that.
-fn ready<'m, T>(
-    loaded: &'m mut Loaded<T>,
+fn ready<T>(
+    loaded: &mut Loaded<T>,
     key: (Arc<str>, EngineChoice),
     most: usize,
     load: impl FnOnce() -> Result<T, TaskError>,
-) -> Result<&'m mut T, TaskError> {
+) -> Result<&mut T, TaskError> {
     match loaded.iter().position(|(known, _)| *known == key) {
         Some(at) => {
             let used = loaded.remove(at);

@@ -170,6 +170,11 @@ fn every_command_of_the_texts_does_what_they_say() {
                 assert!(!line.contains("PATH") || script.contains("\"$@\""), "{place}: it passes no path on");
                 continue;
             }
+            if line == "cargo install --locked --path ." {
+                // What it would build is what every other test runs.
+                assert!(repository().join("Cargo.lock").is_file(), "{place}: nothing is locked");
+                continue;
+            }
             assert!(line.starts_with("touch2touch"), "{place}: what is it?");
             // What is optional is left out and only looked at.
             let whole = line.replace(['[', ']'], "");

@@ -212,7 +212,8 @@ fn stl_seeds() -> Vec<Seed> {
 }
 
 fn unit_seeds() -> Vec<Seed> {
-    let mut seeds: Vec<Seed> = ["m", "auto", "0.001", "mm\n"].map(|unit| good("a unit", text(unit))).into();
+    let mut seeds: Vec<Seed> = ["m", "auto", "1", "m\n"].map(|unit| good("a unit", text(unit))).into();
+    seeds.push(bad("another unit", text("0.001"), "no tool"));
     seeds.push(bad("no unit", text("furlong"), "no unit"));
     seeds.push(bad("a long text", text(&"m".repeat(10_000)), "at most"));
     seeds
