@@ -59,6 +59,7 @@ enum How {
 static TABLE: &[(&str, How)] = &[
     // The studio itself.
     ("touch2touch", How::Parse),
+    ("touch2touch --version", How::Run(&[], "", &[0])),
     ("touch2touch simulate", How::Run(&[("all", "pattern_36,pattern_31_rod"), ("46", "1")], "", &[0])),
     ("touch2touch generate", How::Run(&[], "--limit 1 --steps 1", &[0])),
     ("touch2touch watch", How::Run(&[], "--once --steps 1", &[0])),
