@@ -11,6 +11,7 @@ mod contact_mask;
 mod doctor;
 mod evaluate;
 mod generate;
+mod guard;
 mod ledger;
 mod masks;
 mod models;

@@ -4,14 +4,16 @@
 //! Layers only point downwards (see `ARCHITECTURE.md`):
 //!
 //! ```text
-//! main ─┬─> ui ──┬─> gpu ─────────┐
-//!       │        └─> app ─┬─> io ─┼─> domain
-//!       └─> headless ─────┴─> infer ┘
+//! main ─┬─> ui ──┬─> gpu ─────────────────┐
+//!       │        └─> app ─┐               │
+//!       │                 ├─> work ─> infer ─> io ─> domain
+//!       └─> headless ─────┘
 //! ```
 //!
 //! * [`domain`]: pure science, no files, threads, clocks or windows.
 //! * [`io`]: datasets, meshes, masks and every other file.
 //! * [`infer`]: model bundles and the engines that run them.
+//! * [`work`]: the job itself, from a touch to a pose and its figures, once for the studio and the command line.
 //! * [`app`]: the application model (state, commands, jobs), without a window.
 //! * `gpu`, `ui` (feature `gui`): the renderer and the studio.
 //! * [`headless`]: the command line, from the same code as the studio.

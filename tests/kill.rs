@@ -251,7 +251,7 @@ struct Said {
     confirmations: usize,
 }
 
-fn kill_one(folder: &Path, seed: u64, after: Duration) -> Said {
+fn kill_one(folder: &Path, seed: u64, acts: usize, after: Duration) -> Said {
     let mut child = Process::new(std::env::current_exe().unwrap())
         .args(["--exact", "kill::no_confirmed_stroke_is_lost_to_a_kill", "--nocapture", "--test-threads", "1"])
         .env(ROLE, format!("{} {seed}", folder.display()))
@@ -274,9 +274,9 @@ fn kill_one(folder: &Path, seed: u64, after: Duration) -> Said {
             _ => {}
         }
     };
-    // The clock runs from the first act: how long a program takes to start is not asked here.
-    while said.begun == 0 {
-        note(&mut said, &lines.next().expect("the child ended before its first act").unwrap());
+    // So far by acts, which a busy machine does not change, and only then by the clock: any moment of an act is hit.
+    while said.begun < acts {
+        note(&mut said, &lines.next().expect("the child ended before the act").unwrap());
     }
     std::thread::scope(|scope| {
         let reader = scope.spawn(|| {
@@ -348,9 +348,10 @@ fn no_confirmed_stroke_is_lost_to_a_kill() {
                     }
                     for round in 0..ROUNDS {
                         let seed = (series * ROUNDS + round) as u64;
-                        let after = ChaCha8Rng::seed_from_u64(seed + 1_000_000).random_range(0..150_000);
+                        let mut rng = ChaCha8Rng::seed_from_u64(seed + 1_000_000);
+                        let (acts, after) = (rng.random_range(1..16), rng.random_range(0..30_000));
                         let played = played(dir.path(), seed);
-                        let said = kill_one(dir.path(), seed, Duration::from_micros(after));
+                        let said = kill_one(dir.path(), seed, acts, Duration::from_micros(after));
                         let newer = compare(dir.path(), &played, &said);
                         let mut totals = totals.lock().unwrap();
                         *totals = (totals.0 + said.begun, totals.1 + said.confirmations, totals.2 + newer);
@@ -361,6 +362,6 @@ fn no_confirmed_stroke_is_lost_to_a_kill() {
     });
     let (acts, confirmations, newer) = *totals.lock().unwrap();
     eprintln!("{KILLS} kills, {acts} acts, {confirmations} confirmed saves, {newer} masks newer than confirmed");
-    // Kills that come before anything happens, or long after, would show nothing.
-    assert!(acts > 5 * KILLS && confirmations > 2 * KILLS && newer > 0);
+    // Kills that come before anything was saved would show nothing.
+    assert!(acts > 5 * KILLS && confirmations > KILLS / 2);
 }

@@ -153,7 +153,7 @@ pub trait Services: Send + Sync {
     }
 
     /// Runs the mask model on an imprint in metres; the mask says what it is made of in the end. Called on the same lane as
-    /// [`Self::generate`].
+    /// [`Self::predict`].
     ///
     /// # Errors
     /// If the model cannot be loaded or run.

@@ -8,6 +8,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::args::{DatasetArgs, LimitArgs};
+use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
 use super::predict::{ModelArgs, Predictor};
@@ -202,7 +203,8 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
         let id = PairId(id as u32);
         let name = dataset.index.pairs[id.0 as usize].name.clone();
         output.step(&name);
-        let done = dataset.load(id).map_err(anyhow::Error::from).and_then(|sample| {
+        let done = guarded(dataset.pair_files(id), || {
+            let sample = dataset.load(id)?;
             scale = sample.scale;
             notes.take(&output, &sample.notes);
             // An image folder has one finger, whichever it was.
@@ -254,6 +256,9 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             Ok(made) => pairs.extend(made),
             Err(err) => {
                 output.note(&format!("{name}: {}", says(&err)));
+                if err.is::<Bug>() {
+                    predictor.recover();
+                }
                 complete = false;
             }
         }

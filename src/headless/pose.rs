@@ -11,6 +11,7 @@ use strum::IntoEnumIterator as _;
 
 use super::args::{DatasetArgs, LimitArgs};
 use super::contact_mask::{FingerMasks, MaskArgs, MaskFrom, contact_mask};
+use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
 use super::predict::{ModelArgs, Predictor};
@@ -274,15 +275,11 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         });
         for &imprint in imprints {
             let accepted = reviewed.as_ref().and_then(|r| r.accepted[usize::from(imprint == "predicted")]);
-            match pose_cases(
-                args,
-                (&entry.name, stem.as_deref()),
-                &sample,
-                tool,
-                (imprint, accepted),
-                engines,
-                &mut predictor,
-            ) {
+            let work = || {
+                let pair = (entry.name.as_str(), stem.as_deref());
+                pose_cases(args, pair, &sample, tool, (imprint, accepted), engines, &mut predictor)
+            };
+            match guarded(dataset.pair_files(PairId(id as u32)), work) {
                 Ok(found) => {
                     for note in found.first().iter().flat_map(|case| &case.mask_notes) {
                         output.note(&format!("note: {} ({imprint} imprint), {note}", entry.name));
@@ -292,6 +289,9 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
                 }
                 Err(err) => {
                     output.note(&format!("{} ({imprint} imprint): {}", entry.name, says(&err)));
+                    if err.is::<Bug>() {
+                        predictor.recover();
+                    }
                     complete = false;
                 }
             }

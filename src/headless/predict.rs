@@ -163,6 +163,11 @@ pub(super) struct Predictor {
 }
 
 impl Predictor {
+    /// Forgets everything that was loaded: a bug may have left it half changed.
+    pub(super) fn recover(&mut self) {
+        *self = Self::new(&self.args.clone(), &self.rig.clone());
+    }
+
     /// For data of these sensors. Nothing is looked for yet.
     pub(super) fn new(args: &ModelArgs, rig: &Arc<Rig>) -> Self {
         let store = if args.no_cache { None } else { super::cache::store() };

@@ -15,6 +15,7 @@ use serde_json::json;
 
 use super::args::DatasetArgs;
 use super::contact_mask::{MaskArgs, MaskFrom};
+use super::guard::{Bug, guarded};
 use super::output::says;
 use super::pose::{Engines, parse_engines};
 use super::predict::{ModelArgs, Predictor};
@@ -225,16 +226,22 @@ fn touch(
         Arrival::Broken(problem) => problem,
         Arrival::Whole(loaded) => {
             let Some(dataset) = follower.dataset().cloned() else { return Ok(()) };
-            match worker.work(&dataset, &loaded.sample, tool.as_deref(), &stem, &source, &recipe, (ready, found, start))
-            {
+            let times = (ready, found, start);
+            let work = || worker.work(&dataset, &loaded.sample, tool.as_deref(), &stem, &source, &recipe, times);
+            match guarded(vec![ready.file.clone()], work) {
                 Ok(Some(done)) => return report(output, &done, summary),
                 // Ctrl-C.
                 Ok(None) => return Ok(()),
-                Err(err) => Problem {
-                    file: ready.file.clone(),
-                    what: says(&err),
-                    hint: "touch the file to have it tried again".into(),
-                },
+                Err(err) => {
+                    if err.is::<Bug>() {
+                        worker.recover();
+                    }
+                    Problem {
+                        file: ready.file.clone(),
+                        what: says(&err),
+                        hint: "touch the file to have it tried again".into(),
+                    }
+                }
             }
         }
     };

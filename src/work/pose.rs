@@ -33,7 +33,7 @@ pub struct PoseResult {
     pub converged: bool,
     /// Time it took, milliseconds.
     pub ms: f64,
-    /// Everything the registration says about itself; with trace and fits only in [`Results::runs`].
+    /// Everything the registration says about itself; with trace and fits only of a recorded run.
     pub report: AlignReport,
 }
 

@@ -125,6 +125,11 @@ impl<'a> Worker<'a> {
         Ok(Self { args, predictor, engine, tools: BTreeMap::new(), stop, warm_s })
     }
 
+    /// After a bug: the models are loaded anew for the next touch.
+    pub(super) fn recover(&mut self) {
+        self.predictor.recover();
+    }
+
     /// The tool of a touch: what the command line says, else what the file's name says.
     pub(super) fn tool_name(&self, of_pair: Option<String>) -> Option<String> {
         self.args.tool.clone().or(of_pair)
