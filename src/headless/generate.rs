@@ -16,14 +16,14 @@ use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
 use crate::domain::findings::Finding;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::DepthMap;
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::sensor::Finger;
 use crate::domain::{metrics, resample};
 use crate::io::dataset::{Dataset, assumed_metres};
 use crate::io::images;
 use crate::io::names::with_ending;
-use crate::work::compare::{self, Comparison};
+use crate::work::compare::{Comparison, compare_parts};
 use crate::work::imprint::imprint_of;
 use crate::work::job::JobCx;
 
@@ -257,7 +257,7 @@ fn score(
         Scale::Measured => {
             if let Some(bubble) = sample.finger(finger).and_then(|t| t.bubble.as_ref()) {
                 let seen = metrics::footprint_mask(finger, bubble.imprint.size());
-                take(pair, &compared(imprint, &bubble.imprint, scale, &seen)?);
+                take(pair, &compare_parts(imprint, &bubble.imprint, scale, &seen)?);
             }
         }
         Scale::Assumed => {
@@ -265,20 +265,15 @@ fn score(
             if let Some(tile) = dataset.bubble_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
                 let ours = resample::bilinear(&imprint.rotated_180(), tile.width(), tile.height());
                 let seen = metrics::footprint_mask(finger, tile.size()).rotated_180();
-                take(pair, &compared(&ours, &tile, scale, &seen)?);
+                take(pair, &compare_parts(&ours, &tile, scale, &seen)?);
                 if let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
-                    let theirs = compared(&vqvae, &tile, scale, &seen)?;
+                    let theirs = compare_parts(&vqvae, &tile, scale, &seen)?;
                     (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
                 }
             }
         }
     }
     Ok(())
-}
-
-/// The figures as the studio computes them.
-fn compared(predicted: &DepthMap, measured: &DepthMap, scale: Scale, seen: &Mask) -> anyhow::Result<Comparison> {
-    compare::compare_parts(predicted, measured, scale, seen).map_err(|err| anyhow::anyhow!("{err}"))
 }
 
 fn take(pair: &mut Pair, found: &Comparison) {
