@@ -20,6 +20,7 @@
 
 pub mod app;
 pub mod domain;
+mod fonts;
 #[cfg(feature = "gui")]
 pub mod gpu;
 pub mod headless;

@@ -4,7 +4,7 @@
 mod chain;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
@@ -14,7 +14,7 @@ use touch2touch::domain::pose::Engine;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::{MaskStore, StoredReview};
 
-use crate::support;
+use crate::support::{self, run};
 
 #[cfg(feature = "onnx")]
 mod documented;
@@ -23,18 +23,6 @@ mod hostile;
 mod outputs;
 #[cfg(feature = "onnx")]
 mod watch;
-
-fn run(args: &[&str], data: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touch2touch"))
-        .args(args)
-        // Nothing of the user's may be read or written by a test.
-        .env("TOUCH2TOUCH_DATA", data)
-        .env("XDG_DATA_HOME", data)
-        .env("XDG_CONFIG_HOME", data)
-        .env("TOUCH2TOUCH_CACHE", data)
-        .output()
-        .unwrap()
-}
 
 fn json(output: &Output) -> Value {
     let text = String::from_utf8(output.stdout.clone()).unwrap();

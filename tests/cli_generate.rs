@@ -1,21 +1,11 @@
 //! `generate` and `cache` as a user runs them, with the tiny bundle of the tests.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 use serde_json::Value;
 
-fn run(args: &[&str], home: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touch2touch"))
-        .args(args)
-        // Nothing of the user's may be read or written by a test.
-        .env("TOUCH2TOUCH_DATA", home)
-        .env("XDG_DATA_HOME", home)
-        .env("XDG_CONFIG_HOME", home)
-        .env("TOUCH2TOUCH_CACHE", home)
-        .output()
-        .unwrap()
-}
+use crate::support::run;
 
 fn json(output: &Output) -> Value {
     let error = String::from_utf8_lossy(&output.stderr);

@@ -522,21 +522,10 @@ fn a_build_without_models_says_so() {
 /// The trial of a bundle in a second process, by the program itself.
 #[cfg(feature = "onnx")]
 mod trial {
-    use std::process::{Command, Output};
+    use std::process::Output;
 
     use super::*;
-
-    fn run(args: &[&str], data: &Path) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_touch2touch"))
-            .args(args)
-            // Nothing of the user's may be read or written by a test.
-            .env("TOUCH2TOUCH_DATA", data)
-            .env("XDG_DATA_HOME", data)
-            .env("XDG_CONFIG_HOME", data)
-            .env("TOUCH2TOUCH_CACHE", data)
-            .output()
-            .unwrap()
-    }
+    use crate::support::run;
 
     fn text(output: &Output) -> String {
         String::from_utf8_lossy(&[output.stdout.as_slice(), &output.stderr].concat()).into_owned()

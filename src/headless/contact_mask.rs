@@ -9,8 +9,7 @@ use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad, Rig};
 use crate::domain::sample::PadTouch;
-use crate::work::mask;
-use crate::work::mask::MaskRecipe;
+use crate::work::mask::{self, MaskRecipe};
 
 /// Where masks come from.
 #[derive(Debug, Clone, Copy, Args)]
@@ -73,7 +72,7 @@ pub(super) fn contact_mask(
         MaskFrom::Truth => MaskRecipe::Truth,
         MaskFrom::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
     };
-    mask::mask(&recipe, imprint, Some(touch), tool, truth).map_err(|err| anyhow::anyhow!("{err}"))
+    Ok(mask::mask(&recipe, imprint, Some(touch), tool, truth)?)
 }
 
 /// The masks of both fingers, with what is to be said about them.

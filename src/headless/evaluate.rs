@@ -2,7 +2,6 @@
 
 use crate::io::dataset::Dataset;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
@@ -18,7 +17,6 @@ use crate::domain::pose::Engine;
 use crate::infer::bundle::{Bundle, Found, Origin, find_all};
 use crate::io::atomic;
 use crate::work::evaluate::{Evaluation, MaskBy, Report, Setup, evaluate, rows};
-use crate::work::job::{Cancel, JobCx};
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -106,15 +104,8 @@ fn engine() -> impl TypedValueParser<Value = Engine> {
 pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let setup = setup(args, &dataset)?;
-    let output = Arc::new(Output::new(args.common, "evaluating", 0));
-    let bar = output.clone();
-    let watch = move |p: crate::work::job::Progress| {
-        bar.set(p.done as usize, p.total as usize);
-        bar.message(&p.text);
-    };
-    let cx = JobCx::new(Cancel::default(), Arc::new(watch));
-    let evaluation = evaluate(&dataset, &setup, &cx).map_err(|err| anyhow::anyhow!("{err}"))?;
-    drop(cx);
+    let output = Output::new(args.common, "evaluating", 0);
+    let evaluation = evaluate(&dataset, &setup, &output.job())?;
     for odd in &evaluation.findings {
         let (file, times) = (odd.file.display(), odd.count);
         output.note(&format!("note: {file}: {} ({}); {times} like this", odd.what, odd.hint));
@@ -132,7 +123,6 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let pairs = args.pairs.then_some(evaluation.scores.as_slice());
     let published = if args.paper { paper_rows() } else { Vec::new() };
     let report = Report { evaluation: &evaluation, published, pairs };
-    let Ok(output) = Arc::try_unwrap(output) else { anyhow::bail!("the evaluation is still being watched") };
     output.finish(&report, || text(&evaluation, &rows))?;
     Ok(evaluation.complete && evaluation.skipped.is_empty())
 }

@@ -18,14 +18,14 @@ use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
 use crate::domain::findings::Finding;
-use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::rig::{PadId, Rig, Text};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::{metrics, resample};
 use crate::io::dataset::{Dataset, assumed_metres};
 use crate::io::images;
 use crate::io::names::with_ending;
-use crate::work::compare::{self, Comparison};
+use crate::work::compare::{Comparison, compare_parts};
 use crate::work::imprint::{self, imprint_of};
 use crate::work::job::JobCx;
 
@@ -293,7 +293,7 @@ fn score(
         Scale::Measured => {
             if let Some(bubble) = sample.pad(finger).and_then(|t| t.depth()) {
                 let seen = sample.rig.seen_mask(finger, bubble.imprint.size());
-                take(pair, &compared(imprint, &bubble.imprint, scale, seen.as_ref())?);
+                take(pair, &compare_parts(imprint, &bubble.imprint, scale, seen.as_ref())?);
             }
         }
         Scale::Assumed => {
@@ -301,25 +301,15 @@ fn score(
             if let Some(tile) = dataset.bubble_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
                 let ours = resample::bilinear(&turned(imprint, &sample.rig), tile.width(), tile.height());
                 let seen = sample.rig.seen_mask(finger, tile.size()).map(|seen| turned(&seen, &sample.rig));
-                take(pair, &compared(&ours, &tile, scale, seen.as_ref())?);
+                take(pair, &compare_parts(&ours, &tile, scale, seen.as_ref())?);
                 if let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
-                    let theirs = compared(&vqvae, &tile, scale, seen.as_ref())?;
+                    let theirs = compare_parts(&vqvae, &tile, scale, seen.as_ref())?;
                     (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
                 }
             }
         }
     }
     Ok(())
-}
-
-/// The figures as the studio computes them.
-fn compared(
-    predicted: &DepthMap,
-    measured: &DepthMap,
-    scale: Scale,
-    seen: Option<&Mask>,
-) -> anyhow::Result<Comparison> {
-    compare::compare_parts(predicted, measured, scale, seen).map_err(|err| anyhow::anyhow!("{err}"))
 }
 
 fn take(pair: &mut Pair, found: &Comparison) {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::io::caught::caught;
+use crate::io::files::listed;
 
 /// A panic on a pair's files.
 #[derive(Debug, thiserror::Error)]
@@ -13,8 +14,7 @@ pub(super) struct Bug {
 }
 
 fn names(files: &[PathBuf]) -> String {
-    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-    if names.is_empty() { "the data set".to_owned() } else { names.join(", ") }
+    if files.is_empty() { "the data set".to_owned() } else { listed(files) }
 }
 
 /// Does the work of one pair. After a [`Bug`], whatever `work` changes must be made anew.

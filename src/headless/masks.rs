@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
@@ -19,7 +18,6 @@ use crate::domain::sample::Sample;
 use crate::io::export_unet::{ExportConfig, PARTS};
 use crate::work::error::TaskError;
 use crate::work::export::{Automatic, ExportSetup, HandMasks, export_masks};
-use crate::work::job::{Cancel, JobCx};
 use crate::work::labels::Labels;
 
 /// What can be done with masks.
@@ -90,7 +88,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let Format::Unet = args.format;
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let ids = args.limit.spread(dataset.index.pairs.len());
-    let output = Arc::new(Output::new(args.common, "exporting", ids.len()));
+    let output = Output::new(args.common, "exporting", ids.len());
     let setup = ExportSetup {
         pairs: Some(ids.into_iter().map(|id| PairId(id as u32)).collect()),
         split: ExportConfig { seed: args.split_seed, rig: dataset.rig.clone(), ..ExportConfig::default() },
@@ -117,19 +115,10 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         }
         Ok(found.mask)
     };
-    let bar = output.clone();
-    let cx = JobCx::new(
-        Cancel::default(),
-        Arc::new(move |p| {
-            bar.set(p.done as usize, p.total as usize);
-            bar.message(&p.text);
-        }),
-    );
     let labels = Labels::of(&dataset);
     let masks = HandMasks { labels: &labels, changed: &BTreeMap::new() };
     let automatic: Option<Automatic<'_>> = (args.pairs == Pairs::All).then_some(&mut automatic);
-    let done = export_masks(&dataset, &masks, &setup, &args.out, automatic, &cx)?;
-    drop(cx);
+    let done = export_masks(&dataset, &masks, &setup, &args.out, automatic, &output.job())?;
     let report = &done.report;
     let exported = Exported {
         out: args.out.clone(),
@@ -141,7 +130,6 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         out_of_range_px: report.out_of_range_px,
         unmeasured_px: report.unmeasured_px,
     };
-    let Ok(output) = Arc::try_unwrap(output) else { anyhow::bail!("the export is still being watched") };
     output.finish(&exported, || {
         let skipped = match exported.skipped {
             0 => String::new(),

@@ -3,11 +3,13 @@
 //! A reader that has seen enough (`| head`) ends the program quietly; a disk that is full is an error. Neither is a panic.
 
 use std::io::{self, Write as _};
+use std::sync::Arc;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use super::Common;
+use crate::work::job::{Cancel, JobCx, Progress};
 
 /// Where a verb reports to.
 pub struct Output {
@@ -41,6 +43,17 @@ impl Output {
     /// What is being done now.
     pub fn message(&self, text: &str) {
         self.bar.set_message(text.to_owned());
+    }
+
+    /// A job whose progress moves the bar.
+    pub(super) fn job(&self) -> JobCx {
+        let bar = self.bar.clone();
+        let show = move |p: Progress| {
+            bar.set_length(p.total);
+            bar.set_position(p.done);
+            bar.set_message(p.text);
+        };
+        JobCx::new(Cancel::default(), Arc::new(show))
     }
 
     /// A line on standard error, above the bar.

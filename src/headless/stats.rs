@@ -15,7 +15,7 @@ use crate::domain::postprocess::ShiftMode;
 use crate::domain::units::{fixed, mm};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::error::TaskError;
-use crate::work::job::{Cancel, JobCx};
+use crate::work::job::JobCx;
 use crate::work::models::Wanted;
 use crate::work::statistics::{StatisticsSetup, statistics};
 
@@ -52,7 +52,7 @@ struct Report {
 pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let ids: Vec<PairId> = args.limit.spread(dataset.index.pairs.len()).into_iter().map(|i| PairId(i as u32)).collect();
-    let output = Arc::new(Output::new(args.common, "predicting", ids.len()));
+    let output = Output::new(args.common, "predicting", ids.len());
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let setup = StatisticsSetup {
         pairs: ids,
@@ -63,14 +63,11 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
         dataset: dataset.title.clone(),
     };
     let chain = predictor.chain(ShiftMode::Raw)?;
-    let bar = output.clone();
-    let cx = JobCx::new(Cancel::default(), Arc::new(move |p| bar.set(p.done as usize, p.total as usize)));
     let load = |id| dataset.load(id).map(Arc::new).map_err(|err| TaskError::from_error("Load", &err));
     let predict = |wanted: Wanted<'_>, _: &JobCx| {
         predictor.predict_one(wanted.difference).map_err(|err| TaskError::new("Predict", err))
     };
-    let (statistics, failed) = statistics(&setup, load, predict, &cx)?;
-    drop(cx);
+    let (statistics, failed) = statistics(&setup, load, predict, &output.job())?;
     for failure in &failed {
         output.note(&failure.to_string());
     }
@@ -79,7 +76,6 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let failed: Vec<String> = failed.iter().map(ToString::to_string).collect();
     let complete = failed.is_empty();
     let report = Report { file: args.out.display().to_string(), failed, gain, offset_m, statistics };
-    let output = Arc::into_inner(output).expect("the job that shared it is over");
     output.finish(&report, || text(&report))?;
     Ok(complete)
 }

@@ -33,12 +33,6 @@ pub const TIME: Duration = Duration::from_secs(60);
 const MEMORY: u64 = 4 << 30;
 /// What it may use besides, for each byte of the graphs: weights are unpacked, laid out anew, and held more than once.
 const MEMORY_PER_BYTE: u64 = 8;
-/// The manifests that ship with the program; each holds the checksums of its graphs.
-const SHIPPED: [&[u8]; 3] = [
-    include_bytes!("../../assets/models/generator_ldm/manifest.json"),
-    include_bytes!("../../assets/models/mask_unet/manifest.json"),
-    include_bytes!("../../assets/models/tool_classifier/manifest.json"),
-];
 /// The name of the second process's verb, after the program's: `bundle try DIR --engine rten`.
 pub const VERB: [&str; 2] = ["bundle", "try"];
 /// What the second process says line by line: what it is about to do, what went wrong, that all is well.
@@ -85,7 +79,8 @@ pub(super) fn admit(bundle: &Bundle, choice: EngineChoice) -> Result<EngineKind,
     static KNOWN: Mutex<BTreeMap<String, Result<(), Refusal>>> = Mutex::new(BTreeMap::new());
     let engine = resolve(choice)?;
     let Some(program) = PROGRAM.get() else { return Ok(engine) };
-    if SHIPPED.iter().any(|manifest| sha256(manifest) == bundle.hash()) {
+    // The manifests hold the checksums of the graphs.
+    if Origin::ships(bundle.hash()) {
         return Ok(engine);
     }
     let key = key(bundle, engine);
@@ -232,24 +227,5 @@ fn keep(key: &str, bundle: &Bundle, engine: EngineKind) {
     let written = file.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::write(&file, text));
     if let Err(err) = written {
         log::debug!("the verdict on {} could not be kept: {err}", bundle.name());
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A bundle that is shipped but not listed would be tried on every machine; one that changed as well.
-    #[test]
-    fn every_bundle_that_ships_is_known() {
-        let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/models");
-        let mut folders = 0;
-        for entry in std::fs::read_dir(models).unwrap() {
-            let manifest = entry.unwrap().path().join(super::super::bundle::MANIFEST);
-            let Ok(text) = std::fs::read(&manifest) else { continue };
-            assert!(SHIPPED.contains(&&text[..]), "{} is not in the list", manifest.display());
-            folders += 1;
-        }
-        assert_eq!(folders, SHIPPED.len());
     }
 }

@@ -1,20 +1,20 @@
-//! Panics that become errors: whatever a file holds, it costs its own pair and never the run.
+//! Panics that become errors: a pair, a job or a thread that fails costs itself and never the run.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Runs `read`; where it panics, what the panic said.
+/// Runs `work`; where it panics, what the panic said.
 ///
-/// Nothing that `read` borrowed mutably may be used afterwards, as it may be half changed.
+/// Nothing that `work` borrowed mutably may be used afterwards, as it may be half changed.
 ///
 /// # Errors
 /// The panic's message.
-pub fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
-    catch_unwind(AssertUnwindSafe(read)).map_err(|payload| panic_message(&*payload))
+pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|payload| panic_message(&*payload))
 }
 
 /// What a panic said.
-pub fn panic_message(payload: &(dyn Any + Send)) -> String {
+fn panic_message(payload: &(dyn Any + Send)) -> String {
     let text = payload.downcast_ref::<&str>().map(ToString::to_string);
     text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".into())
 }

@@ -5,7 +5,7 @@
 
 use std::fs::{File, Metadata};
 use std::io::{self, Read as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most bytes of a small file: settings, manifests, reports, masks.
 pub const SMALL: u64 = 64 << 20;
@@ -32,6 +32,11 @@ fn ordinary(found: &Metadata) -> io::Result<()> {
     } else {
         Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a pipe, a socket or a device, not an ordinary file"))
     }
+}
+
+/// The paths of some files, for messages.
+pub fn listed(files: &[PathBuf]) -> String {
+    files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
 }
 
 /// Reads an ordinary file of at most `limit` bytes.

@@ -147,9 +147,8 @@ pub fn install(ctx: &egui::Context) {
 
 fn fonts() -> FontDefinitions {
     let mut fonts = FontDefinitions::default();
-    let regular = include_bytes!("../../assets/fonts/Roboto-Regular.ttf");
     let bold = include_bytes!("../../assets/fonts/Roboto-Medium.ttf");
-    fonts.font_data.insert("regular".into(), Arc::new(FontData::from_static(regular)));
+    fonts.font_data.insert("regular".into(), Arc::new(FontData::from_static(crate::fonts::REGULAR)));
     fonts.font_data.insert("medium".into(), Arc::new(FontData::from_static(bold)));
     // The fonts that come with the toolkit stay as fallbacks: they have the symbols.
     let fallback = fonts.families.get(&FontFamily::Proportional).cloned().unwrap_or_default();

@@ -43,11 +43,10 @@ impl TaskError {
     }
 
     /// A panic caught at the edge of a lane.
-    pub fn panicked(what: impl Into<String>, payload: &(dyn std::any::Any + Send)) -> Self {
-        let text = crate::io::caught::panic_message(payload);
+    pub fn panicked(what: impl Into<String>, message: &str) -> Self {
         Self {
             what: what.into(),
-            why: format!("an internal error: {text}"),
+            why: format!("an internal error: {message}"),
             hint: Some("Nothing is lost. Please report this with the steps that led here.".into()),
             kind: TaskErrorKind::Panicked,
         }

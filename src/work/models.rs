@@ -49,17 +49,15 @@ pub struct KeptPrediction {
 }
 
 /// A model in memory, with the bundle's identity and the engine it was loaded for.
-type Loaded<T> = Vec<((Arc<str>, EngineChoice), T)>;
+type Loaded<T> = Option<((Arc<str>, EngineChoice), T)>;
 
 /// The models of a run of the program. Shared by threads; each model runs on one at a time.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Models {
     store: Option<Mutex<Store>>,
-    generators: Mutex<Loaded<Generator>>,
-    masks: Mutex<Loaded<MaskModel>>,
+    generator: Mutex<Loaded<Generator>>,
+    mask_model: Mutex<Loaded<MaskModel>>,
     ways: Mutex<BTreeMap<Arc<str>, Ways>>,
-    /// Generators that stay loaded side by side.
-    most: usize,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -83,53 +81,24 @@ fn ways_of(spec: &GeneratorSpec) -> Ways {
     }
 }
 
-/// The model of `key`, loaded by `load` if it is not there; the one used longest ago makes room before that.
+/// The model of `key`, loaded by `load` if it is not there.
 fn ready<T>(
     loaded: &mut Loaded<T>,
     key: (Arc<str>, EngineChoice),
-    most: usize,
     load: impl FnOnce() -> Result<T, TaskError>,
 ) -> Result<&mut T, TaskError> {
-    match loaded.iter().position(|(known, _)| *known == key) {
-        Some(at) => {
-            let used = loaded.remove(at);
-            loaded.push(used);
-        }
-        None => {
-            // Before the new one is loaded, so that memory never holds one more than it may.
-            while loaded.len() >= most.max(1) {
-                loaded.remove(0);
-            }
-            let model = load()?;
-            loaded.push((key, model));
-        }
+    if loaded.as_ref().is_none_or(|(known, _)| *known != key) {
+        // Before the new one is loaded, so that both are never in memory.
+        *loaded = None;
+        *loaded = Some((key, load()?));
     }
-    let (_, model) = loaded.last_mut().expect("one was just put there");
-    Ok(model)
-}
-
-impl Default for Models {
-    fn default() -> Self {
-        Self::new(None)
-    }
+    Ok(&mut loaded.as_mut().expect("it was just put there").1)
 }
 
 impl Models {
     /// Nothing is loaded yet. Predictions are kept in `store` and taken from it; `None` keeps none.
     pub fn new(store: Option<Store>) -> Self {
-        Self {
-            store: store.map(Mutex::new),
-            generators: Mutex::default(),
-            masks: Mutex::default(),
-            ways: Mutex::default(),
-            most: 1,
-        }
-    }
-
-    /// The same with several generators side by side in memory.
-    #[must_use]
-    pub fn side_by_side(self, generators: usize) -> Self {
-        Self { most: generators, ..self }
+        Self { store: store.map(Mutex::new), ..Self::default() }
     }
 
     /// Sets what kept predictions may take, bytes.
@@ -152,9 +121,12 @@ impl Models {
             return Ok(known.clone());
         }
         let opened = bundle.open(&format!("Open {}", bundle.name))?;
-        let ways = opened.generator().map(ways_of).unwrap_or_default();
-        lock(&self.ways).insert(bundle.id.clone(), ways.clone());
-        Ok(ways)
+        Ok(opened.generator().map(|spec| self.ways_to(bundle, spec)).unwrap_or_default())
+    }
+
+    /// The same of a bundle that is open already.
+    fn ways_to(&self, bundle: &BundleInfo, spec: &GeneratorSpec) -> Ways {
+        lock(&self.ways).entry(bundle.id.clone()).or_insert_with(|| ways_of(spec)).clone()
     }
 
     /// Predictions, all of one call in one batch; one answer for each, in order. What was made before is not made
@@ -192,31 +164,34 @@ impl Models {
         }
         let kind = resolve(engine).map_err(|err| fail(err.into()))?;
         let (images, image) = distinct(wanted);
-        let digests: Vec<String> = images.iter().map(|difference| input_digest(difference)).collect();
-        let recipe = |(item, at): (&Wanted<'_>, &usize)| {
-            let config = GenerateConfig { seed: item.seed, ..*config };
-            Recipe::new(digests[*at].clone(), bundle.id.as_ref().to_owned(), kind, &config)
-        };
-        let keys: Vec<Recipe> = wanted.iter().zip(&image).map(recipe).collect();
-        let mut answers: Vec<Option<(RawPrediction, f64, bool)>> = match store {
-            Some(store) => {
-                let store = lock(store);
-                keys.iter().map(|key| store.get(key).map(|found| (found.raw, found.seconds, true))).collect()
+        let mut answers: Vec<Option<(RawPrediction, f64, bool)>> = vec![None; wanted.len()];
+        let mut keys = Vec::new();
+        if let Some(store) = store {
+            let digests: Vec<String> = images.iter().map(|difference| input_digest(difference)).collect();
+            let recipe = |(item, at): (&Wanted<'_>, &usize)| {
+                let config = GenerateConfig { seed: item.seed, ..*config };
+                Recipe::new(digests[*at].clone(), bundle.id.as_ref().to_owned(), kind, &config)
+            };
+            keys = wanted.iter().zip(&image).map(recipe).collect();
+            let store = lock(store);
+            for (answer, key) in answers.iter_mut().zip(&keys) {
+                *answer = store.get(key).map(|found| (found.raw, found.seconds, true));
             }
-            None => vec![None; wanted.len()],
-        };
+        }
         let fresh: Vec<usize> = (0..wanted.len()).filter(|at| answers[*at].is_none()).collect();
-        // Nothing has to be loaded to show what is there.
-        let Ways { chains, color, .. } = self.ways(bundle)?;
-        if !fresh.is_empty() {
-            let mut loaded = lock(&self.generators);
-            let generator = ready(&mut loaded, (bundle.id.clone(), engine), self.most, || {
+        let Ways { chains, color, .. } = if fresh.is_empty() {
+            // Nothing has to be loaded to show what is there.
+            self.ways(bundle)?
+        } else {
+            let mut loaded = lock(&self.generator);
+            let generator = ready(&mut loaded, (bundle.id.clone(), engine), || {
                 cx.progress(0, config.steps.into(), "loading the model");
                 Generator::open(&bundle.open(&what)?, engine).map_err(fail)
             })?;
+            let ways = self.ways_to(bundle, generator.spec());
             let begin = std::time::Instant::now();
             let items: Vec<Item> = fresh.iter().map(|&at| Item { image: image[at], seed: wanted[at].seed }).collect();
-            let mut follow = Follow { cx, wanted, fresh: &fresh, chains: &chains };
+            let mut follow = Follow { cx, wanted, fresh: &fresh, chains: &ways.chains };
             let made = generator.run(&images, &items, config, &mut follow).map_err(fail)?;
             let each = begin.elapsed().as_secs_f64() / fresh.len() as f64;
             for (&at, raw) in fresh.iter().zip(made) {
@@ -227,7 +202,8 @@ impl Models {
                 }
                 answers[at] = Some((raw, each, false));
             }
-        }
+            ways
+        };
         let prediction = |(raw, seconds, kept)| Prediction {
             raw,
             chains: chains.clone(),
@@ -301,8 +277,8 @@ impl Models {
         imprint: &DepthMap,
     ) -> Result<ContactMask, TaskError> {
         let what = format!("Mask with {}", bundle.name);
-        let mut loaded = lock(&self.masks);
-        let model = ready(&mut loaded, (bundle.id.clone(), engine), 1, || {
+        let mut loaded = lock(&self.mask_model);
+        let model = ready(&mut loaded, (bundle.id.clone(), engine), || {
             MaskModel::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
         })?;
         model.contact(imprint).map_err(|err| TaskError::from_error(&what, &err))

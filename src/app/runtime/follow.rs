@@ -1,6 +1,5 @@
 //! The thread that follows a folder. It sleeps almost always, and wakes the window only when a touch arrived.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 
@@ -9,6 +8,7 @@ use super::super::keys::DatasetSeq;
 use super::super::services::{DataSource, Following};
 use super::lanes::Event;
 use super::{JobId, Runtime, Wake};
+use crate::io::caught::caught;
 use crate::io::follow::PERIOD;
 use crate::work::error::TaskError;
 use crate::work::job::Cancel;
@@ -35,9 +35,8 @@ impl Runtime {
         let cancel = Cancel::default();
         let (stop, sender, wake) = (cancel.clone(), self.sender.clone(), self.wake.clone());
         let thread = std::thread::Builder::new().name("follow".into()).spawn(move || {
-            let work = AssertUnwindSafe(|| watch(seq, &*source, &stop, &sender, &wake));
-            if let Err(payload) = catch_unwind(work) {
-                let err = TaskError::panicked("Follow", &*payload);
+            if let Err(message) = caught(|| watch(seq, &*source, &stop, &sender, &wake)) {
+                let err = TaskError::panicked("Follow", &message);
                 drop(sender.send(Event { id: JobId::Follow, command: Command::Report(err) }));
                 wake();
             }

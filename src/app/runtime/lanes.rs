@@ -1,7 +1,6 @@
 //! Queues and threads. A job that panics is caught here and becomes an ordinary failure.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
@@ -13,6 +12,7 @@ use super::super::jobs::Lane;
 use super::super::jobs::prepare::{Body, RequestJob};
 use super::super::keys::Request;
 use super::{JobId, Wake, lock};
+use crate::io::caught::caught;
 use crate::work::error::TaskError;
 use crate::work::job::{Cancel, JobCx};
 
@@ -256,9 +256,9 @@ fn execute(job: Job) -> Event {
     let outcome = if cx.cancel.is_cancelled() {
         Err(TaskError::cancelled(what))
     } else {
-        match catch_unwind(AssertUnwindSafe(|| body(&cx))) {
+        match caught(|| body(&cx)) {
             Ok(outcome) => outcome,
-            Err(payload) => Err(TaskError::panicked(what, &*payload)),
+            Err(message) => Err(TaskError::panicked(what, &message)),
         }
     };
     Event { id, command: outcome.unwrap_or_else(failed) }

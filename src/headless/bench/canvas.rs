@@ -8,6 +8,7 @@ use plotters::prelude::*;
 use plotters::style::register_font;
 
 use crate::domain::grid::RgbGrid;
+use crate::fonts;
 use crate::io::{atomic, images};
 
 /// Family of the letters; a viewer of the SVG takes its own.
@@ -70,8 +71,7 @@ fn draw<B: DrawingBackend, D: Drawing>(backend: B, scale: f64, drawing: &D) -> a
 where
     B::ErrorType: 'static,
 {
-    let font = include_bytes!("../../../assets/fonts/Roboto-Regular.ttf");
-    register_font(FAMILY, FontStyle::Normal, font).ok().context("the built-in font cannot be read")?;
+    register_font(FAMILY, FontStyle::Normal, fonts::REGULAR).ok().context("the built-in font cannot be read")?;
     let area = backend.into_drawing_area();
     area.fill(&WHITE)?;
     drawing.draw(&Paper { area: &area, scale })?;

@@ -9,6 +9,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::{MANIFEST, sha256};
+
 use crate::io::files;
 
 /// What stands before the name of a bundle of the program, wherever a folder could be named.
@@ -53,6 +55,12 @@ impl Origin {
     /// All bundles of the program, in the order in which they are offered.
     pub fn built_in() -> impl Iterator<Item = Self> {
         EMBEDDED.iter().map(|(name, _)| Self::BuiltIn(name))
+    }
+
+    /// Whether a bundle of this hash is one of the program's.
+    pub(in crate::infer) fn ships(hash: &str) -> bool {
+        Self::built_in()
+            .any(|origin| origin.file(MANIFEST).read(files::SMALL).is_ok_and(|manifest| sha256(&manifest) == hash))
     }
 
     /// The last part of the folder's path, or the name in the program.
@@ -163,6 +171,8 @@ mod tests {
         assert_eq!(names(&models), EMBEDDED.iter().map(|(name, _)| (*name).to_owned()).collect());
         for (name, files) in EMBEDDED {
             assert_eq!(names(&models.join(name)), files.iter().map(|(file, _)| (*file).to_owned()).collect());
+            let manifest = std::fs::read(models.join(name).join(MANIFEST)).unwrap();
+            assert!(Origin::ships(&sha256(&manifest)) && !Origin::ships(&sha256(&manifest[1..])), "{name}");
             for (file, bytes) in *files {
                 assert!(std::fs::read(models.join(name).join(file)).unwrap() == *bytes, "{name}/{file}");
             }

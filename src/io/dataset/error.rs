@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::domain::dataset::{PairId, Problem};
+use crate::io::files::listed;
 use crate::io::images::PictureError;
 use crate::io::pt::PtError;
 
@@ -76,7 +77,7 @@ pub enum LoadError {
         share: f64,
     },
     /// The program failed on the pair's files.
-    #[error("reading the pair failed, which is a bug: {message} ({})", names(files))]
+    #[error("reading the pair failed, which is a bug: {message} ({})", listed(files))]
     Bug {
         /// The pair's files.
         files: Vec<PathBuf>,
@@ -123,8 +124,4 @@ impl LoadError {
             hint: self.hint().into(),
         }
     }
-}
-
-fn names(files: &[PathBuf]) -> String {
-    files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>().join(", ")
 }
