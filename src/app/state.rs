@@ -52,7 +52,7 @@ pub struct State {
 }
 
 /// What is looked at.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Selection {
     /// The pair.
     pub pair: Option<PairId>,
@@ -70,21 +70,6 @@ pub struct Selection {
     pub palette: bool,
     /// Whether the shortcut sheet is open.
     pub shortcut_sheet: bool,
-}
-
-impl Default for Selection {
-    fn default() -> Self {
-        Self {
-            pair: None,
-            finger: PadId::default(),
-            both_fingers: false,
-            hover: None,
-            hover_point: None,
-            panes: BTreeSet::new(),
-            palette: false,
-            shortcut_sheet: false,
-        }
-    }
 }
 
 impl State {
