@@ -36,7 +36,7 @@ fn sheet(count: usize) -> CloudItem {
         revision: count as u64,
         points: points.into(),
         colors: PointColors::Scalar(values.into()),
-        style: CloudStyle { size: PointSize::Metres(0.000_3), ..CloudStyle::default() },
+        style: CloudStyle { size: PointSize::Meters(0.000_3), ..CloudStyle::default() },
     }
 }
 

@@ -14,7 +14,7 @@ use touch2touch::domain::sim;
 const TILE: u32 = 128;
 const GAP: u32 = 3;
 const COLUMNS: u32 = 6;
-/// Grey levels per step of the written values.
+/// Gray levels per step of the written values.
 const STEP: f32 = 6.0;
 
 fn main() -> anyhow::Result<()> {
@@ -79,8 +79,8 @@ fn resample(width: usize, height: usize, at: impl Fn(usize, usize) -> [f32; 3]) 
 fn scaled(tile: &[[f32; 3]]) -> Vec<[u8; 3]> {
     // the deviations that the lab standardises by matter only relative to each other
     let deviation = [0.0989, 0.0746, 0.0731];
-    let grey = tile.iter().all(|p| p[0] == p[1] && p[1] == p[2]);
-    let value = |p: &[f32; 3], c: usize| if grey { p[c] } else { p[c] / deviation[c] };
+    let gray = tile.iter().all(|p| p[0] == p[1] && p[1] == p[2]);
+    let value = |p: &[f32; 3], c: usize| if gray { p[c] } else { p[c] / deviation[c] };
     let all = || tile.iter().flat_map(|p| (0..3).map(move |c| value(p, c)));
     let (lo, hi) = all().fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
     let level = |v: f32| (((v - lo) / (hi - lo).max(1e-9) * 255.0 / STEP).round() * STEP) as u8;

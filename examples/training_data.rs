@@ -24,7 +24,7 @@ use touch2touch::domain::sim::{self, Condition, Grasp, MISALIGNMENT_M, SimConfig
 
 /// Side of the resized GelSlim image, pixels.
 const SIDE: usize = 128;
-/// Steps per grey level in which the difference image is stored.
+/// Steps per gray level in which the difference image is stored.
 const STEPS_PER_LEVEL: f32 = 64.0;
 /// Grasps simulated at a time.
 const CHUNK: usize = 64;
@@ -71,8 +71,8 @@ impl Npy {
     }
 }
 
-/// Metres to whole micrometres; no measurement becomes `i16::MIN`.
-fn micrometres(depth: &DepthMap) -> Vec<i16> {
+/// Meters to whole micrometers; no measurement becomes `i16::MIN`.
+fn micrometers(depth: &DepthMap) -> Vec<i16> {
     depth
         .as_slice()
         .iter()
@@ -143,8 +143,8 @@ fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Re
             let tool_number = number.map_or(-1.0, |i| i as f32);
             Ok(Record {
                 gelslim: planes.collect(),
-                imprint: micrometres(&imprint.imprint),
-                clean: micrometres(&truth.imprint),
+                imprint: micrometers(&imprint.imprint),
+                clean: micrometers(&truth.imprint),
                 contact: truth.contact.as_slice().iter().map(|&c| u8::from(c)).collect(),
                 meta: [
                     index as f32,

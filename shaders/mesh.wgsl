@@ -4,7 +4,7 @@
 
 struct MeshUniform {
     world_from_mesh: mat4x4<f32>,
-    // sRGB-encoded colour and opacity.
+    // sRGB-encoded color and opacity.
     color: vec4<f32>,
     // 0 = solid, 1 = x-ray (more opaque where the surface turns away from the eye).
     xray: u32,
@@ -43,7 +43,7 @@ fn fs_main(in: Varying) -> @location(0) vec4<f32> {
         let rim = (1.0 - facing) * (1.0 - facing);
         return vec4<f32>(mesh.color.rgb, mix(mesh.color.a * 0.6, min(mesh.color.a * 2.5, 1.0), rim));
     }
-    // A head light and a weaker one from above; the sum stays below 1, so that the colour stays itself.
+    // A head light and a weaker one from above; the sum stays below 1, so that the color stays itself.
     let light = 0.25 + 0.55 * facing + 0.20 * clamp(dot(normal, view.up_in_world.xyz), 0.0, 1.0);
     return vec4<f32>(srgb_from_linear(linear_from_srgb(mesh.color.rgb) * light), mesh.color.a);
 }

@@ -5,21 +5,21 @@
 
 struct PointVertex {
     position: vec3<f32>,
-    // Colour modes: 0 = a colour as rgba8, 1 = the bits of an f32, 2 = unused.
+    // Color modes: 0 = a color as rgba8, 1 = the bits of an f32, 2 = unused.
     payload: u32,
 }
 
 struct PointsUniform {
     world_from_points: mat4x4<f32>,
-    // One colour for all (mode 2).
+    // One color for all (mode 2).
     color: vec4<f32>,
     highlight: vec4<f32>,
-    // Values at the ends of the colour map (mode 1).
+    // Values at the ends of the color map (mode 1).
     lo: f32,
     hi: f32,
-    // Disc diameter: pixels, or metres if size_in_metres != 0.
+    // Disc diameter: pixels, or meters if size_in_meters != 0.
     size: f32,
-    size_in_metres: u32,
+    size_in_meters: u32,
     color_mode: u32,
     map: u32,
     // Every stride-th point is drawn.
@@ -59,14 +59,14 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
         return out;
     }
     var diameter = cloud.size;
-    if cloud.size_in_metres != 0u {
+    if cloud.size_in_meters != 0u {
         diameter = cloud.size * view.px_per_m / clip.w;
     }
     // Below one pixel a disc would vanish between the samples.
     var radius = max(0.5 * diameter, 0.5);
     if is_extra {
         radius = max(radius * 2.0, radius + 3.0);
-        // In front of its neighbours, and of the unmarked disc of the same point.
+        // In front of its neighbors, and of the unmarked disc of the same point.
         clip.z = min(clip.z * 1.02 , clip.w);
     }
     out.corner = quad_corner(vertex);
@@ -91,7 +91,7 @@ fn fs_main(in: Varying) -> @location(0) vec4<f32> {
         discard;
     }
     if in.radius.y > 0.5 && dot(in.corner, in.corner) > 0.55 {
-        // A dark rim keeps the highlight visible on any colour.
+        // A dark rim keeps the highlight visible on any color.
         return vec4<f32>(in.color.rgb * 0.15, 1.0);
     }
     return vec4<f32>(in.color.rgb, 1.0);

@@ -1,7 +1,7 @@
 //! Pure science: images, sensors, frames, simulation, registration, diffusion, metrics.
 //!
 //! **Architecture invariant:** nothing here names a window, a GPU, a model runtime, a file,
-//! a thread or a clock. Values come in as arguments and go out as results, in metres and radians.
+//! a thread or a clock. Values come in as arguments and go out as results, in meters and radians.
 
 pub mod align;
 pub mod ambiguity;

@@ -65,7 +65,7 @@ enum Verb {
     Simulate(simulate::SimulateArgs),
     /// Predict Soft Bubble imprints from GelSlim images and compare them with the measured ones.
     Generate(generate::GenerateArgs),
-    /// Everything between the decoder and the metres, for one pair: stages, histograms, line against truth, what is odd.
+    /// Everything between the decoder and the meters, for one pair: stages, histograms, line against truth, what is odd.
     Ledger(Box<ledger::LedgerArgs>),
     /// Statistics of a dataset's predictions and measurements, for the shift `--shift refit`.
     Stats(stats::StatsArgs),
@@ -108,8 +108,8 @@ pub struct Common {
 /// The option of the verbs that read CAD models.
 #[derive(Debug, Clone, Copy, Args)]
 struct ToolArgs {
-    /// Unit of the CAD models (tools_stls/*.stl): m, cm, mm, um, in, a factor to metres, or `auto` for the one that
-    /// makes them as large as a hand-held tool. Without it, what tools_stls/unit.txt says, else metres.
+    /// Unit of the CAD models (tools_stls/*.stl): m, cm, mm, um, in, a factor to meters, or `auto` for the one that
+    /// makes them as large as a hand-held tool. Without it, what tools_stls/unit.txt says, else meters.
     #[arg(long, value_name = "UNIT")]
     tool_scale: Option<ToolScale>,
 }

@@ -1,4 +1,4 @@
-//! The job itself, once: from a touch to a prediction, its imprint in metres, the contact mask, the cloud, the pose and
+//! The job itself, once: from a touch to a prediction, its imprint in meters, the contact mask, the cloud, the pose and
 //! the figures, as plain functions of values.
 //!
 //! A button of the studio gathers the inputs, calls one of these on a lane and wraps the answer; a verb of the command

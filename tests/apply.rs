@@ -82,7 +82,7 @@ fn what_is_not_on_screen_is_not_computed() {
     bench.send(panes(&[Pane::GelDifference]));
     bench.settle();
     let loaded = bench.services.source.loads();
-    assert_eq!(loaded, 5, "the pair shown and four neighbours on the one side that has any");
+    assert_eq!(loaded, 5, "the pair shown and four neighbors on the one side that has any");
     assert!(bench.state.results.masks.is_empty() && bench.state.results.clouds.is_empty());
     bench.send(panes(&[Pane::Browser]));
     bench.send(Command::ShowRows(0..3));
@@ -180,7 +180,7 @@ fn a_failure_is_said_once_and_not_tried_again_by_itself() {
     assert!(matches!(bench.state.imprint(ImprintSource::Measured, RIGHT), Lookup::Failed(_)));
     bench.settle();
     assert_eq!((bench.errors(), bench.services.source.loads_of(1)), (1, 1));
-    assert!(bench.services.source.loads() > loads, "the neighbours are loaded all the same");
+    assert!(bench.services.source.loads() > loads, "the neighbors are loaded all the same");
     bench.services.source.heal();
     bench.send(Command::Retry);
     bench.settle();
@@ -216,7 +216,7 @@ fn the_newest_request_replaces_a_waiting_one() {
     }
     let last = bench.state.pair_key().unwrap();
     assert_eq!(last.pair, PairId(11));
-    assert!(bench.runtime.waiting(Lane::Files) <= 2 + 4 + 1, "labels, the pair, four neighbours and the settings");
+    assert!(bench.runtime.waiting(Lane::Files) <= 2 + 4 + 1, "labels, the pair, four neighbors and the settings");
     bench.settle();
     assert_eq!(bench.services.source.loads_of(0), 0);
     assert_eq!(bench.services.source.loads_of(11), 1);
@@ -227,7 +227,7 @@ fn the_newest_request_replaces_a_waiting_one() {
 fn a_request_that_runs_is_not_started_twice() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::GelRaw]));
-    // Labels first, then the sample, then a neighbour: its answer waits while the screen goes on.
+    // Labels first, then the sample, then a neighbor: its answer waits while the screen goes on.
     assert!(bench.runtime.run_one(Lane::Files));
     while bench.services.source.loads() == 0 {
         assert!(bench.runtime.run_one(Lane::Files));
@@ -274,14 +274,14 @@ fn preferences_are_kept_in_range_and_saved() {
     bench.send(Command::SetMaskOpacity(-3.0));
     assert_eq!(bench.state.settings.mask_opacity, 0.0);
     let range = bench.state.settings.range;
-    bench.send(Command::SetRange(touch2touch::app::settings::ColourRange { min_m: 1.0, max_m: f32::NAN, ..range }));
+    bench.send(Command::SetRange(touch2touch::app::settings::ColorRange { min_m: 1.0, max_m: f32::NAN, ..range }));
     assert_eq!(bench.state.settings.range, range);
     bench.settle();
     assert_eq!(bench.services.settings_saved(), saved + 1, "changes that wait for the disk become one");
 }
 
 #[test]
-fn the_colour_range_stays_until_it_is_told_otherwise() {
+fn the_color_range_stays_until_it_is_told_otherwise() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Measured]));
     bench.settle();
@@ -292,7 +292,7 @@ fn the_colour_range_stays_until_it_is_told_otherwise() {
     bench.send(Command::RangeFromShown);
     assert_ne!(bench.state.settings.range, range);
     let fitted = bench.state.settings.range;
-    bench.send(Command::SetRange(touch2touch::app::settings::ColourRange { locked: false, ..fitted }));
+    bench.send(Command::SetRange(touch2touch::app::settings::ColorRange { locked: false, ..fitted }));
     bench.send(Command::Step(1));
     bench.settle();
     assert_ne!(bench.state.settings.range.max_m, fitted.max_m, "unlocked, it follows the pair");

@@ -102,9 +102,8 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let accepted = [Some(AcceptedPose { pose, by_hand: true }), None];
     let name = cases[0]["name"].as_str().unwrap();
     store.save_review(name, &StoredReview { review: "todo".into(), accepted }).unwrap();
-    let labelled = json(&run(&["pose", set_text, "--json"], data_path));
-    let cases: Vec<&Value> =
-        labelled["cases"].as_array().unwrap().iter().filter(|c| !c["accepted"].is_null()).collect();
+    let labeled = json(&run(&["pose", set_text, "--json"], data_path));
+    let cases: Vec<&Value> = labeled["cases"].as_array().unwrap().iter().filter(|c| !c["accepted"].is_null()).collect();
     assert_eq!(cases.len(), 1);
     let found = &cases[0]["accepted"];
     assert_eq!((cases[0]["name"].as_str(), found["by_hand"].as_bool()), (Some(name), Some(true)));
@@ -169,13 +168,13 @@ fn every_engine_is_measured_on_fresh_cases_and_drawn() {
 }
 
 #[test]
-fn a_cad_model_in_millimetres_is_refused_with_an_offer_that_can_be_accepted() {
+fn a_cad_model_in_millimeters_is_refused_with_an_offer_that_can_be_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("set");
     let set_text = set.to_str().unwrap();
     let tool = "pattern_36";
     assert!(run(&["simulate", "--out", set_text, "--tools", tool, "--grasps", "1"], dir.path()).status.success());
-    let metres = json(&run(&["pose", set_text, "--json"], dir.path()));
+    let meters = json(&run(&["pose", set_text, "--json"], dir.path()));
     let file = set.join("tools_stls").join(format!("{tool}.stl"));
     let mut mesh = touch2touch::io::stl::read(&file).unwrap().mesh;
     mesh.vertices.iter_mut().for_each(|v| *v *= 1e3);
@@ -188,7 +187,7 @@ fn a_cad_model_in_millimetres_is_refused_with_an_offer_that_can_be_accepted() {
     let accept = |args: &[&str]| {
         let done = run(&[&["pose", set_text, "--json"], args].concat(), dir.path());
         assert!(done.status.success(), "{}", error_text(&done));
-        let (a, b) = (&json(&done)["cases"][0]["angle_deg"], &metres["cases"][0]["angle_deg"]);
+        let (a, b) = (&json(&done)["cases"][0]["angle_deg"], &meters["cases"][0]["angle_deg"]);
         assert!((a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-3, "{a} {b}");
     };
     accept(&["--tool-scale", "auto"]);

@@ -70,7 +70,7 @@ fn predictions_are_kept_found_again_and_cleared() {
 }
 
 #[test]
-fn lengths_of_pictures_are_in_the_assumed_metres() {
+fn lengths_of_pictures_are_in_the_assumed_meters() {
     use touch2touch::domain::grid::Grid;
     use touch2touch::io::images;
     let dir = tempfile::tempdir().unwrap();
@@ -79,7 +79,7 @@ fn lengths_of_pictures_are_in_the_assumed_metres() {
     let bundle = full_size_bundle(dir.path());
     let gelslim = Grid::from_fn(128, 128, |x, y| [(x % 90) as f32 + 80.0, (y % 70) as f32 + 90.0, 120.0]);
     images::write_rgb8(&set.join("a_gelslim.png"), &gelslim).unwrap();
-    images::write_grey8(&set.join("a_bubble.png"), &Grid::from_fn(128, 128, |x, y| (x + y) as u8)).unwrap();
+    images::write_gray8(&set.join("a_bubble.png"), &Grid::from_fn(128, 128, |x, y| (x + y) as u8)).unwrap();
     let [set, out, bundle] = [&set, &dir.path().join("out"), &bundle].map(|p| p.to_str().unwrap().to_owned());
     let args = ["generate", "--input", &set, "--out", &out, "--bundle", &bundle, "--runtime", "rten", "--json"];
     let report = json(&run(&args, &home));

@@ -85,10 +85,10 @@ fn cloud(points: &[DVec3], colors: &[[u8; 3]], size: PointSize) -> CloudItem {
     }
 }
 
-/// A square of side `2 * half` in the plane through `centre` that faces `normal`.
-fn square(centre: DVec3, normal: DVec3, half: f64) -> TriMesh {
+/// A square of side `2 * half` in the plane through `center` that faces `normal`.
+fn square(center: DVec3, normal: DVec3, half: f64) -> TriMesh {
     let (u, v) = normal.any_orthonormal_pair();
-    let corner = |a: f64, b: f64| centre + (u * a + v * b) * half;
+    let corner = |a: f64, b: f64| center + (u * a + v * b) * half;
     TriMesh {
         vertices: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
@@ -107,7 +107,7 @@ fn inked(picture: &Picture) -> Vec<[u32; 2]> {
 }
 
 #[test]
-fn a_point_appears_at_its_pixel_in_its_colour_and_size() {
+fn a_point_appears_at_its_pixel_in_its_color_and_size() {
     let Some(mut view) = View::new() else { return };
     for orthographic in [false, true] {
         for preset in [None, Some(Preset::Left), Some(Preset::Top)] {
@@ -126,9 +126,9 @@ fn a_point_appears_at_its_pixel_in_its_colour_and_size() {
             let ink = inked(&picture);
             // A disc of 9 px has 63.6 px; multisampling and its rim give or take a ring of pixels.
             assert!((50..=90).contains(&ink.len()), "{}", ink.len());
-            let centre = ink.iter().fold(DVec2::ZERO, |s, [x, y]| s + DVec2::new(f64::from(*x), f64::from(*y)));
-            let centre = centre / ink.len() as f64 + 0.5;
-            assert!((centre - at).length() < 0.6, "{centre} for {at}");
+            let center = ink.iter().fold(DVec2::ZERO, |s, [x, y]| s + DVec2::new(f64::from(*x), f64::from(*y)));
+            let center = center / ink.len() as f64 + 0.5;
+            assert!((center - at).length() < 0.6, "{center} for {at}");
         }
     }
 }
@@ -143,16 +143,16 @@ fn one_sample_per_pixel_shows_the_same_point() {
         view.picture(&SceneData { clouds: vec![cloud(&[p], &[[10, 200, 90]], PointSize::Px(9.0))], ..scene() });
     let [x, y] = view.pixel(p);
     assert_eq!(picture.rgb(x, y), Some([10, 200, 90]));
-    // Nothing but the two colours: 63.6 px of disc, 28 px of rim that may fall to either side.
+    // Nothing but the two colors: 63.6 px of disc, 28 px of rim that may fall to either side.
     let ink = inked(&picture);
     assert!(ink.iter().all(|[x, y]| picture.rgb(*x, *y) == Some([10, 200, 90])));
     assert!((52..=76).contains(&ink.len()), "{}", ink.len());
 }
 
 #[test]
-fn size_in_metres_shrinks_with_distance() {
+fn size_in_meters_shrinks_with_distance() {
     let Some(mut view) = View::new() else { return };
-    let scene = SceneData { clouds: vec![cloud(&[DVec3::ZERO], &[[255; 3]], PointSize::Metres(0.01))], ..scene() };
+    let scene = SceneData { clouds: vec![cloud(&[DVec3::ZERO], &[[255; 3]], PointSize::Meters(0.01))], ..scene() };
     for distance in [0.1, 0.2] {
         view.camera.distance = distance;
         let diameter = 0.01 * view.camera.px_per_m(SIZE);
@@ -294,7 +294,7 @@ fn a_line_that_passes_the_eye_is_cut_not_lost() {
 }
 
 #[test]
-fn the_colour_maps_of_gpu_and_cpu_are_the_same() {
+fn the_color_maps_of_gpu_and_cpu_are_the_same() {
     let Some(mut view) = View::new() else { return };
     view.camera.orthographic = true;
     view.camera.look_from(Preset::Front);
@@ -433,7 +433,7 @@ fn empty_and_impossible_input_is_a_picture_or_an_error_not_a_panic() {
     let empty_mesh = mesh_item(TriMesh::default(), MeshStyle::default());
     let picture = view.picture(&SceneData { clouds: vec![nothing, bad], meshes: vec![empty_mesh], ..scene() });
     let [x, y] = view.pixel(DVec3::ZERO);
-    assert_eq!(picture.rgb(x, y), Some([107; 3]), "a point without a colour is drawn as NaN");
+    assert_eq!(picture.rgb(x, y), Some([107; 3]), "a point without a color is drawn as NaN");
     view.target.resize(&view.gpu, [0, 0]).unwrap();
     assert_eq!(view.target.size(), [1, 1]);
     assert_eq!(view.picture(&scene()).rgba.len(), 4);

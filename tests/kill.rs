@@ -342,8 +342,8 @@ fn no_confirmed_stroke_is_lost_to_a_kill() {
                     let dir = tempfile::tempdir().unwrap();
                     for pair in 0..PAIRS {
                         let file = |kind: &str| dir.path().join(format!("touch_{pair}_{kind}.png"));
-                        let grey = Grid::from_fn(32, 32, |x, y| ((x * y * (pair as usize + 1)) % 256) as u8);
-                        images::write_grey8(&file("bubble"), &grey).unwrap();
+                        let gray = Grid::from_fn(32, 32, |x, y| ((x * y * (pair as usize + 1)) % 256) as u8);
+                        images::write_gray8(&file("bubble"), &gray).unwrap();
                         images::write_rgb8(&file("gelslim"), &Grid::from_fn(32, 32, |x, _| [x as f32; 3])).unwrap();
                     }
                     for round in 0..ROUNDS {

@@ -175,7 +175,7 @@ fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
     let generate = ["generate", "--input", &set, "--out", &out, "--runtime", "rten", "--json", "--bundle"];
     let found = report(&run(&[&generate[..], &[&tiny]].concat(), &home));
     assert_eq!(found["pairs"][0]["finger"], "thumb");
-    let depth: Grid<f32> = images::read_grey(&Path::new(&out).join("a_thumb.png")).unwrap();
+    let depth: Grid<f32> = images::read_gray(&Path::new(&out).join("a_thumb.png")).unwrap();
     assert_eq!(depth.size(), [175, 140]);
     // A bundle for other sensors says so, and what would fit; without a name the fitting one is looked for.
     let lab = bundle("generator");

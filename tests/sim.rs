@@ -155,7 +155,7 @@ fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
     }
 }
 
-/// The colour streaks appear where the ridges are, in both fingers' pictures.
+/// The color streaks appear where the ridges are, in both fingers' pictures.
 #[test]
 fn gelslim_streaks_frame_the_bars() {
     for (tool, sample) in a_few() {
@@ -168,11 +168,11 @@ fn gelslim_streaks_frame_the_bars() {
                     let yz = sim::gelslim_yz(finger, column as f64, row as f64);
                     let s = tool.outline_distance(object_from_grasp.transform_yz(yz));
                     let [r, g, b] = difference[(column, row)];
-                    let colour = (r - g).abs() + (g - b).abs();
+                    let color = (r - g).abs() + (g - b).abs();
                     if (-1e-3..0.0).contains(&s) {
-                        near.push(f64::from(colour));
+                        near.push(f64::from(color));
                     } else if s > 4e-3 {
-                        far.push(f64::from(colour));
+                        far.push(f64::from(color));
                     }
                 }
             }

@@ -22,13 +22,13 @@ use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::pose::{Engine, FingerInput, Fingers, PoseError, PoseReport, estimate, register};
 use touch2touch::domain::rig::Rig;
 use touch2touch::domain::tool::{ToolError, ToolModel};
-use touch2touch::domain::units::{angle_error, scale_to_metres};
+use touch2touch::domain::units::{angle_error, scale_to_meters};
 use touch2touch::io::cases::{self, Case};
 
-/// A box with the given half sizes about `centre`, closed, facing outwards.
-fn cuboid(centre: DVec3, half: DVec3) -> TriMesh {
+/// A box with the given half sizes about `center`, closed, facing outwards.
+fn cuboid(center: DVec3, half: DVec3) -> TriMesh {
     let sign = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    let vertices = (0..8).map(|i| centre + half * DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect();
+    let vertices = (0..8).map(|i| center + half * DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect();
     let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     TriMesh { vertices, triangles: quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect() }
 }
@@ -166,7 +166,7 @@ fn e03_coincident_points_and_too_few_have_no_pose() {
     assert_eq!(closed_form::in_space(&same.iter().map(|p| (*p, *p)).collect::<Vec<_>>()), None);
 }
 
-/// Offsets in the plane up to a thousand kilometres.
+/// Offsets in the plane up to a thousand kilometers.
 const OFFSETS: [DVec2; 6] = [
     DVec2::ZERO,
     DVec2::new(1.0, -2.0),
@@ -209,7 +209,7 @@ fn e04_a_large_offset_does_not_cost_the_angle() {
         let error = turn_between(closed_form::in_space(&pairs).unwrap(), truth.to_affine());
         assert!(error <= 1e-4, "closed form in space at {offset}: {error} deg");
     }
-    // Farther out the numbers themselves no longer hold millimetres: an error, not an answer.
+    // Farther out the numbers themselves no longer hold millimeters: an error, not an answer.
     let far: Vec<DVec2> = yz(&scene).iter().map(|p| *p + DVec2::splat(1e9)).collect();
     assert!(matches!(align(&far, &model.field, &AlignConfig::default()), Err(AlignError::TooFewPoints { got: 0, .. })));
 }
@@ -236,7 +236,7 @@ fn e05_the_scale_does_not_change_the_angle_or_is_an_error() {
             (mesh.vertices.iter()).map(|p| (*p * scale, truth.to_affine().transform_point3(*p) * scale)).collect();
         assert!(turn_between(closed_form::in_space(&pairs).unwrap(), truth.to_affine()) < 1e-3, "scale {scale}");
 
-        // The lab's loop has none either, except that contacts within a millimetre are one spot.
+        // The lab's loop has none either, except that contacts within a millimeter are one spot.
         let scaled = |v: &[DVec3]| v.iter().map(|p| *p * scale).collect::<Vec<_>>();
         match lab_icp(&scaled(&scene), &LabModel::new(&scaled(&surface)), &LabIcpConfig::default()) {
             Ok(report) => {
@@ -248,12 +248,12 @@ fn e05_the_scale_does_not_change_the_angle_or_is_an_error() {
             Err(other) => panic!("scale {scale}: {other}"),
         }
 
-        // The robust kernels are in millimetres: another unit is refused, with the factor that repairs it.
+        // The robust kernels are in millimeters: another unit is refused, with the factor that repairs it.
         match ToolModel::new(scaled_mesh(&mesh, scale)).map(|_| ()) {
             // A tool of 4 mm or 40 cm is unusual, not impossible.
             Ok(()) => assert!((0.1..=10.0).contains(&scale), "scale {scale}"),
             Err(ToolError::Field(FieldError::Units { size, scale: Some(offered) })) => {
-                assert_eq!(scale_to_metres(size), Some(offered));
+                assert_eq!(scale_to_meters(size), Some(offered));
                 assert!((0.004..=0.4).contains(&(size * offered)), "scale {scale}: offered {offered}");
             }
             Err(ToolError::Field(FieldError::Units { scale: None, .. })) => {}
@@ -268,18 +268,18 @@ fn scaled_mesh(mesh: &TriMesh, scale: f64) -> TriMesh {
 
 #[test]
 fn e06_a_tool_in_another_unit_is_refused_and_after_the_offer_the_same() {
-    let metres = angle_mesh();
+    let meters = angle_mesh();
     let truth = pose(9.0, -1.0, 2.0);
-    let scene = contacts(&metres, 600, truth, 1e-4, 5);
+    let scene = contacts(&meters, 600, truth, 1e-4, 5);
     let reference: Vec<AlignReport> =
-        Engine::iter().map(|e| register(&scene, &tool(metres.clone()), e, false).unwrap()).collect();
+        Engine::iter().map(|e| register(&scene, &tool(meters.clone()), e, false).unwrap()).collect();
     for unit in [1e-2, 1e-3] {
-        let stored = scaled_mesh(&metres, 1.0 / unit);
+        let stored = scaled_mesh(&meters, 1.0 / unit);
         let model = match ToolModel::new(stored.clone()).map(|_| ()) {
-            // 4 cm read as metres.
+            // 4 cm read as meters.
             Err(ToolError::Field(FieldError::Units { scale: Some(offered), .. })) => {
                 // More than one unit may make a tool of a plausible size; the right one always does.
-                assert!(scale_to_metres(4.0) == Some(offered) || unit == 1e-3, "{offered}");
+                assert!(scale_to_meters(4.0) == Some(offered) || unit == 1e-3, "{offered}");
                 tool(scaled_mesh(&stored, unit))
             }
             other => panic!("{unit}: {other:?}"),
@@ -292,7 +292,7 @@ fn e06_a_tool_in_another_unit_is_refused_and_after_the_offer_the_same() {
         }
     }
     let config = AlignConfig::default();
-    let model = tool(metres);
+    let model = tool(meters);
     assert!(matches!(align(&yz(&scene)[..31], &model.field, &config), Err(AlignError::TooFewPoints { got: 31, .. })));
     let spot: Vec<DVec2> = yz(&scene).iter().map(|p| *p * 0.01).collect();
     assert!(matches!(align(&spot, &model.field, &config), Err(AlignError::Coincident { .. })), "below four cells");
@@ -314,7 +314,7 @@ fn e07_what_is_not_observable_is_flagged_and_stays_where_it_was() {
             })
             .collect();
         let along = DVec2::from_angle(truth.theta_rad).rotate(DVec2::Y);
-        let centre = scene.iter().sum::<DVec2>() / scene.len() as f64;
+        let center = scene.iter().sum::<DVec2>() / scene.len() as f64;
         let aimed = AlignConfig { starts: vec![pose(degrees, 0.0, 0.0)], ..AlignConfig::default() };
         for (config, straight_on) in [(AlignConfig::default(), false), (aimed, true)] {
             let report = align(&scene, &model.field, &config).unwrap();
@@ -329,7 +329,7 @@ fn e07_what_is_not_observable_is_flagged_and_stays_where_it_was() {
             assert!(weak.length() > 0.9 && off < 5.0, "seed {seed}: {weak} is {off} deg off the rod");
             // Along the rod nothing is known, so nothing may change: the spot of the rod that lies under the middle of
             // the contacts is the one that lay there at the start. (The turn about that middle moves the rod's origin.)
-            let spot = |p: PlanarPose| p.inverse().transform_yz(centre).y;
+            let spot = |p: PlanarPose| p.inverse().transform_yz(center).y;
             let slide = spot(found) - spot(report.start);
             assert!(slide.abs() < 1e-4, "seed {seed}: slid by {} mm", 1e3 * slide);
             if straight_on {
@@ -345,7 +345,7 @@ fn e07_what_is_not_observable_is_flagged_and_stays_where_it_was() {
         let report = report.unwrap();
         let o = report.observability.unwrap();
         assert!(o.degenerate && o.weakest[0].abs() > 0.95, "a disc turns freely: {o:?}");
-        assert_eq!(o.weakest_text(), "turns about its centre");
+        assert_eq!(o.weakest_text(), "turns about its center");
         assert!(report.grasp_from_object.is_finite());
     }
 }

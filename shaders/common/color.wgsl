@@ -1,4 +1,4 @@
-// Colour maps, sRGB-encoded. CPU twin: src/domain/colormap.rs (a GPU test compares them).
+// Color maps, sRGB-encoded. CPU twin: src/domain/colormap.rs (a GPU test compares them).
 
 const NAN_COLOR: vec3<f32> = vec3<f32>(0.42, 0.42, 0.42);
 
@@ -37,7 +37,7 @@ fn map_color(map: u32, unit: f32) -> vec3<f32> {
     }
 }
 
-// The colour of a value given by its bits: drivers may assume that floats are numbers, so NaN is found in the bits.
+// The color of a value given by its bits: drivers may assume that floats are numbers, so NaN is found in the bits.
 fn scalar_color(map: u32, bits: u32, lo: f32, hi: f32) -> vec3<f32> {
     if (bits & 0x7fffffffu) > 0x7f800000u {
         return NAN_COLOR;

@@ -1,7 +1,7 @@
 // Group 0: the camera, the same for every shader. Rust twin: gpu::view::ViewUniform.
 //
 // World = the grasp frame: x = closing axis of the gripper, +z = the direction the tool points,
-// y = lateral, right-handed, metres. Clip depth is reversed: 1 at the near plane, 0 far away.
+// y = lateral, right-handed, meters. Clip depth is reversed: 1 at the near plane, 0 far away.
 struct ViewUniform {
     clip_from_world: mat4x4<f32>,
     // xyz, w = 1: where the eye is (perspective). xyz, w = 0: the direction towards it (orthographic).
@@ -9,7 +9,7 @@ struct ViewUniform {
     // Towards the top of the screen; light comes from above the eye.
     up_in_world: vec4<f32>,
     size_px: vec2<f32>,
-    // Pixels per metre where clip w = 1; divide by clip w for any other place.
+    // Pixels per meter where clip w = 1; divide by clip w for any other place.
     px_per_m: f32,
     unused: f32,
 }

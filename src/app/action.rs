@@ -9,7 +9,7 @@ use super::inspect::{InspectCommand, Inspected};
 use super::keys::{ImprintSource, PoseEngine, Request, ShiftMode};
 use super::library::Place;
 use super::seeds::SeedsCommand;
-use super::settings::{ColourRange, MaskTool, Theme, Workspace};
+use super::settings::{ColorRange, MaskTool, Theme, Workspace};
 use super::state::State;
 use super::workbench::{Layer, SceneTool, WorkbenchCommand};
 use crate::domain::hand::HandAxis;
@@ -301,9 +301,9 @@ actions! {
     Correspondences, Pose, "Correspondences", "Draws lines from contact points to where they are pulled, or not", [];
     NextPoseEngine, Pose, "Other registration", "Goes through the registrations", [];
 
-    LockRange, View, "Lock the colour range", "Keeps the colours from pair to pair, or fits them to each", [plain(K::O)];
-    RangeOnce, View, "Fit the colour range once", "Sets the colour range from what is shown", [plain(K::C)];
-    ResetRange, View, "Reset the colour range", "Sets the colour range to 0 to 18 mm", [shift(K::C)];
+    LockRange, View, "Lock the color range", "Keeps the colors from pair to pair, or fits them to each", [plain(K::O)];
+    RangeOnce, View, "Fit the color range once", "Sets the color range from what is shown", [plain(K::C)];
+    ResetRange, View, "Reset the color range", "Sets the color range to 0 to 18 mm", [shift(K::C)];
     Fit, View, "Fit", "Fits images and 3D views to their panes", [plain(K::Num0)];
     CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl_alt(K::Num1)];
     CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl_alt(K::Num2)];
@@ -315,13 +315,13 @@ actions! {
     LinkCameras, View, "Link cameras", "Moves both 3D views together", [];
     Footprint, View, "GelSlim window", "Draws the GelSlim's window on bubble images", [];
     SwitchTheme, View, "Dark or light", "Switches between the dark and the light theme", [];
-    DepthChain, View, "Depth chain", "Shows everything between the decoder and the metres, stage by stage", [];
+    DepthChain, View, "Depth chain", "Shows everything between the decoder and the meters, stage by stage", [];
     InspectWorkspace, View, "Inspect", "Truth and prediction side by side", [];
     AlignWorkspace, View, "Align", "The cloud on the CAD model", [];
     LabelWorkspace, View, "Label", "Correcting masks", [];
     EvaluateWorkspace, View, "Evaluate", "The figures", [];
     ResetWorkspace, View, "Reset workspace", "Puts the panes back where they were", [];
-    MaximisePane, View, "Maximise pane", "Lets one pane fill the window", [plain(K::Backtick)];
+    MaximizePane, View, "Maximize pane", "Lets one pane fill the window", [plain(K::Backtick)];
     Fullscreen, View, "Full screen", "Fills the screen", [plain(K::F11)];
     Screenshot, View, "Screenshot", "Saves a picture of the window", [plain(K::F12)];
     CopyHovered, View, "Copy the hovered value", "Copies the number under the pointer", [ctrl(K::C)];
@@ -369,7 +369,7 @@ impl Action {
         }
     }
 
-    /// What it does now; `None` = it cannot do anything now (greyed out).
+    /// What it does now; `None` = it cannot do anything now (grayed out).
     pub fn command(self, state: &State) -> Option<Command> {
         let open = state.library.open.is_some();
         let selected = state.entry().is_some();
@@ -495,11 +495,9 @@ impl Action {
             Self::Correspondences => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines)),
             Self::NextPoseEngine => next_of::<PoseEngine>(&settings.pose_engine).map(Command::SetPoseEngine),
 
-            Self::LockRange => {
-                Some(Command::SetRange(ColourRange { locked: !settings.range.locked, ..settings.range }))
-            }
+            Self::LockRange => Some(Command::SetRange(ColorRange { locked: !settings.range.locked, ..settings.range })),
             Self::RangeOnce => when(selected, Command::RangeFromShown),
-            Self::ResetRange => Some(Command::SetRange(ColourRange::default())),
+            Self::ResetRange => Some(Command::SetRange(ColorRange::default())),
             Self::Fit => ui(UiRequest::Fit),
             Self::CameraLeft => ui(UiRequest::Camera(CameraPreset::Left)),
             Self::CameraRight => ui(UiRequest::Camera(CameraPreset::Right)),
@@ -519,7 +517,7 @@ impl Action {
             Self::LabelWorkspace => Some(Command::SetWorkspace(Workspace::Label)),
             Self::EvaluateWorkspace => Some(Command::SetWorkspace(Workspace::Evaluate)),
             Self::ResetWorkspace => ui(UiRequest::ResetWorkspace),
-            Self::MaximisePane => ui(UiRequest::ToggleMaximised),
+            Self::MaximizePane => ui(UiRequest::ToggleMaximized),
             Self::Fullscreen => ui(UiRequest::ToggleFullscreen),
             Self::Screenshot => ui(UiRequest::Screenshot),
             Self::CopyHovered => when(state.selection.hover.is_some(), Command::Ui(UiRequest::CopyHovered)),
@@ -610,7 +608,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_open_greys_out_what_needs_data() {
+    fn nothing_open_grays_out_what_needs_data() {
         let state = State::default();
         for action in [Action::Generate, Action::NextSample, Action::Undo, Action::FillHoles, Action::Reload] {
             assert!(action.command(&state).is_none(), "{action:?}");

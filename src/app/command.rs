@@ -17,7 +17,7 @@ use super::results::Preview;
 use super::seeds::SeedsCommand;
 use super::services::{DataSource, Followed};
 use super::settings::{
-    ColourMap, ColourRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, Settings, Theme, Workspace,
+    ColorMap, ColorRange, GenerateSettings, MaskSettings, MaskSource, MaskTool, Settings, Theme, Workspace,
 };
 use super::tasks::Ticket;
 use super::workbench::WorkbenchCommand;
@@ -79,7 +79,7 @@ pub enum Pane {
     Layers,
     /// Poses of truth, measurement and prediction, per finger and joint.
     Poses,
-    /// The depth chain: from the decoder to metres, stage by stage.
+    /// The depth chain: from the decoder to meters, stage by stage.
     Ledger,
     /// The figures of the selected pair.
     Metrics,
@@ -98,7 +98,7 @@ pub enum Pane {
 pub struct Hover {
     /// The finger.
     pub finger: PadId,
-    /// Column and row; (0, 0) is the centre of the top-left pixel.
+    /// Column and row; (0, 0) is the center of the top-left pixel.
     pub at_px: [f32; 2],
 }
 
@@ -137,7 +137,7 @@ pub enum UiRequest {
     /// Fill the screen, or stop it.
     ToggleFullscreen,
     /// Let one pane fill the window, or stop it.
-    ToggleMaximised,
+    ToggleMaximized,
     /// Put the panes of the workspace back where they were.
     ResetWorkspace,
     /// Write the number under the pointer to the clipboard.
@@ -186,7 +186,7 @@ pub enum Command {
     ShowBothFingers(bool),
     /// The pixel under the pointer, shared by all images.
     HoverPixel(Option<Hover>),
-    /// The point under the pointer in 3D, metres, grasp frame.
+    /// The point under the pointer in 3D, meters, grasp frame.
     HoverPoint(Option<DVec3>),
     /// The panes on screen.
     ShowPanes(BTreeSet<Pane>),
@@ -268,13 +268,13 @@ pub enum Command {
     SetTheme(Theme),
     /// Scale of the window.
     SetUiZoom(f32),
-    /// The colour range.
-    SetRange(ColourRange),
-    /// Sets the colour range once from what is shown.
+    /// The color range.
+    SetRange(ColorRange),
+    /// Sets the color range once from what is shown.
     RangeFromShown,
-    /// The colour map.
-    SetColourMap(ColourMap),
-    /// How predictions become metres.
+    /// The color map.
+    SetColorMap(ColorMap),
+    /// How predictions become meters.
     SetShift(ShiftMode),
     /// The generator.
     SetGenerate(GenerateSettings),

@@ -37,8 +37,8 @@ pub struct Inspect {
     pub lines: bool,
     /// The plane of the basin map.
     pub plane: Plane,
-    /// What colours the basin map.
-    pub colour: BasinColour,
+    /// What colors the basin map.
+    pub color: BasinColor,
 }
 
 impl Default for Inspect {
@@ -52,14 +52,14 @@ impl Default for Inspect {
             pins: [None, None],
             lines: true,
             plane: Plane::default(),
-            colour: BasinColour::default(),
+            color: BasinColor::default(),
         }
     }
 }
 
-/// What colours a basin map.
+/// What colors a basin map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
-pub enum BasinColour {
+pub enum BasinColor {
     /// Square root of the cost at the end.
     #[default]
     Cost,
@@ -69,7 +69,7 @@ pub enum BasinColour {
     Winner,
 }
 
-impl BasinColour {
+impl BasinColor {
     /// The name on screen.
     pub fn name(self) -> &'static str {
         match self {
@@ -95,9 +95,9 @@ pub struct Pin {
     pub at: usize,
     /// The pose, `grasp_from_object`.
     pub grasp_from_object: PlanarPose,
-    /// Cost per point there, square metres.
+    /// Cost per point there, square meters.
     pub cost_m2: f64,
-    /// Width of the kernel that the cost is of, metres; infinite without one.
+    /// Width of the kernel that the cost is of, meters; infinite without one.
     pub kernel_m: f64,
 }
 
@@ -133,8 +133,8 @@ pub enum InspectCommand {
     Lines(bool),
     /// The plane of the basin map.
     Plane(Plane),
-    /// What colours the basin map.
-    Colour(BasinColour),
+    /// What colors the basin map.
+    Color(BasinColor),
     /// Gives up the basin map that is being computed.
     StopBasin,
 }
@@ -144,7 +144,7 @@ pub enum InspectCommand {
 pub struct Inspection {
     /// The recorded registration.
     pub result: Arc<PoseResult>,
-    /// The contact points that were offered, metres, grasp frame.
+    /// The contact points that were offered, meters, grasp frame.
     pub points: Vec<DVec3>,
     /// What the points are compared with.
     pub counterparts: Counterparts,

@@ -43,7 +43,7 @@ pub type PreviewSink = Arc<dyn Fn(Preview) + Send + Sync>;
 pub struct PreviewWish {
     /// After so many steps, and after the first; 0 = never.
     pub every: u32,
-    /// How they become metres.
+    /// How they become meters.
     pub shift: ShiftMode,
     /// The touches whose predicted imprint is on screen.
     pub touches: BTreeSet<TouchKey>,

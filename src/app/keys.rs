@@ -49,7 +49,7 @@ pub fn shift_tooltip(mode: ShiftMode) -> &'static str {
     match mode {
         ShiftMode::Raw => "As the lab's generator stores it: the range is mapped twice, so depths are too large",
         ShiftMode::PaperShift => "Mean and spread matched to the training statistics, as the paper's pixel shift does",
-        ShiftMode::ExactInverse => "The doubled range mapping undone exactly: metres",
+        ShiftMode::ExactInverse => "The doubled range mapping undone exactly: meters",
         ShiftMode::Refit(_) => "Mean and spread matched to statistics of this data set's own predictions",
     }
 }
@@ -106,7 +106,7 @@ impl PredictionKey {
     }
 }
 
-/// One imprint in metres.
+/// One imprint in meters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum ImprintKey {
     /// Measured: it is in the sample.
@@ -204,7 +204,7 @@ pub struct BasinKey {
 pub struct EnsembleKey {
     /// At least one; they differ in their seeds.
     pub recipes: Vec<PredictionKey>,
-    /// How they become metres.
+    /// How they become meters.
     pub shift: ShiftMode,
 }
 
@@ -225,7 +225,7 @@ pub enum Request {
     Seed(PredictionKey),
     /// Mean and spread of several predictions.
     Ensemble(EnsembleKey),
-    /// A prediction in metres (of a raw prediction that exists).
+    /// A prediction in meters (of a raw prediction that exists).
     Imprint(PredictionKey, ShiftMode),
     /// A prediction against the measurement.
     Comparison(PredictionKey, ShiftMode),

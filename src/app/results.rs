@@ -132,7 +132,7 @@ pub struct Results {
     pub thumbnails: Cache<PairKey, DepthMap>,
     /// Raw predictions.
     pub predictions: Cache<PredictionKey, Prediction>,
-    /// Predictions in metres, as large as the bubble image.
+    /// Predictions in meters, as large as the bubble image.
     pub imprints: Cache<(PredictionKey, ShiftMode), DepthMap>,
     /// Predictions of a color sensor: differences, 0..255 scale.
     pub colors: Cache<PredictionKey, RgbGrid>,

@@ -64,7 +64,7 @@ impl State {
         Ok(seeds(first.seed, self.seeds.count).into_iter().map(recipe).collect())
     }
 
-    /// The imprint of one seed in metres, if it is there.
+    /// The imprint of one seed in meters, if it is there.
     pub fn seed_imprint(&self, recipe: &PredictionKey) -> Option<&DepthMap> {
         self.results.imprints.get(&(recipe.clone(), self.settings.shift)).map(|imprint| &**imprint)
     }

@@ -54,7 +54,7 @@ pub trait DataSource: Send + Sync {
     /// With the file and the reason if it cannot be read.
     fn load(&self, pair: PairId) -> Result<Sample, TaskError>;
 
-    /// The CAD model of a tool, metres, object frame.
+    /// The CAD model of a tool, meters, object frame.
     ///
     /// # Errors
     /// If there is none, or it cannot be read.
@@ -152,7 +152,7 @@ pub trait Services: Send + Sync {
         Vec::new()
     }
 
-    /// Runs the mask model on an imprint in metres; the mask says what it is made of in the end. Called on the same lane as
+    /// Runs the mask model on an imprint in meters; the mask says what it is made of in the end. Called on the same lane as
     /// [`Self::predict`].
     ///
     /// # Errors

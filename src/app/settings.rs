@@ -30,15 +30,16 @@ pub const MAX_CACHE_MIB: u32 = 1 << 20;
 pub struct Settings {
     /// [`SETTINGS_VERSION`] of the program that wrote it.
     pub version: u32,
-    /// Colours of the window.
+    /// Colors of the window.
     pub theme: Theme,
     /// Scale of the whole window, 1 = the system's.
     pub ui_zoom: f32,
-    /// The colour range of imprints, shared by all panes.
-    pub range: ColourRange,
-    /// The colour map of imprints.
-    pub colour_map: ColourMap,
-    /// How predictions become metres.
+    /// The color range of imprints, shared by all panes.
+    pub range: ColorRange,
+    /// The color map of imprints.
+    #[serde(alias = "colour_map")]
+    pub color_map: ColorMap,
+    /// How predictions become meters.
     pub shift: ShiftMode,
     /// The last statistics made for a refit shift, to be chosen again.
     pub refit: Option<RefitShift>,
@@ -80,8 +81,8 @@ impl Default for Settings {
             version: SETTINGS_VERSION,
             theme: Theme::Dark,
             ui_zoom: 1.0,
-            range: ColourRange::default(),
-            colour_map: ColourMap::Viridis,
+            range: ColorRange::default(),
+            color_map: ColorMap::Viridis,
             shift: ShiftMode::default(),
             refit: None,
             generate: GenerateSettings::default(),
@@ -126,7 +127,7 @@ fn clamp_or(value: f32, lo: f32, hi: f32, default: f32) -> f32 {
     if value.is_finite() { value.clamp(lo, hi) } else { default }
 }
 
-/// Colours of the window.
+/// Colors of the window.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum Theme {
@@ -164,49 +165,49 @@ impl Workspace {
     }
 }
 
-/// The range of imprint depths that the colour map spans, shared by all panes.
+/// The range of imprint depths that the color map spans, shared by all panes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct ColourRange {
-    /// Depth of the first colour, metres.
+pub struct ColorRange {
+    /// Depth of the first color, meters.
     pub min_m: f32,
-    /// Depth of the last colour, metres.
+    /// Depth of the last color, meters.
     pub max_m: f32,
     /// Whether the range stays when another sample is shown. Unlocked, each new selection sets it.
     pub locked: bool,
 }
 
-impl Default for ColourRange {
+impl Default for ColorRange {
     /// 0..18 mm: a 10 mm press tents up to that depth.
     fn default() -> Self {
         Self { min_m: 0.0, max_m: 0.018, locked: true }
     }
 }
 
-impl ColourRange {
-    /// Whether colours can be looked up with it.
+impl ColorRange {
+    /// Whether colors can be looked up with it.
     pub fn is_valid(self) -> bool {
         self.min_m.is_finite() && self.max_m.is_finite() && self.min_m < self.max_m
     }
 }
 
-/// Colour maps for depth.
+/// Color maps for depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
-pub enum ColourMap {
-    /// Perceptually uniform, dark blue to yellow, readable by colour-blind eyes.
+pub enum ColorMap {
+    /// Perceptually uniform, dark blue to yellow, readable by color-blind eyes.
     #[default]
     Viridis,
-    /// Grey.
-    Grey,
+    /// Gray.
+    Gray,
 }
 
-impl ColourMap {
+impl ColorMap {
     /// The name on screen.
     pub fn name(self) -> &'static str {
         match self {
             Self::Viridis => "Viridis",
-            Self::Grey => "Grey",
+            Self::Gray => "Gray",
         }
     }
 }
@@ -322,11 +323,11 @@ pub struct MaskSettings {
     pub radius_px: f32,
     /// The automatic source in use where no mask was drawn by hand.
     pub source: MaskSource,
-    /// Depth of the threshold source, metres.
+    /// Depth of the threshold source, meters.
     pub threshold_m: f32,
     /// Share of the deepest pixels of the top-percent source, percent.
     pub top_percent: f32,
-    /// Distance to the CAD surface of the CAD source, metres.
+    /// Distance to the CAD surface of the CAD source, meters.
     pub cad_distance_m: f32,
     /// The mask bundle's name; `None` takes the first found.
     pub bundle: Option<String>,

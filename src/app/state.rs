@@ -62,7 +62,7 @@ pub struct Selection {
     pub both_fingers: bool,
     /// The pixel under the pointer: the cross-hair of all images.
     pub hover: Option<Hover>,
-    /// The point under the pointer in 3D, metres, grasp frame.
+    /// The point under the pointer in 3D, meters, grasp frame.
     pub hover_point: Option<DVec3>,
     /// The panes on screen.
     pub panes: BTreeSet<Pane>,

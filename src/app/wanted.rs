@@ -23,7 +23,7 @@ use crate::work::compare::Comparison;
 use crate::work::pose::PoseResult;
 use crate::work::tool::NamedTool;
 
-/// Neighbours loaded ahead on each side of the selection.
+/// Neighbors loaded ahead on each side of the selection.
 pub const PREFETCH: usize = 4;
 
 /// The mask in force.
@@ -90,7 +90,7 @@ impl State {
         }
     }
 
-    /// The imprint shown for one finger, metres, raw bubble orientation.
+    /// The imprint shown for one finger, meters, raw bubble orientation.
     pub fn imprint(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
         match self.imprint_key(source, finger) {
             Err(absent) => Lookup::Absent(absent),
@@ -431,7 +431,7 @@ impl State {
             list.ask(false, request);
         }
         list.thumbnails();
-        list.neighbours();
+        list.neighbors();
         list.list
     }
 
@@ -707,7 +707,7 @@ impl Wanted<'_> {
         }
     }
 
-    fn neighbours(&mut self) {
+    fn neighbors(&mut self) {
         let state = self.state;
         let (Some(open), Some(selected)) = (state.library.open.as_ref(), state.selection.pair) else {
             return;

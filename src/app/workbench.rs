@@ -14,10 +14,10 @@ use crate::domain::rig::{PadId, PerPad, Rig};
 use crate::work::layers::LayerResult;
 use crate::work::pose::PoseResult;
 
-/// What colours the contact points in 3D.
+/// What colors the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
 pub enum Layer {
-    /// One colour.
+    /// One color.
     #[default]
     None,
     /// How far each is from the model.
@@ -42,9 +42,9 @@ impl Layer {
     /// What it shows, for the tooltip.
     pub fn tooltip(self) -> &'static str {
         match self {
-            Self::None => "Contact points in one colour",
-            Self::Residuals => "Contact points coloured by their distance to the model, in millimetres",
-            Self::Reasons => "Contact points coloured by what became of them in the registration",
+            Self::None => "Contact points in one color",
+            Self::Residuals => "Contact points colored by their distance to the model, in millimeters",
+            Self::Reasons => "Contact points colored by what became of them in the registration",
             Self::Correspondences => "Lines from contact points to the model",
         }
     }
@@ -110,7 +110,7 @@ pub struct HandTry {
 /// What the 3D panes do and show besides.
 #[derive(Clone, Debug)]
 pub struct Workbench {
-    /// What colours the contact points.
+    /// What colors the contact points.
     pub layer: Layer,
     /// Whether the tool is moved along its weakest direction.
     pub animate_weakest: bool,
@@ -126,7 +126,7 @@ pub struct Workbench {
     pub hand: Option<HandTry>,
     /// The point clicked last.
     pub picked: Option<Picked>,
-    /// Points of the measurement, metres, grasp frame, and the side they were clicked in.
+    /// Points of the measurement, meters, grasp frame, and the side they were clicked in.
     pub marks: Vec<(ImprintSource, DVec3)>,
 }
 
@@ -163,7 +163,7 @@ impl Workbench {
 /// What can happen to the workbench.
 #[derive(Clone, Debug, PartialEq)]
 pub enum WorkbenchCommand {
-    /// What colours the contact points.
+    /// What colors the contact points.
     SetLayer(Layer),
     /// Whether the tool is moved along its weakest direction.
     SetAnimateWeakest(bool),
@@ -175,7 +175,7 @@ pub enum WorkbenchCommand {
     SetSixDof(bool),
     /// The side that the pointer is over.
     SetSide(ImprintSource),
-    /// Moves the tool along one axis, metres or radians.
+    /// Moves the tool along one axis, meters or radians.
     Nudge(HandAxis, f64),
     /// Puts the tool somewhere.
     SetHandPose(HandPose),

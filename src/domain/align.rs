@@ -45,7 +45,7 @@ pub use planar::align;
 pub use refine::RefineConfig;
 pub use register::{Ask, Register, Scene};
 
-/// Length that makes an angle comparable with a shift: one radian counts as this many metres.
+/// Length that makes an angle comparable with a shift: one radian counts as this many meters.
 ///
 /// It is the lever arm of typical contact points, so that both halves of a step move points about equally far.
 pub const ANGLE_SCALE_M: f64 = 0.02;
@@ -65,7 +65,7 @@ pub struct AlignConfig {
     pub points: usize,
     /// Points used to rank the starts.
     pub scout_points: usize,
-    /// Widths of the Geman-McClure kernel, metres, wide to narrow. The last one decides.
+    /// Widths of the Geman-McClure kernel, meters, wide to narrow. The last one decides.
     pub kernels_m: Vec<f64>,
     /// Most steps per kernel width and start.
     pub max_iterations: usize,
@@ -137,7 +137,7 @@ impl Default for Accept {
 pub struct Prior {
     /// Largest size of the angle, radians.
     pub theta_rad: f64,
-    /// Largest size of y and of z, metres.
+    /// Largest size of y and of z, meters.
     pub shift_m: f64,
 }
 
@@ -171,7 +171,7 @@ pub enum AlignError {
     /// All points lie in one spot.
     #[error("all contact points lie within {:.2} mm: a pose needs a contact area", .extent_m * 1e3)]
     Coincident {
-        /// Diagonal of the points' bounding box, metres.
+        /// Diagonal of the points' bounding box, meters.
         extent_m: f64,
     },
     /// The points are nowhere near the tool.
@@ -280,7 +280,7 @@ pub enum Verdict {
 pub struct RungAttempt {
     /// Which one.
     pub rung: Rung,
-    /// Cost per point of its answer, square metres; comparable between attempts with the same `points`.
+    /// Cost per point of its answer, square meters; comparable between attempts with the same `points`.
     pub cost_m2: f64,
     /// Points it used.
     pub points: usize,
@@ -302,9 +302,9 @@ pub struct Certificate {
     /// Points that the costs are about: thinned, so that the proof takes milliseconds. The answer is then refined
     /// on all.
     pub points: usize,
-    /// Cost per point of the best pose found, square metres.
+    /// Cost per point of the best pose found, square meters.
     pub cost_m2: f64,
-    /// No pose in the box costs less than this per point, square metres; proved even where `certified` is false.
+    /// No pose in the box costs less than this per point, square meters; proved even where `certified` is false.
     pub lower_bound_m2: f64,
     /// Boxes looked at.
     pub nodes: usize,
@@ -328,7 +328,7 @@ pub struct Run {
     pub start: PlanarPose,
     /// Where it ended, `grasp_from_object`.
     pub end: PlanarPose,
-    /// Cost per point there, square metres; comparable between the runs of one report.
+    /// Cost per point there, square meters; comparable between the runs of one report.
     pub cost_m2: f64,
     /// Steps taken.
     pub iterations: usize,
@@ -372,7 +372,7 @@ pub struct AlignReport {
     pub used: usize,
     /// Share of the used points within the narrowest kernel of the silhouette (or of the model points).
     pub inlier_share: f64,
-    /// Root mean square residual of those, metres.
+    /// Root mean square residual of those, meters.
     pub inlier_rms_m: f64,
     /// Whether the pose is where the gripper can hold a tool.
     pub within_prior: bool,
@@ -409,11 +409,11 @@ pub struct TraceStep {
     pub grasp_from_object: PlanarPose,
     /// The same with all six degrees of freedom where the registration has them.
     pub grasp_from_object_6dof: Option<DAffine3>,
-    /// Cost per point, square metres; comparable only at the same kernel width and number of points.
+    /// Cost per point, square meters; comparable only at the same kernel width and number of points.
     pub cost_m2: f64,
     /// Share of the points within the kernel's width.
     pub inlier_share: f64,
-    /// Width of the kernel, metres; infinite without one.
+    /// Width of the kernel, meters; infinite without one.
     pub kernel_m: f64,
     /// Points in use.
     pub points: usize,
@@ -440,7 +440,7 @@ pub enum Fate {
 /// Residual, weight and fate of a point at the final pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PointFit {
-    /// Distance it pays for, metres; NaN if the point is not finite.
+    /// Distance it pays for, meters; NaN if the point is not finite.
     pub residual_m: f32,
     /// Weight in [0, 1].
     pub weight: f32,
@@ -460,7 +460,7 @@ struct Cleaned<'a> {
 fn clean(points: &[DVec2], needed: usize) -> Result<Cleaned<'_>, AlignError> {
     /// Four cells of the field: below this no outline can be told from a dot.
     const MIN_EXTENT_M: f64 = 4.0 * field::CELL_M;
-    // Larger coordinates would lose the millimetres that matter; no gripper is a kilometre long.
+    // Larger coordinates would lose the millimeters that matter; no gripper is a kilometer long.
     const MAX_COORDINATE_M: f64 = 1e6;
     // False for NaN too.
     let usable = |p: &DVec2| p.x.abs() <= MAX_COORDINATE_M && p.y.abs() <= MAX_COORDINATE_M;

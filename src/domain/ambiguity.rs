@@ -2,7 +2,7 @@
 //!
 //! A tool whose picture does not change when it is moved along one direction leaves that position open, whatever model
 //! reads the picture: "cannot know", not "wrong". So the test is the definition: the difference image is compared with
-//! itself moved by some millimetres, in every direction; where there is one in which nothing changes and in the others
+//! itself moved by some millimeters, in every direction; where there is one in which nothing changes and in the others
 //! there is, the touch is ambiguous. An end of the shaft, a bend, a crossing or a second contact within the window
 //! changes the picture in every direction.
 

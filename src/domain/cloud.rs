@@ -44,7 +44,7 @@ pub enum CloudError {
 /// Points of one finger with the pixel each came from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Lifted {
-    /// Metres, grasp frame, row by row.
+    /// Meters, grasp frame, row by row.
     pub points: Vec<DVec3>,
     /// Column and row in the imprint, one per point.
     pub pixels: Vec<[u16; 2]>,
@@ -86,7 +86,7 @@ pub struct FingerCounts {
 /// The points of both fingers in the grasp frame, right finger first: what registration works on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContactCloud {
-    /// Metres, grasp frame.
+    /// Meters, grasp frame.
     pub points: Vec<DVec3>,
     /// Finger and pixel, one per point.
     pub sources: Vec<PointSource>,
@@ -96,7 +96,7 @@ pub struct ContactCloud {
 
 /// Lifts the pixels of `imprint` that `mask` contains (all without one) to the grasp frame.
 ///
-/// Depth is `camera.depth_reference - imprint`, in metres along the optical axis. Pixels whose depth or reference
+/// Depth is `camera.depth_reference - imprint`, in meters along the optical axis. Pixels whose depth or reference
 /// is NaN, infinite, zero or negative are counted in [`Lifted::invalid`] and left out.
 ///
 /// # Errors
@@ -131,7 +131,7 @@ pub fn lift(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Re
     Ok(lifted)
 }
 
-/// The point of one pixel, metres, grasp frame; `None` outside the images and where the depth is unusable.
+/// The point of one pixel, meters, grasp frame; `None` outside the images and where the depth is unusable.
 pub fn lift_pixel(imprint: &DepthMap, camera: &DepthCamera, x: usize, y: usize) -> Option<DVec3> {
     let reference = *camera.depth_reference.get(x, y)?;
     let depth = reference - imprint.get(x, y)?;
@@ -142,7 +142,7 @@ pub fn lift_pixel(imprint: &DepthMap, camera: &DepthCamera, x: usize, y: usize) 
     Some(camera.grasp_from_camera.transform_point3(in_camera))
 }
 
-/// The pixel position (column, row; not rounded) that sees a point given in the grasp frame, metres.
+/// The pixel position (column, row; not rounded) that sees a point given in the grasp frame, meters.
 ///
 /// `None` behind the camera, for a point that is not finite, and for a camera whose transform has no inverse.
 pub fn project(camera: &DepthCamera, in_grasp: DVec3) -> Option<DVec2> {
@@ -194,7 +194,7 @@ impl ContactCloud {
         self.sources.extend(lifted.pixels.into_iter().map(|pixel| PointSource { finger, pixel }));
     }
 
-    /// The points in the plane of the tool: `(y, z)`, metres.
+    /// The points in the plane of the tool: `(y, z)`, meters.
     pub fn yz(&self) -> Vec<DVec2> {
         self.points.iter().map(|p| DVec2::new(p.y, p.z)).collect()
     }

@@ -1,16 +1,16 @@
-//! Colour maps for depth (sequential) and error (diverging); CPU twin of `shaders/common/color.wgsl`.
+//! Color maps for depth (sequential) and error (diverging); CPU twin of `shaders/common/color.wgsl`.
 //!
-//! Colours are sRGB-encoded (what a PNG or a screen takes). A GPU test holds the two implementations together.
+//! Colors are sRGB-encoded (what a PNG or a screen takes). A GPU test holds the two implementations together.
 
 use serde::{Deserialize, Serialize};
 
-/// sRGB colour of a value that is not a number: a mid grey that neither map contains.
+/// sRGB color of a value that is not a number: a mid gray that neither map contains.
 pub const NAN_COLOR: [f32; 3] = [0.42, 0.42, 0.42];
 
-/// How a scalar becomes a colour.
+/// How a scalar becomes a color.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::EnumIter)]
 pub enum ColorMap {
-    /// Dark blue to yellow, perceptually uniform, readable by the colour-blind: depth and other amounts.
+    /// Dark blue to yellow, perceptually uniform, readable by the color-blind: depth and other amounts.
     #[default]
     Viridis,
     /// Blue, white, red, symmetric in lightness: signed errors around zero. Use it with [`Range::symmetric`].
@@ -42,8 +42,8 @@ impl ColorMap {
         ["Viridis", "Diverging", "Gray"][self as usize]
     }
 
-    /// The sRGB colour, each part in 0..1, of a position `unit` in the range. Positions outside 0..1 take the end
-    /// colours; NaN takes [`NAN_COLOR`].
+    /// The sRGB color, each part in 0..1, of a position `unit` in the range. Positions outside 0..1 take the end
+    /// colors; NaN takes [`NAN_COLOR`].
     pub fn rgb(self, unit: f32) -> [f32; 3] {
         if unit.is_nan() {
             return NAN_COLOR;
@@ -74,7 +74,7 @@ impl ColorMap {
     }
 }
 
-/// The values that the two ends of a colour map stand for, in the unit of the data.
+/// The values that the two ends of a color map stand for, in the unit of the data.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Range {
     /// Value at the lower end.
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn viridis_passes_through_its_published_colours() {
+    fn viridis_passes_through_its_published_colors() {
         let published = [
             (0.0, [0x44, 0x01, 0x54]),
             (0.25, [0x3b, 0x52, 0x8b]),

@@ -8,19 +8,19 @@ use super::mesh::MeshDistance;
 use super::sample::DepthCamera;
 use super::units::text_mm;
 
-/// Distance to the CAD model that the lab still calls contact, metres (`ICP_dataset_cal.py` lines 337-391).
+/// Distance to the CAD model that the lab still calls contact, meters (`ICP_dataset_cal.py` lines 337-391).
 pub const LAB_CAD_DISTANCE_M: f64 = 0.001;
-/// Imprint that the lab's networks map to 0, metres.
+/// Imprint that the lab's networks map to 0, meters.
 pub const LAB_IMPRINT_MIN_M: f32 = -0.0116;
-/// Imprint that the lab's networks map to 1, metres.
+/// Imprint that the lab's networks map to 1, meters.
 pub const LAB_IMPRINT_MAX_M: f32 = 0.0225;
 
-/// Pixels pushed in by at least `min_m` metres. Values that are not finite are no contact.
+/// Pixels pushed in by at least `min_m` meters. Values that are not finite are no contact.
 pub fn threshold(imprint: &DepthMap, min_m: f32) -> Mask {
     imprint.map(|&d| d.is_finite() && d >= min_m)
 }
 
-/// The deepest `percent` (0 to 100) of the pixels that are pushed in by at least `min_m` metres.
+/// The deepest `percent` (0 to 100) of the pixels that are pushed in by at least `min_m` meters.
 ///
 /// Ties at the limit are all kept, so the share can be larger on an image of few values. Values that are not finite
 /// are no contact; a `percent` that is not positive (or NaN) gives an empty mask.
@@ -35,7 +35,7 @@ pub fn top_percent(imprint: &DepthMap, percent: f64, min_m: f32) -> Mask {
     threshold(imprint, limit)
 }
 
-/// Pixels whose point is at most `max_m` metres from the CAD model at the given pose, or inside it: the lab's way to
+/// Pixels whose point is at most `max_m` meters from the CAD model at the given pose, or inside it: the lab's way to
 /// label contact, with [`LAB_CAD_DISTANCE_M`].
 ///
 /// Pixels without a usable depth are no contact.
@@ -69,7 +69,7 @@ pub const CLEAR_M: f32 = 0.002;
 /// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
 const CONTACT_SHARE: f32 = 0.6;
 
-/// Rest and top of an imprint, metres: the depth that a quarter of it stays below, and that of its deepest parts, both
+/// Rest and top of an imprint, meters: the depth that a quarter of it stays below, and that of its deepest parts, both
 /// of medians over small squares, so that neither noise nor flying pixels count. `None` if nothing was measured.
 pub fn rest_and_top(imprint: &DepthMap) -> Option<[f32; 2]> {
     let side = imprint.width().div_ceil(SQUARES_ACROSS).max(1);
@@ -93,7 +93,7 @@ pub fn rest_and_top(imprint: &DepthMap) -> Option<[f32; 2]> {
     Some([at(REST_SHARE), at(1.0 - TOP_SHARE)])
 }
 
-/// How far an imprint rises out of its rest, metres; 0 if nothing was measured.
+/// How far an imprint rises out of its rest, meters; 0 if nothing was measured.
 pub fn rise(imprint: &DepthMap) -> f32 {
     rest_and_top(imprint).map_or(0.0, |[rest, top]| top - rest)
 }
@@ -106,7 +106,7 @@ pub enum MaskBasis {
     Source,
     /// Nothing: the imprint is flat, so that there is no contact, whatever the source says.
     Flat,
-    /// Depth of at least so many metres, because the source found no contact in an imprint that clearly has some.
+    /// Depth of at least so many meters, because the source found no contact in an imprint that clearly has some.
     Depth(f32),
 }
 
@@ -249,7 +249,7 @@ mod tests {
         assert_eq!(count(&top_percent(&DepthMap::filled(0, 0, 0.0), 40.0, 0.0)), 0);
     }
 
-    /// A bump of `height` over a rest of `rest`, with noise of half a millimetre.
+    /// A bump of `height` over a rest of `rest`, with noise of half a millimeter.
     fn bump(rest: f32, height: f32) -> DepthMap {
         let noise = |x: usize, y: usize| ((x * 37 + y * 91) % 11) as f32 / 10.0 * 1e-3 - 5e-4;
         DepthMap::from_fn(175, 140, |x, y| {
@@ -301,9 +301,9 @@ mod tests {
         // A 6 mm bar along z, 1 mm in front of a flat membrane that is everywhere 90 mm from the camera.
         let camera = super::super::cloud::testing::camera(175, 140);
         let imprint = DepthMap::filled(175, 140, 0.0);
-        let centre = cloud::lift_pixel(&imprint, &camera, 87, 66).unwrap();
+        let center = cloud::lift_pixel(&imprint, &camera, 87, 66).unwrap();
         let bar =
-            MeshDistance::new(&cuboid(DVec3::new(centre.x, 0.0, centre.z), DVec3::new(0.003, 0.003, 0.003))).unwrap();
+            MeshDistance::new(&cuboid(DVec3::new(center.x, 0.0, center.z), DVec3::new(0.003, 0.003, 0.003))).unwrap();
         let still = PlanarPose::default();
         let mask = cad_signed_distance(&imprint, &camera, &bar, still, LAB_CAD_DISTANCE_M).unwrap();
         assert!(mask[(87, 66)] && !mask[(0, 0)]);

@@ -13,9 +13,9 @@ use super::units::angle_error;
 /// Mean and spread of images of one size, per pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spread {
-    /// Mean, metres; NaN where no image has a value.
+    /// Mean, meters; NaN where no image has a value.
     pub mean: DepthMap,
-    /// Standard deviation, metres; NaN where fewer than two images have a value.
+    /// Standard deviation, meters; NaN where fewer than two images have a value.
     pub std: DepthMap,
     /// Images.
     pub count: usize,
@@ -44,7 +44,7 @@ impl Spread {
         Some(Self { mean: both.map(|v| v.0 as f32), std: both.map(|v| v.1 as f32), count: images.len() })
     }
 
-    /// The mean of the spread over the pixels that have one, metres; NaN if none has.
+    /// The mean of the spread over the pixels that have one, meters; NaN if none has.
     pub fn mean_std(&self) -> f64 {
         let (mut sum, mut n) = (0.0, 0usize);
         for &v in self.std.as_slice().iter().filter(|v| v.is_finite()) {
@@ -54,13 +54,13 @@ impl Spread {
         if n == 0 { f64::NAN } else { sum / n as f64 }
     }
 
-    /// The largest spread, metres; NaN if no pixel has one.
+    /// The largest spread, meters; NaN if no pixel has one.
     pub fn max_std(&self) -> f64 {
         self.std.as_slice().iter().filter(|v| v.is_finite()).fold(f64::NAN, |max, &v| f64::from(v).max(max))
     }
 }
 
-/// How far the channels of one prediction are apart, per pixel, metres, through the same steps as the depth itself;
+/// How far the channels of one prediction are apart, per pixel, meters, through the same steps as the depth itself;
 /// `None` for a decoder of one channel.
 ///
 /// # Errors
@@ -187,14 +187,14 @@ mod tests {
         assert!(one.max_std().is_nan());
         assert_eq!(Spread::of(&[]), None);
         assert_eq!(Spread::of(&[&images[0], &Grid::filled(3, 1, 0.0)]), None);
-        // A spread of a micrometre around a metre survives 32 bits in and out.
+        // A spread of a micrometer around a meter survives 32 bits in and out.
         let large = [Grid::filled(1, 1, 1.0f32), Grid::filled(1, 1, 1.000_001)];
         let spread = Spread::of(&large.iter().collect::<Vec<_>>()).unwrap();
         assert!((f64::from(spread.std[(0, 0)]) - 0.707e-6).abs() < 0.1e-6);
     }
 
     #[test]
-    fn channels_disagree_in_metres_and_one_channel_cannot() {
+    fn channels_disagree_in_meters_and_one_channel_cannot() {
         let chain = DepthChain {
             range: DepthRange { min_m: 0.0, max_m: 0.02 },
             mapping: Mapping::Correct,

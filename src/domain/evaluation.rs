@@ -23,7 +23,7 @@ use super::sim;
 pub use paper::paper_rows;
 pub use write::{Column, NOTES, columns, conventions, csv, markdown, text};
 
-/// The lab's peak of the PSNR, metres.
+/// The lab's peak of the PSNR, meters.
 pub const PEAK_M: f64 = 0.0225;
 /// Seed of the intervals.
 const BOOTSTRAP_SEED: u64 = 1;

@@ -17,9 +17,9 @@ use serde::{Deserialize, Serialize};
 pub struct PlanarPose {
     /// Rotation about +x, radians, right-handed (y towards z).
     pub theta_rad: f64,
-    /// Translation along y, metres.
+    /// Translation along y, meters.
     pub y_m: f64,
-    /// Translation along z, metres.
+    /// Translation along z, meters.
     pub z_m: f64,
 }
 

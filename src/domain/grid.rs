@@ -1,6 +1,6 @@
 //! [`Grid`]: a checked, row-major image. Every picture, depth map and mask in the product is one.
 //!
-//! Pixels are addressed as `(x, y)` = (column, row); `(0, 0)` is the *centre* of the top-left pixel.
+//! Pixels are addressed as `(x, y)` = (column, row); `(0, 0)` is the *center* of the top-left pixel.
 
 use std::ops::{Index, IndexMut};
 
@@ -12,11 +12,11 @@ pub struct Grid<T> {
     data: Vec<T>,
 }
 
-/// A depth or imprint image in metres; NaN marks "no measurement".
+/// A depth or imprint image in meters; NaN marks "no measurement".
 pub type DepthMap = Grid<f32>;
 /// A contact mask: `true` where the membrane touches the object.
 pub type Mask = Grid<bool>;
-/// A colour image on the 0..255 scale; a difference image has signed values.
+/// A color image on the 0..255 scale; a difference image has signed values.
 pub type RgbGrid = Grid<[f32; 3]>;
 
 /// A storage whose length does not match its size.

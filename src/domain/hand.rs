@@ -9,7 +9,7 @@ use super::mesh::MeshDistance;
 use super::mesh::sampling::spread;
 use super::units::angle_error;
 
-/// Step of a shift by key, metres.
+/// Step of a shift by key, meters.
 pub const STEP_M: f64 = 1e-4;
 /// Step of a turn by key, radians (half a degree).
 pub const STEP_RAD: f64 = 0.5 / 180.0 * std::f64::consts::PI;
@@ -22,7 +22,7 @@ pub struct HandPose {
     /// Angle about x, shift along y and z.
     #[serde(flatten)]
     pub planar: PlanarPose,
-    /// Shift along the closing axis, metres.
+    /// Shift along the closing axis, meters.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub x_m: f64,
     /// Angle about y, radians, applied after `yaw_rad` and before the planar angle.
@@ -56,7 +56,7 @@ pub enum HandAxis {
 }
 
 impl HandAxis {
-    /// What one step adds, metres or radians.
+    /// What one step adds, meters or radians.
     pub fn step(self) -> f64 {
         if self.is_turn() { STEP_RAD } else { STEP_M }
     }
@@ -97,7 +97,7 @@ impl HandPose {
         self.x_m == 0.0 && self.pitch_rad == 0.0 && self.yaw_rad == 0.0
     }
 
-    /// The pose moved along one axis of the grasp frame, in metres or radians. Turns are about the object's origin.
+    /// The pose moved along one axis of the grasp frame, in meters or radians. Turns are about the object's origin.
     #[must_use]
     pub fn moved(mut self, axis: HandAxis, by: f64) -> Self {
         match axis {
@@ -142,7 +142,7 @@ impl AcceptedPose {
 pub struct PoseDifference {
     /// Size of the difference of the angles, radians.
     pub angle_rad: f64,
-    /// Distance between the places of the object's origin, metres.
+    /// Distance between the places of the object's origin, meters.
     pub position_m: f64,
 }
 
@@ -157,13 +157,13 @@ impl PoseDifference {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct HandCost {
     /// Root mean square distance of the points to the tool's outline in the plane, those inside counted as zero,
-    /// metres. NaN without a point.
+    /// meters. NaN without a point.
     pub outline_rms_m: f64,
-    /// Robust cost per point as the registration counts it, square metres. NaN without a point.
+    /// Robust cost per point as the registration counts it, square meters. NaN without a point.
     pub cost_m2: f64,
     /// Share of the points within the kernel, 0 to 1. NaN without a point.
     pub inlier_share: f64,
-    /// Root mean square distance of the points to the tool's surface in space, metres. NaN without a point.
+    /// Root mean square distance of the points to the tool's surface in space, meters. NaN without a point.
     pub surface_rms_m: f64,
     /// Points looked at.
     pub points: usize,
@@ -172,7 +172,7 @@ pub struct HandCost {
 /// Points looked at: as many as the registration uses, so that a drag is answered within a frame.
 const COST_POINTS: usize = 512;
 
-/// What `pose` costs, for at most 512 of the contact points (metres, grasp frame), spread evenly; points that are not
+/// What `pose` costs, for at most 512 of the contact points (meters, grasp frame), spread evenly; points that are not
 /// finite are left out. `kernel_m` is the width of the Geman-McClure kernel.
 pub fn cost(
     points: &[DVec3],

@@ -18,7 +18,7 @@ const MAP_POINTS_COSTLY: usize = 96;
 
 /// A registration with everything it can tell about itself; `start` (`grasp_from_object`) replaces its own starts.
 ///
-/// Points are contact points in the grasp frame, metres.
+/// Points are contact points in the grasp frame, meters.
 ///
 /// # Errors
 /// [`AlignError`] as of the registration itself.

@@ -102,8 +102,8 @@ impl Patch {
     }
 }
 
-/// Sets every pixel whose centre lies within `radius_px` of the segment from `a` to `b` (pixel coordinates,
-/// `(0, 0)` = centre of the first pixel), and the pixel under each end. `a == b` is a single stamp.
+/// Sets every pixel whose center lies within `radius_px` of the segment from `a` to `b` (pixel coordinates,
+/// `(0, 0)` = center of the first pixel), and the pixel under each end. `a == b` is a single stamp.
 ///
 /// Returns the rectangle of pixels that changed, `None` if none did (outside, not finite, or set already).
 pub fn paint(mask: &mut Mask, [a, b]: [DVec2; 2], radius_px: f64, value: bool) -> Option<Rect> {

@@ -1,4 +1,4 @@
-//! Triangle meshes: the CAD models of the tools, in metres and the object frame.
+//! Triangle meshes: the CAD models of the tools, in meters and the object frame.
 
 pub mod distance;
 pub mod sampling;
@@ -10,7 +10,7 @@ pub use distance::MeshDistance;
 /// An indexed triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
-    /// Corner positions, metres, object frame.
+    /// Corner positions, meters, object frame.
     pub vertices: Vec<DVec3>,
     /// Corner indices of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
@@ -28,7 +28,7 @@ impl TriMesh {
         Some(self.vertices.iter().fold([first, first], |[lo, hi], v| [lo.min(*v), hi.max(*v)]))
     }
 
-    /// Surface area, square metres.
+    /// Surface area, square meters.
     pub fn area(&self) -> f64 {
         (0..self.triangles.len()).map(|i| triangle_area(self.corners(i))).sum()
     }
@@ -47,7 +47,7 @@ impl TriMesh {
     }
 }
 
-/// Area of a triangle, square metres.
+/// Area of a triangle, square meters.
 pub fn triangle_area([a, b, c]: [DVec3; 3]) -> f64 {
     0.5 * (b - a).cross(c - a).length()
 }

@@ -128,7 +128,7 @@ impl Engine {
 /// One finger's part of the question.
 #[derive(Clone, Copy, Debug)]
 pub struct FingerInput<'a> {
-    /// Measured or predicted imprint, metres, raw orientation.
+    /// Measured or predicted imprint, meters, raw orientation.
     pub imprint: &'a DepthMap,
     /// The camera that saw it, or that would have.
     pub camera: &'a DepthCamera,
@@ -212,7 +212,7 @@ pub fn contact_cloud(fingers: &Fingers<'_>) -> Result<ContactCloud, PoseError> {
     if cloud.counts.is_empty() { Err(PoseError::NoFinger) } else { Ok(cloud) }
 }
 
-/// Contact points (grasp frame, metres) to the tool's pose: what every caller ends in. `record` keeps per-iteration
+/// Contact points (grasp frame, meters) to the tool's pose: what every caller ends in. `record` keeps per-iteration
 /// states, per-point residuals and the distances both ways.
 ///
 /// # Errors

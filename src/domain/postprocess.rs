@@ -1,4 +1,4 @@
-//! From a decoder's picture to depth in metres: every step is a value, and every step can be looked at.
+//! From a decoder's picture to depth in meters: every step is a value, and every step can be looked at.
 //!
 //! The released script maps its range twice: the decoder's [-1, 1] is first brought to [0, 1], and that is then treated
 //! as [-1, 1] again, so that it saves `(depth + max) / 2`. The paper's "pixel shift" mostly undoes this. [`ShiftMode`]
@@ -24,7 +24,7 @@ use super::grid::{DepthMap, Grid};
 use super::resample::Resampling;
 use super::units::{fixed, mm};
 
-/// Weights of red, green and blue in the lab's grey value (torchvision's `rgb_to_grayscale`; their sum is 0.9999).
+/// Weights of red, green and blue in the lab's gray value (torchvision's `rgb_to_grayscale`; their sum is 0.9999).
 const LUMA: [f64; 3] = [0.2989, 0.587, 0.114];
 
 /// A spread below this share of the values' size is rounding, not information (see [`Shift::PaperMeanStd`]).
@@ -41,7 +41,7 @@ pub enum Reduction {
     Luma,
 }
 
-/// How the decoder's [-1, 1] becomes metres.
+/// How the decoder's [-1, 1] becomes meters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mapping {
@@ -51,7 +51,7 @@ pub enum Mapping {
     Doubled,
 }
 
-/// Means and deviations for the paper's shift, metres. `pred` is of values mapped with [`Mapping::Doubled`].
+/// Means and deviations for the paper's shift, meters. `pred` is of values mapped with [`Mapping::Doubled`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShiftStats {
@@ -65,7 +65,7 @@ pub struct ShiftStats {
     pub gt_std: f64,
 }
 
-/// What happens to the metres.
+/// What happens to the meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shift {
     /// Nothing.
@@ -111,7 +111,7 @@ impl ShiftMode {
     }
 }
 
-/// A range of depth, metres.
+/// A range of depth, meters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[f64; 2]", into = "[f64; 2]")]
 pub struct DepthRange {
@@ -155,7 +155,7 @@ pub enum PostprocessError {
         "this model has no shift statistics, so the paper's shift cannot be applied; choose the raw value or the exact inverse"
     )]
     NoStatistics,
-    /// Luma needs colours.
+    /// Luma needs colors.
     #[error("luma needs 3 channels, the prediction has {0}; the model's manifest should say \"mean\"")]
     Channels(usize),
     /// No channels, or channels of different size.
@@ -164,9 +164,9 @@ pub enum PostprocessError {
     /// A range that is empty or not a number.
     #[error("the depth range {min_m} to {max_m} m is empty")]
     Range {
-        /// Lower end, metres.
+        /// Lower end, meters.
         min_m: f64,
-        /// Upper end, metres.
+        /// Upper end, meters.
         max_m: f64,
     },
     /// A color picture was asked for its depth.
@@ -188,11 +188,11 @@ pub enum PostprocessError {
 pub struct DepthChain {
     /// What -1 and 1 mean. Values outside are clamped, as the lab does.
     pub range: DepthRange,
-    /// How they become metres.
+    /// How they become meters.
     pub mapping: Mapping,
     /// How channels become one.
     pub reduction: Reduction,
-    /// What happens to the metres.
+    /// What happens to the meters.
     pub shift: Shift,
     /// `[width, height]` of the result, pixels.
     pub size: [usize; 2],
@@ -241,13 +241,13 @@ impl DepthChain {
         Ok((depth, ledger))
     }
 
-    /// The picture in metres before any shift, at the decoder's size: what statistics for a shift are taken of.
+    /// The picture in meters before any shift, at the decoder's size: what statistics for a shift are taken of.
     ///
     /// # Errors
     /// See [`PostprocessError`].
-    pub fn metres(&self, raw: &RawPrediction) -> Result<DepthMap, PostprocessError> {
+    pub fn meters(&self, raw: &RawPrediction) -> Result<DepthMap, PostprocessError> {
         self.check()?;
-        Ok(self.denormalised(raw, &self.weights(raw)?))
+        Ok(self.denormalized(raw, &self.weights(raw)?))
     }
 
     fn check(&self) -> Result<(), PostprocessError> {
@@ -262,7 +262,7 @@ impl DepthChain {
     }
 
     /// The lab clamps and maps each channel before it makes them one.
-    fn denormalised(&self, raw: &RawPrediction, weights: &[f64]) -> Grid<f32> {
+    fn denormalized(&self, raw: &RawPrediction, weights: &[f64]) -> Grid<f32> {
         let DepthRange { min_m, max_m } = self.range;
         combine(&raw.channels, weights, |v| {
             let unit = (f64::from(v).clamp(-1.0, 1.0) + 1.0) / 2.0;
@@ -285,7 +285,7 @@ impl DepthChain {
         };
         record(Stage::Reduced, &how, &combine(&raw.channels, &weights, f64::from), None);
 
-        let metres = self.denormalised(raw, &weights);
+        let meters = self.denormalized(raw, &weights);
         let clamped = raw.channels.iter().flat_map(|c| c.as_slice()).filter(|v| v.abs() > 1.0).count();
         let note = (clamped > 0).then(|| format!("{clamped} values outside -1 to 1 were clamped"));
         let how = || {
@@ -295,9 +295,9 @@ impl DepthChain {
                 Mapping::Doubled => format!("{range}, mapped twice: (depth + max) / 2"),
             }
         };
-        record(Stage::Metres, &how, &metres, note);
+        record(Stage::Meters, &how, &meters, note);
 
-        let (shifted, note) = self.shift.apply(metres, max_m);
+        let (shifted, note) = self.shift.apply(meters, max_m);
         record(Stage::Shifted, &|| self.shift_text(), &shifted, note);
 
         let [width, height] = self.size;
@@ -354,7 +354,7 @@ impl ShiftStats {
         self.pred_std.is_nan() || self.pred_std <= RELATIVE_NO_SPREAD * size
     }
 
-    /// Gain and offset (metres) of the shift: `gain · d + offset`.
+    /// Gain and offset (meters) of the shift: `gain · d + offset`.
     pub fn affine(&self, max_m: f64) -> [f64; 2] {
         let gain = if self.has_no_spread(max_m) { 1.0 } else { self.gt_std / self.pred_std };
         [gain, self.gt_mean - gain * self.pred_mean]
@@ -363,10 +363,10 @@ impl ShiftStats {
 
 impl Shift {
     /// The shifted image and a note if the shift could not be applied as asked.
-    fn apply(self, metres: Grid<f32>, max_m: f64) -> (Grid<f32>, Option<String>) {
+    fn apply(self, meters: Grid<f32>, max_m: f64) -> (Grid<f32>, Option<String>) {
         match self {
-            Shift::None => (metres, None),
-            Shift::ExactInverse => (metres.map(|&d| (2.0 * f64::from(d) - max_m) as f32), None),
+            Shift::None => (meters, None),
+            Shift::ExactInverse => (meters.map(|&d| (2.0 * f64::from(d) - max_m) as f32), None),
             Shift::PaperMeanStd(s) => {
                 let note = s.has_no_spread(max_m).then(|| {
                     format!(
@@ -375,7 +375,7 @@ impl Shift {
                     )
                 });
                 let [gain, _] = s.affine(max_m);
-                (metres.map(|&d| ((f64::from(d) - s.pred_mean) * gain + s.gt_mean) as f32), note)
+                (meters.map(|&d| ((f64::from(d) - s.pred_mean) * gain + s.gt_mean) as f32), note)
             }
         }
     }

@@ -33,7 +33,7 @@ impl Resampling {
         resize(image, width, height, self)
     }
 
-    /// Resizes a colour image to `width × height` pixels, channel by channel.
+    /// Resizes a color image to `width × height` pixels, channel by channel.
     pub fn resize_rgb(self, image: &RgbGrid, width: usize, height: usize) -> RgbGrid {
         resize(image, width, height, self)
     }
@@ -51,18 +51,18 @@ pub fn area(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
     resize(image, width, height, Resampling::Area)
 }
 
-/// [`bilinear`] for colour images.
+/// [`bilinear`] for color images.
 pub fn bilinear_rgb(image: &RgbGrid, width: usize, height: usize) -> RgbGrid {
     resize(image, width, height, Resampling::Bilinear)
 }
 
-/// A mask at another size: the pixel whose area holds the target pixel's centre. An empty source gives `false`.
+/// A mask at another size: the pixel whose area holds the target pixel's center. An empty source gives `false`.
 pub fn nearest_mask(mask: &Grid<bool>, width: usize, height: usize) -> Grid<bool> {
     let [source_width, source_height] = mask.size();
     if mask.is_empty() {
         return Grid::filled(width, height, false);
     }
-    // Centre of the target pixel in source pixels, in whole numbers: (2i + 1)·in / (2·out).
+    // Center of the target pixel in source pixels, in whole numbers: (2i + 1)·in / (2·out).
     let pick = |i: usize, source: usize, target: usize| ((2 * i + 1) * source / (2 * target)).min(source - 1);
     Grid::from_fn(width, height, |x, y| mask[(pick(x, source_width, width), pick(y, source_height, height))])
 }
@@ -120,17 +120,17 @@ fn taps(source: usize, target: usize, kind: Resampling) -> Vec<Vec<(usize, f64)>
     let last = source - 1;
     (0..target)
         .map(|i| {
-            let centre = scale * (i as f64 + 0.5) - 0.5;
+            let center = scale * (i as f64 + 0.5) - 0.5;
             let mut taps = match kind {
                 Resampling::Bilinear => {
-                    let x = centre.max(0.0);
+                    let x = center.max(0.0);
                     let first = (x.floor() as usize).min(last);
                     let t = (x - first as f64).min(1.0);
                     vec![(first, 1.0 - t), ((first + 1).min(last), t)]
                 }
                 Resampling::Bicubic => {
-                    let first = centre.floor();
-                    let t = centre - first;
+                    let first = center.floor();
+                    let t = center - first;
                     let index = |k: i64| (first as i64 + k).clamp(0, last as i64) as usize;
                     cubic_weights(t).iter().zip(-1..).map(|(&w, k)| (index(k), w)).collect()
                 }
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn colour_is_the_same_per_channel() {
+    fn color_is_the_same_per_channel() {
         let image = Grid::from_fn(9, 7, |x, y| [x as f32, (y * y) as f32, -((x * y) as f32)]);
         for kind in [Resampling::Bilinear, Resampling::Bicubic, Resampling::Area] {
             let resized = kind.resize_rgb(&image, 5, 12);

@@ -45,7 +45,7 @@ pub struct SensorId(pub u8);
 pub enum SensorKind {
     /// A camera behind a gel: red, green and blue.
     Color,
-    /// A depth camera behind a membrane: metres.
+    /// A depth camera behind a membrane: meters.
     Depth,
 }
 
@@ -63,7 +63,7 @@ pub struct Sensor {
     pub width: usize,
     /// Rows of the stored picture.
     pub height: usize,
-    /// Scale on the touched surface, pixels per metre.
+    /// Scale on the touched surface, pixels per meter.
     pub px_per_m: f64,
     /// Which part of the camera's picture is stored; without it all of it is.
     #[serde(default)]
@@ -110,7 +110,7 @@ pub struct Window {
 }
 
 impl Crop {
-    /// Lifts stored pixel `(u, v)` at depth `z` (metres) to a point in the camera frame, metres.
+    /// Lifts stored pixel `(u, v)` at depth `z` (meters) to a point in the camera frame, meters.
     ///
     /// Source: the lab's `ICP_dataset_cal.py` lines 426-433: the crop offset is added before the pinhole model.
     pub fn lift(&self, intrinsics: &Intrinsics, u: f64, v: f64, z: f64) -> DVec3 {

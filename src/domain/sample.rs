@@ -43,13 +43,13 @@ impl Default for Sample {
     }
 }
 
-/// Where the metres of a sample come from.
+/// Where the meters of a sample come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Scale {
-    /// The source stores metres.
+    /// The source stores meters.
     #[default]
     Measured,
-    /// The source was scaled to 0..255 image by image; the range is an assumption and must be labelled so.
+    /// The source was scaled to 0..255 image by image; the range is an assumption and must be labeled so.
     Assumed,
 }
 
@@ -225,7 +225,7 @@ impl ColorTouch {
 /// A depth sensor's touch, in the sensor's own *raw* orientation (the lab's Soft Bubble: not rotated by 180 degrees).
 #[derive(Clone, Debug)]
 pub struct DepthTouch {
-    /// Reference depth minus current depth, metres, positive = pushed in. 175 x 140 px from the lab's files.
+    /// Reference depth minus current depth, meters, positive = pushed in. 175 x 140 px from the lab's files.
     pub imprint: DepthMap,
     /// What is needed to lift the imprint to points in the grasp frame; `None` for image folders.
     pub camera: Option<DepthCamera>,
@@ -236,7 +236,7 @@ pub struct DepthTouch {
 /// A depth camera: untouched depth, intrinsics and its place in the gripper.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthCamera {
-    /// Depth without contact, metres, same size as the imprint.
+    /// Depth without contact, meters, same size as the imprint.
     pub depth_reference: DepthMap,
     /// Intrinsics of the full image.
     pub intrinsics: Intrinsics,
@@ -247,7 +247,7 @@ pub struct DepthCamera {
 }
 
 impl DepthCamera {
-    /// Lifts pixel `(u, v)` of the imprint at depth `z` (metres) to a point in the camera frame, metres.
+    /// Lifts pixel `(u, v)` of the imprint at depth `z` (meters) to a point in the camera frame, meters.
     pub fn lift(&self, u: f64, v: f64, z: f64) -> DVec3 {
         self.crop.lift(&self.intrinsics, u, v, z)
     }
@@ -261,7 +261,7 @@ impl DepthCamera {
 /// What only a simulator knows.
 #[derive(Clone, Debug)]
 pub struct DepthTruth {
-    /// The imprint before camera noise, metres.
+    /// The imprint before camera noise, meters.
     pub imprint: DepthMap,
     /// Pixels whose membrane point lies on the tool.
     pub contact: Mask,

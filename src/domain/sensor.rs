@@ -17,7 +17,7 @@ pub struct Intrinsics {
 }
 
 impl Intrinsics {
-    /// Lifts pixel `(u, v)` of the full image at depth `z` (metres) to a point in the camera frame, metres.
+    /// Lifts pixel `(u, v)` of the full image at depth `z` (meters) to a point in the camera frame, meters.
     pub fn lift(&self, u: f64, v: f64, z: f64) -> DVec3 {
         DVec3::new((u - self.cx) * z / self.fx, (v - self.cy) * z / self.fy, z)
     }

@@ -4,7 +4,7 @@
 //! [`Grasp`] and returns what the lab's files hold, plus the truth. The same arguments give the same numbers on
 //! every machine and for every number of threads.
 //!
-//! What is modelled, and what not: the bubble's membrane solves the obstacle problem of an inflated elastic sheet
+//! What is modeled, and what not: the bubble's membrane solves the obstacle problem of an inflated elastic sheet
 //! (see `membrane`), so it tents between bars and bulges beside them; its camera looks obliquely, hides what lies
 //! behind a bar and adds noise. The gel is a sheet on an elastic foundation under three LEDs. There is no friction
 //! between membrane and tool, no light bouncing in the gel and no lens distortion.
@@ -42,7 +42,7 @@ use super::rig::{PadId, lab};
 use super::sample::{DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
 use noise::{Noise, Stream};
 
-/// Grid spacing of the membrane, metres.
+/// Grid spacing of the membrane, meters.
 const MEMBRANE_STEP_M: f64 = 0.000_5;
 
 /// Both sensors' touch of `tool` held at `grasp`, for both fingers, with the truth.

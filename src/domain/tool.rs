@@ -1,4 +1,4 @@
-//! [`ToolModel`]: a tool's CAD model with everything that registration and labelling derive from it.
+//! [`ToolModel`]: a tool's CAD model with everything that registration and labeling derive from it.
 
 use std::sync::OnceLock;
 
@@ -12,14 +12,14 @@ use super::mesh::{MeshDistance, TriMesh};
 
 /// Seed of the model points, so that every run compares with the same ones.
 const MODEL_SEED: u64 = 0;
-/// Samples this close to the outline of the silhouette, metres, get its normal.
+/// Samples this close to the outline of the silhouette, meters, get its normal.
 const OUTLINE_M: f64 = 0.5e-3;
-/// Points of the surface that stand for triangles which are too dear to search: less than half a millimetre apart on a
+/// Points of the surface that stand for triangles which are too dear to search: less than half a millimeter apart on a
 /// hand-held tool.
 const DENSE_POINTS: usize = 50_000;
 /// Most triangles that a search may look at, on average. Ordinary meshes take some ten, however many they have.
 const MAX_EFFORT: usize = 500;
-/// Searches that tell, each this far from the surface, metres.
+/// Searches that tell, each this far from the surface, meters.
 const EFFORT_SEARCHES: usize = 64;
 const EFFORT_OFFSET_M: f64 = 1e-3;
 
@@ -34,16 +34,16 @@ pub enum ToolError {
     Mesh(#[from] MeshError),
 }
 
-/// A tool's CAD model with everything that registration and labelling derive from it, built once and shared.
+/// A tool's CAD model with everything that registration and labeling derive from it, built once and shared.
 #[derive(Clone, Debug)]
 pub struct ToolModel {
-    /// The model, metres, object frame.
+    /// The model, meters, object frame.
     pub mesh: TriMesh,
     /// Distance to its silhouette along the closing axis.
     pub field: DistanceField,
     /// Distance to its surface.
     pub distance: MeshDistance,
-    /// 5000 points of its surface, `(y, z)`, metres: what the lab's loop compares with.
+    /// 5000 points of its surface, `(y, z)`, meters: what the lab's loop compares with.
     pub model_points: Vec<DVec2>,
     /// The same points in space with their normals.
     surface: Vec<(DVec3, DVec3)>,
@@ -56,10 +56,10 @@ pub struct ToolModel {
 }
 
 impl ToolModel {
-    /// Builds everything that the default registration and labelling need: some 10 to 30 ms.
+    /// Builds everything that the default registration and labeling need: some 10 to 30 ms.
     ///
     /// # Errors
-    /// [`ToolError`] if the mesh is empty or damaged, or its size cannot be metres (with the scale that would be).
+    /// [`ToolError`] if the mesh is empty or damaged, or its size cannot be meters (with the scale that would be).
     pub fn new(mesh: TriMesh) -> Result<Self, ToolError> {
         let field = DistanceField::from_mesh(&mesh)?;
         let distance = MeshDistance::new(&mesh)?;

@@ -1,8 +1,8 @@
-//! Metres and radians inside, millimetres and degrees on screen: the only place that converts and formats.
+//! Meters and radians inside, millimeters and degrees on screen: the only place that converts and formats.
 
-/// Metres to millimetres.
-pub fn mm(metres: f64) -> f64 {
-    metres * 1e3
+/// Meters to millimeters.
+pub fn mm(meters: f64) -> f64 {
+    meters * 1e3
 }
 
 /// A number with fixed decimals that never reads `-0.00`.
@@ -15,8 +15,8 @@ pub fn fixed(value: f64, decimals: usize) -> String {
 }
 
 /// `8.42 mm`: lengths are shown with two decimals.
-pub fn text_mm(metres: f64) -> String {
-    format!("{} mm", fixed(mm(metres), 2))
+pub fn text_mm(meters: f64) -> String {
+    format!("{} mm", fixed(mm(meters), 2))
 }
 
 /// `12.3°`: angles are shown with one decimal.
@@ -29,16 +29,16 @@ pub fn text_percent(share: f64) -> String {
     if share > 0.0 && share < 0.0005 { "< 0.1 %".into() } else { format!("{} %", fixed(100.0 * share, 1)) }
 }
 
-/// The factor to metres for a tool whose longest side is `size` in an unknown unit: 1 if it may be metres, else that
+/// The factor to meters for a tool whose longest side is `size` in an unknown unit: 1 if it may be meters, else that
 /// of mm, cm, inch, µm or of a mesh scaled twice, whichever makes it as large as a hand-held tool first.
 /// `None` if none does.
-pub fn scale_to_metres(size: f64) -> Option<f64> {
+pub fn scale_to_meters(size: f64) -> Option<f64> {
     [1.0, 1e-3, 1e-2, 0.0254, 1e-6, 1e3].into_iter().find(|scale| is_tool_length(size * scale))
 }
 
-/// Whether a hand-held tool can be so long, metres.
-pub fn is_tool_length(metres: f64) -> bool {
-    (0.004..=0.4).contains(&metres)
+/// Whether a hand-held tool can be so long, meters.
+pub fn is_tool_length(meters: f64) -> bool {
+    (0.004..=0.4).contains(&meters)
 }
 
 /// A number of unknown unit for a message: four significant digits.

@@ -1,10 +1,10 @@
-//! Which way up a GelSlim image is, seen in the colours of its lights.
+//! Which way up a GelSlim image is, seen in the colors of its lights.
 //!
 //! Pictures made for training are often turned by a quarter or mirrored, both images of a pair alike. The sensor's
-//! three lights stay where they are in the sensor, so the colours tell. A light brightens the slopes that face it:
-//! without its grey part, the difference image is a linear function of the gel's slope, and the known directions of
+//! three lights stay where they are in the sensor, so the colors tell. A light brightens the slopes that face it:
+//! without its gray part, the difference image is a linear function of the gel's slope, and the known directions of
 //! the lights give the slope back. The slope of a surface has no curl. Read in a wrong quarter turn or mirrored, the
-//! same colours give a field that is nearly all curl. Reading an image upside down turns the surface inside out; a
+//! same colors give a field that is nearly all curl. Reading an image upside down turns the surface inside out; a
 //! touched gel is dented, with sharp convex rims, so the slope's divergence is skewed to one side.
 
 use super::grid::{Grid, RgbGrid};
@@ -73,7 +73,7 @@ fn mirrored<T: Clone>(image: &Grid<T>) -> Grid<T> {
 
 /// How a square difference image (signed, any scale) lies, by the directions of the nominal sensor's lights.
 ///
-/// `None` where the colours do not tell: nothing touched, not square, values that are not numbers, other lights.
+/// `None` where the colors do not tell: nothing touched, not square, values that are not numbers, other lights.
 pub fn seen(difference: &RgbGrid) -> Option<Turn> {
     let [width, height] = difference.size();
     if width != height || width < 4 * MARGIN || difference.as_slice().iter().flatten().any(|v| !v.is_finite()) {
@@ -124,7 +124,7 @@ impl Sums {
     }
 }
 
-/// The gel's slope along x and y (up to a factor), from the colours without their grey part, blurred.
+/// The gel's slope along x and y (up to a factor), from the colors without their gray part, blurred.
 fn slopes(difference: &RgbGrid) -> [Grid<f64>; 2] {
     let config = GelSlimConfig::default();
     let lights: [[f64; 2]; 3] = std::array::from_fn(|c| {
@@ -132,15 +132,15 @@ fn slopes(difference: &RgbGrid) -> [Grid<f64>; 2] {
     });
     let mean: [f64; 2] = std::array::from_fn(|i| lights.iter().map(|l| l[i]).sum::<f64>() / 3.0);
     let lights = lights.map(|l| [l[0] - mean[0], l[1] - mean[1]]);
-    // Least squares of three colours on two slopes.
+    // Least squares of three colors on two slopes.
     let dot = |i: usize, j: usize| lights.iter().map(|l| l[i] * l[j]).sum::<f64>();
     let (a, b, d) = (dot(0, 0), dot(0, 1), dot(1, 1));
     let det = a * d - b * b;
     let inverse = lights.map(|[u, v]| [(d * u - b * v) / det, (a * v - b * u) / det]);
     [0, 1].map(|i| {
         let read = difference.map(|pixel| {
-            let grey = pixel.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
-            pixel.iter().zip(&inverse).map(|(&v, w)| (f64::from(v) - grey) * w[i]).sum::<f64>()
+            let gray = pixel.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
+            pixel.iter().zip(&inverse).map(|(&v, w)| (f64::from(v) - gray) * w[i]).sum::<f64>()
         });
         blurred(&read)
     })
@@ -203,12 +203,12 @@ mod tests {
     }
 
     #[test]
-    fn where_the_colours_do_not_tell_nothing_is_said() {
+    fn where_the_colors_do_not_tell_nothing_is_said() {
         assert_eq!(seen(&Grid::filled(128, 128, [0.0; 3])), None);
         assert_eq!(seen(&Grid::filled(128, 128, [f32::NAN; 3])), None);
         assert_eq!(seen(&Grid::filled(427, 320, [3.0; 3])), None);
         assert_eq!(seen(&Grid::filled(0, 0, [3.0; 3])), None);
-        let grey = Grid::from_fn(128, 128, |x, y| [((x * 31 + y * 17) % 97) as f32; 3]);
-        assert_eq!(seen(&grey), None);
+        let gray = Grid::from_fn(128, 128, |x, y| [((x * 31 + y * 17) % 97) as f32; 3]);
+        assert_eq!(seen(&gray), None);
     }
 }

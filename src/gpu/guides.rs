@@ -7,24 +7,24 @@ use super::lines::Segment;
 /// sRGB of the x, y and z axes.
 pub const AXIS_COLORS: [[u8; 4]; 3] = [[226, 88, 80, 255], [108, 184, 92, 255], [84, 140, 236, 255]];
 
-/// A square grid in the plane through `centre` that `u` and `v` (unit vectors) span, `cells` cells of `spacing`
-/// metres to each side. Every fifth line from the centre is stronger. Empty if a number makes no sense.
-pub fn grid(centre: DVec3, [u, v]: [DVec3; 2], spacing: f64, cells: u32, rgb: [u8; 3]) -> Vec<Segment> {
+/// A square grid in the plane through `center` that `u` and `v` (unit vectors) span, `cells` cells of `spacing`
+/// meters to each side. Every fifth line from the center is stronger. Empty if a number makes no sense.
+pub fn grid(center: DVec3, [u, v]: [DVec3; 2], spacing: f64, cells: u32, rgb: [u8; 3]) -> Vec<Segment> {
     let cells = cells.min(500) as i32;
     let reach = spacing * f64::from(cells);
-    if !(reach.is_finite() && reach > 0.0 && centre.is_finite()) {
+    if !(reach.is_finite() && reach > 0.0 && center.is_finite()) {
         return Vec::new();
     }
     let [r, g, b] = rgb;
     let line = |i: i32, across: DVec3, along: DVec3| {
-        let middle = centre + across * (f64::from(i) * spacing);
+        let middle = center + across * (f64::from(i) * spacing);
         let alpha = if i % 5 == 0 { 150 } else { 60 };
         Segment { ends: [middle - along * reach, middle + along * reach], rgba: [r, g, b, alpha] }
     };
     (-cells..=cells).flat_map(|i| [line(i, u, v), line(i, v, u)]).collect()
 }
 
-/// The axes x (red), y (green) and z (blue) at `origin`, `length` metres long, with arrow heads.
+/// The axes x (red), y (green) and z (blue) at `origin`, `length` meters long, with arrow heads.
 pub fn axes(origin: DVec3, length: f64) -> Vec<Segment> {
     let mut out = Vec::with_capacity(9);
     for (axis, rgba) in AXIS_COLORS.into_iter().enumerate() {
@@ -39,7 +39,7 @@ pub fn axes(origin: DVec3, length: f64) -> Vec<Segment> {
     out
 }
 
-/// A bar of `length` metres from `start` along the unit vector `along`, with end marks along the unit vector `mark`.
+/// A bar of `length` meters from `start` along the unit vector `along`, with end marks along the unit vector `mark`.
 pub fn scale_bar(start: DVec3, along: DVec3, mark: DVec3, length: f64, rgba: [u8; 4]) -> Vec<Segment> {
     let end = start + along * length;
     let half = mark * (0.12 * length);

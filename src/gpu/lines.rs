@@ -25,7 +25,7 @@ pub struct LinesItem {
 /// A straight line between two points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// Both ends, metres, in the lines' own frame.
+    /// Both ends, meters, in the lines' own frame.
     pub ends: [DVec3; 2],
     /// sRGB and opacity.
     pub rgba: [u8; 4],

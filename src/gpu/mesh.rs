@@ -18,7 +18,7 @@ pub struct MeshItem {
     pub name: String,
     /// Must change whenever `mesh` changes; nothing else makes it go to the device.
     pub revision: u64,
-    /// Metres, in its own frame. Triangles with a corner that does not exist or is not finite are left out.
+    /// Meters, in its own frame. Triangles with a corner that does not exist or is not finite are left out.
     pub mesh: Arc<TriMesh>,
     /// How edges are shaded.
     pub shading: Shading,
@@ -171,12 +171,9 @@ fn vertices(mesh: &TriMesh, shading: Shading) -> Vec<MeshVertex> {
     for (face, area) in faces.iter().zip(&areas) {
         let own = area.normalize_or_zero();
         for p in face {
-            let neighbours = around.get(&key(*p)).map_or(&[][..], Vec::as_slice);
-            let rounded: DVec3 = neighbours
-                .iter()
-                .map(|&f| areas[f])
-                .filter(|n| n.normalize_or_zero().dot(own) > CREASE_RAD.cos())
-                .sum();
+            let neighbors = around.get(&key(*p)).map_or(&[][..], Vec::as_slice);
+            let rounded: DVec3 =
+                neighbors.iter().map(|&f| areas[f]).filter(|n| n.normalize_or_zero().dot(own) > CREASE_RAD.cos()).sum();
             let normal = rounded.try_normalize().unwrap_or(own);
             out.push(MeshVertex { position: view::position(*p), normal: normal.as_vec3().to_array() });
         }

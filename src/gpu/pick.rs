@@ -11,7 +11,7 @@ pub struct Hit {
     pub index: usize,
     /// Its distance from the pointer on the screen, pixels.
     pub distance_px: f64,
-    /// Its distance in front of the eye, metres; smaller is nearer.
+    /// Its distance in front of the eye, meters; smaller is nearer.
     pub depth_m: f64,
 }
 
@@ -67,12 +67,12 @@ mod tests {
         let camera = Camera::default();
         let towards = camera.axes()[2];
         let points = [DVec3::NAN, DVec3::ZERO, towards * 0.02, towards * 0.01, towards];
-        let centre = DVec2::new(200.0, 150.0);
+        let center = DVec2::new(200.0, 150.0);
         let pick = |px, radius| nearest_point(&points, &DAffine3::IDENTITY, &camera, SIZE, px, radius);
-        assert_eq!(pick(centre, 3.0).unwrap().index, 2);
-        assert_eq!(pick(centre + DVec2::X * 5.0, 4.9), None);
-        assert_eq!(pick(centre + DVec2::X * 5.0, 5.1).unwrap().index, 2);
+        assert_eq!(pick(center, 3.0).unwrap().index, 2);
+        assert_eq!(pick(center + DVec2::X * 5.0, 4.9), None);
+        assert_eq!(pick(center + DVec2::X * 5.0, 5.1).unwrap().index, 2);
         assert_eq!(pick(DVec2::NAN, 5.0), None);
-        assert_eq!(nearest_point(&[], &DAffine3::IDENTITY, &camera, SIZE, centre, 9.0), None);
+        assert_eq!(nearest_point(&[], &DAffine3::IDENTITY, &camera, SIZE, center, 9.0), None);
     }
 }

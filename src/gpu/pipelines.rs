@@ -158,6 +158,6 @@ fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) 
     })
 }
 
-/// Blends colours by alpha; the picture itself stays opaque.
+/// Blends colors by alpha; the picture itself stays opaque.
 const OVER: wgpu::BlendState =
     wgpu::BlendState { color: wgpu::BlendState::ALPHA_BLENDING.color, alpha: wgpu::BlendComponent::OVER };

@@ -17,15 +17,15 @@ pub struct CloudItem {
     pub name: String,
     /// Must change whenever `points` or `colors` change; nothing else makes them go to the device.
     pub revision: u64,
-    /// Positions, metres, in the cloud's own frame. One that is not finite is left out; the others keep their index.
+    /// Positions, meters, in the cloud's own frame. One that is not finite is left out; the others keep their index.
     pub points: Arc<[DVec3]>,
-    /// Colours.
+    /// Colors.
     pub colors: PointColors,
     /// Everything that may change at every frame.
     pub style: CloudStyle,
 }
 
-/// What colours the points.
+/// What colors the points.
 #[derive(Clone, Debug)]
 pub enum PointColors {
     /// [`CloudStyle::color`] for all.
@@ -41,8 +41,8 @@ pub enum PointColors {
 pub enum PointSize {
     /// Physical pixels, at any distance.
     Px(f32),
-    /// Metres; at least one pixel.
-    Metres(f32),
+    /// Meters; at least one pixel.
+    Meters(f32),
 }
 
 /// How a cloud looks and where it is.
@@ -96,7 +96,7 @@ pub(super) struct PointsUniform {
     pub(super) lo: f32,
     pub(super) hi: f32,
     pub(super) size: f32,
-    pub(super) size_in_metres: u32,
+    pub(super) size_in_meters: u32,
     pub(super) color_mode: u32,
     pub(super) map: u32,
     pub(super) stride: u32,
@@ -110,7 +110,7 @@ pub(super) struct PointsUniform {
 /// A cloud on the device.
 #[derive(Debug)]
 pub(super) struct PointsData {
-    /// Revision, colour mode and number of points of what is in the buffer.
+    /// Revision, color mode and number of points of what is in the buffer.
     uploaded: (u64, u32, usize),
     points: Elements,
     uniform: Uniform<PointsUniform>,
@@ -185,12 +185,12 @@ fn vertices(item: &CloudItem) -> Vec<PointVertex> {
 
 /// The numbers that go with a cloud.
 fn uniform(style: &CloudStyle, color_mode: u32, stride: u32, drawn: u32, selected: Option<u32>) -> PointsUniform {
-    let (size, size_in_metres) = match style.size {
+    let (size, size_in_meters) = match style.size {
         PointSize::Px(px) => (px, 0),
-        PointSize::Metres(m) => (m, 1),
+        PointSize::Meters(m) => (m, 1),
     };
     let opaque = |[r, g, b]: [f32; 3]| [r, g, b, 1.0];
-    // An empty or infinite range shows the middle colour, as on the CPU.
+    // An empty or infinite range shows the middle color, as on the CPU.
     let sound = (style.range.hi - style.range.lo).is_finite();
     let range = if sound { style.range } else { Range { lo: 0.0, hi: 0.0 } };
     PointsUniform {
@@ -200,7 +200,7 @@ fn uniform(style: &CloudStyle, color_mode: u32, stride: u32, drawn: u32, selecte
         lo: range.lo,
         hi: range.hi,
         size: if size.is_finite() { size } else { 1.0 },
-        size_in_metres,
+        size_in_meters,
         color_mode,
         map: style.map as u32,
         stride,

@@ -59,7 +59,7 @@ impl SceneData {
 pub struct Counters {
     /// Geometry sent to the device, items.
     pub uploads: u64,
-    /// Small blocks of numbers (camera, pose, colours) sent to the device.
+    /// Small blocks of numbers (camera, pose, colors) sent to the device.
     pub uniforms: u64,
     /// Pictures drawn.
     pub renders: u64,

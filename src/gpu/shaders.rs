@@ -253,7 +253,7 @@ mod tests {
                 lo,
                 hi,
                 size,
-                size_in_metres,
+                size_in_meters,
                 color_mode,
                 map,
                 stride,

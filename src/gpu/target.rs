@@ -9,7 +9,7 @@ pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Depth is reversed (1 near, 0 far), which spreads the precision of a float evenly.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Colour (multisampled where possible), its resolved picture and depth, in physical pixels.
+/// Color (multisampled where possible), its resolved picture and depth, in physical pixels.
 #[derive(Debug)]
 pub struct Target {
     size: [u32; 2],
@@ -167,7 +167,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The colour of a pixel; `None` outside.
+    /// The color of a pixel; `None` outside.
     pub fn rgb(&self, x: u32, y: u32) -> Option<[u8; 3]> {
         let [width, height] = self.size;
         let start = (y as usize * width as usize + x as usize) * 4;

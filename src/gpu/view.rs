@@ -1,4 +1,4 @@
-//! The camera, and the only place where f64 metres become the f32 of the device.
+//! The camera, and the only place where f64 meters become the f32 of the device.
 //!
 //! World = the grasp frame (see [`crate::domain::frames`]): x = closing axis with the left finger at negative x,
 //! +z = the direction the tool points, y = lateral. On screen the wrist is up (-z), so the tool hangs down.
@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Up on the screen, in world coordinates.
 const UP: DVec3 = DVec3::NEG_Z;
-/// Distances that make sense for things between a hair and a room, metres.
+/// Distances that make sense for things between a hair and a room, meters.
 const DISTANCE: std::ops::RangeInclusive<f64> = 1e-4..=100.0;
 /// x of a point that is not finite; see `is_hidden` in `shaders/common/view.wgsl`.
 pub(super) const HIDDEN: f32 = f32::MAX;
@@ -48,7 +48,7 @@ impl Preset {
 /// A half line in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it starts, metres.
+    /// Where it starts, meters.
     pub origin: DVec3,
     /// Unit vector into the scene.
     pub direction: DVec3,
@@ -67,9 +67,9 @@ impl Ray {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Camera {
-    /// The point in the middle of the screen, metres, world.
+    /// The point in the middle of the screen, meters, world.
     pub target: DVec3,
-    /// From the eye to the target, metres.
+    /// From the eye to the target, meters.
     pub distance: f64,
     /// Direction of the eye seen from the target, radians about the vertical; 0 = positive x, growing towards y.
     pub yaw_rad: f64,
@@ -98,7 +98,7 @@ impl Camera {
         [right, back.cross(right), back]
     }
 
-    /// Where the eye is, metres, world.
+    /// Where the eye is, meters, world.
     pub fn eye(&self) -> DVec3 {
         self.target + self.axes()[2] * self.distance
     }
@@ -134,7 +134,7 @@ impl Camera {
         (self.yaw_rad, self.pitch_rad) = preset.angles();
     }
 
-    /// Moves so that the box `[smallest, largest]` (metres, world) fills the view from the present side. Does
+    /// Moves so that the box `[smallest, largest]` (meters, world) fills the view from the present side. Does
     /// nothing for a box that is not finite.
     pub fn fit(&mut self, bounds: [DVec3; 2], size: [u32; 2]) {
         let [lo, hi] = bounds;
@@ -158,7 +158,7 @@ impl Camera {
             && (0.01..3.0).contains(&self.fov_rad)
     }
 
-    /// Pixels per metre at the target.
+    /// Pixels per meter at the target.
     pub fn px_per_m(&self, size: [u32; 2]) -> f64 {
         0.5 * f64::from(size[1].max(1)) / ((0.5 * self.fov_rad).tan() * self.distance)
     }
@@ -184,8 +184,8 @@ impl Camera {
         DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose()
     }
 
-    /// Where a point (metres, world) appears: pixels from the upper left corner, and its distance in front of the
-    /// eye in metres. `None` behind the eye and for a point that is not finite.
+    /// Where a point (meters, world) appears: pixels from the upper left corner, and its distance in front of the
+    /// eye in meters. `None` behind the eye and for a point that is not finite.
     pub fn project(&self, p_in_world: DVec3, size: [u32; 2]) -> Option<(DVec2, f64)> {
         Projector::new(self, &DAffine3::IDENTITY, size).project(p_in_world)
     }

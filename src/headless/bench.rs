@@ -48,7 +48,7 @@ struct Machine {
     load_1min: Option<f64>,
     /// `linux x86_64`.
     system: String,
-    /// Whether the program was built without optimisation, which makes its times meaningless.
+    /// Whether the program was built without optimization, which makes its times meaningless.
     debug_build: bool,
 }
 

@@ -56,7 +56,7 @@ pub(super) struct EvaluateArgs {
     /// The way from noise to an image (default: each bundle's).
     #[arg(long, value_parser = PossibleValuesParser::new(Sampler::iter().map(Sampler::key)).map(sampler))]
     sampler: Option<Sampler>,
-    /// How the decoder's output becomes metres.
+    /// How the decoder's output becomes meters.
     #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]
     shift: ShiftArg,
     /// The engine that runs the models.

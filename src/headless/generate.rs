@@ -22,7 +22,7 @@ use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::rig::{PadId, Rig, Text};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::{metrics, resample};
-use crate::io::dataset::{Dataset, assumed_metres};
+use crate::io::dataset::{Dataset, assumed_meters};
 use crate::io::images;
 use crate::io::names::with_ending;
 use crate::work::compare::{Comparison, compare_parts};
@@ -80,7 +80,7 @@ impl FingerArg {
 /// What a prediction is measured in.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Unit {
-    Metres,
+    Meters,
     /// Of 0..255: a color picture.
     Levels,
 }
@@ -100,7 +100,7 @@ struct Pair {
     vqvae_psnr_db: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     vqvae_ssim: Option<f64>,
-    /// The figures apart for what the GelSlim saw and for what lies outside its footprint; errors in metres.
+    /// The figures apart for what the GelSlim saw and for what lies outside its footprint; errors in meters.
     #[serde(skip_serializing_if = "Option::is_none")]
     seen: Option<metrics::Figures>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -180,7 +180,7 @@ struct Report {
 /// What PSNR and SSIM mean here.
 fn convention(scale: Scale) -> &'static str {
     match scale {
-        Scale::Measured => "depth in metres, PSNR peak and SSIM range 0.0225 m (the lab's peak)",
+        Scale::Measured => "depth in meters, PSNR peak and SSIM range 0.0225 m (the lab's peak)",
         Scale::Assumed => "both images scaled to 0..1 one by one, peak and range 1 (the source lost its scale)",
     }
 }
@@ -198,7 +198,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let mut notes = Notes::default();
     let mut complete = !ids.is_empty();
     let mut scale = Scale::Measured;
-    let mut unit = Unit::Metres;
+    let mut unit = Unit::Meters;
     for (id, stem) in ids.into_iter().zip(stems) {
         let id = PairId(id as u32);
         let name = dataset.index.pairs[id.0 as usize].name.clone();
@@ -298,11 +298,11 @@ fn score(
         }
         Scale::Assumed => {
             // Compared on the tile's own pixels and in its orientation, so that the lab's prediction is not resampled.
-            if let Some(tile) = dataset.bubble_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
+            if let Some(tile) = dataset.bubble_tile(id, sample.laid)?.as_ref().map(assumed_meters) {
                 let ours = resample::bilinear(&turned(imprint, &sample.rig), tile.width(), tile.height());
                 let seen = sample.rig.seen_mask(finger, tile.size()).map(|seen| turned(&seen, &sample.rig));
                 take(pair, &compare_parts(&ours, &tile, scale, seen.as_ref())?);
-                if let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_metres) {
+                if let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_meters) {
                     let theirs = compare_parts(&vqvae, &tile, scale, seen.as_ref())?;
                     (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
                 }
@@ -323,16 +323,16 @@ fn turned<T: Copy>(image: &Grid<T>, rig: &Rig) -> Grid<T> {
     if rig.depth().is_some_and(|sensor| sensor.rotation_deg == 180) { image.rotated_180() } else { image.clone() }
 }
 
-/// Writes `STEM.npy` (metres, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
+/// Writes `STEM.npy` (meters, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from
 /// -20 mm) for people.
 fn write(stem: &Path, imprint: &DepthMap) -> anyhow::Result<()> {
     crate::io::npz::write_npy(&with_ending(stem, ".npy"), imprint)?;
     let picture = imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
-    images::write_grey16(&with_ending(stem, ".png"), &picture)?;
+    images::write_gray16(&with_ending(stem, ".png"), &picture)?;
     Ok(())
 }
 
-/// Writes `STEM.png`: the difference of a color sensor's images around the middle grey, in its raw orientation;
+/// Writes `STEM.png`: the difference of a color sensor's images around the middle gray, in its raw orientation;
 /// and `STEM.npy` with the numbers (f32, 3 x height x width).
 fn write_color(stem: &Path, difference: &RgbGrid) -> anyhow::Result<()> {
     crate::io::npz::write_npy_planes(&with_ending(stem, ".npy"), difference)?;

@@ -1,4 +1,4 @@
-//! `touch2touch ledger`: everything between a decoder's picture and metres, for one touch.
+//! `touch2touch ledger`: everything between a decoder's picture and meters, for one touch.
 
 use std::path::PathBuf;
 
@@ -72,7 +72,7 @@ struct StageReport {
 struct AgainstReport {
     /// Pixels compared.
     pixels: usize,
-    /// `prediction = slope · truth + offset` (offset and deviation in metres).
+    /// `prediction = slope · truth + offset` (offset and deviation in meters).
     line: Option<Line>,
     correlation: Orientation,
     joint: JointReport,
@@ -80,7 +80,7 @@ struct AgainstReport {
 
 #[derive(Debug, Serialize)]
 struct JointReport {
-    /// Ends of both axes, metres.
+    /// Ends of both axes, meters.
     range_m: [f64; 2],
     bins: usize,
     /// Row by row: one row per prediction bin (smallest first), one number per truth bin.
@@ -99,7 +99,7 @@ struct Report {
     scale: &'static str,
     stages: Vec<StageReport>,
     against_truth: Option<AgainstReport>,
-    /// The same picture in every other way to metres.
+    /// The same picture in every other way to meters.
     readings: Vec<ChainReading>,
     ambiguity: Option<Ambiguity>,
     flags: Vec<Flag>,
@@ -173,7 +173,7 @@ fn stage(record: &crate::domain::postprocess::StageRecord) -> StageReport {
     StageReport {
         name: record.stage.name(),
         how: record.how.clone(),
-        unit: if record.stage.is_metres() { "m" } else { "1" },
+        unit: if record.stage.is_meters() { "m" } else { "1" },
         size: record.image.size(),
         stats: record.stats,
         invalid: record.invalid,
@@ -182,24 +182,24 @@ fn stage(record: &crate::domain::postprocess::StageRecord) -> StageReport {
     }
 }
 
-/// `01-decoder-channel-1.png` and so on: colours over the stage's own range; NaN is grey.
+/// `01-decoder-channel-1.png` and so on: colors over the stage's own range; NaN is gray.
 fn pictures(out: &std::path::Path, ledger: &Ledger) -> anyhow::Result<()> {
     for (i, record) in ledger.stages.iter().enumerate() {
         let range = Range { lo: record.stats.min as f32, hi: record.stats.max as f32 };
         let name = record.stage.name().to_lowercase().replace(' ', "-");
-        images::write_rgb8(&out.join(format!("{:02}-{name}.png", i + 1)), &coloured(&record.image, range))?;
+        images::write_rgb8(&out.join(format!("{:02}-{name}.png", i + 1)), &colored(&record.image, range))?;
     }
     if let Some(against) = &ledger.against {
         let counts = &against.joint.counts;
         let most = counts.as_slice().iter().copied().max().unwrap_or(1).max(1);
         // Roots, so that the few deep pixels are seen beside the many shallow ones; prediction upwards.
         let shares: DepthMap = counts.map(|&c| (f64::from(c) / f64::from(most)).powf(0.25) as f32).rows_reversed();
-        images::write_rgb8(&out.join("joint-histogram.png"), &coloured(&shares, Range { lo: 0.0, hi: 1.0 }))?;
+        images::write_rgb8(&out.join("joint-histogram.png"), &colored(&shares, Range { lo: 0.0, hi: 1.0 }))?;
     }
     Ok(())
 }
 
-fn coloured(image: &DepthMap, range: Range) -> RgbGrid {
+fn colored(image: &DepthMap, range: Range) -> RgbGrid {
     Grid::from_fn(image.width(), image.height(), |x, y| {
         let v = image[(x, y)];
         if v.is_finite() { ColorMap::Viridis.rgb8(range.unit(v)).map(f32::from) } else { NAN_COLOR.map(|c| 255.0 * c) }

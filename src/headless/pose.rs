@@ -110,7 +110,7 @@ fn parse_start(text: &str) -> Result<PlanarPose, String> {
     let numbers: Vec<f64> =
         text.split(',').filter_map(|n| n.trim().parse().ok()).filter(|n: &f64| n.is_finite()).collect();
     let (&[degrees, y_mm, z_mm], 3) = (numbers.as_slice(), text.split(',').count()) else {
-        return Err("three numbers are needed: degrees, millimetres along y, millimetres along z".to_owned());
+        return Err("three numbers are needed: degrees, millimeters along y, millimeters along z".to_owned());
     };
     Ok(PlanarPose { theta_rad: degrees.to_radians(), y_m: y_mm * 1e-3, z_m: z_mm * 1e-3 })
 }

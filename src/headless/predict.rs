@@ -56,7 +56,7 @@ pub(super) struct ModelArgs {
     /// The way from noise to an image (default: the preset's).
     #[arg(long, value_parser = PossibleValuesParser::new(Sampler::iter().map(Sampler::key)).map(sampler))]
     sampler: Option<Sampler>,
-    /// How the decoder's output becomes metres.
+    /// How the decoder's output becomes meters.
     #[arg(long, value_enum, default_value_t = AnyShiftArg::Exact)]
     shift: AnyShiftArg,
     /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
@@ -309,7 +309,7 @@ impl Predictor {
         }
     }
 
-    /// The way to metres that a bundle offers for a reading, or why it offers none.
+    /// The way to meters that a bundle offers for a reading, or why it offers none.
     pub(super) fn chain(&mut self, mode: ShiftMode) -> anyhow::Result<DepthChain> {
         let bundle = self.bundle()?.clone();
         let chains = self.models.chains(&bundle)?;
@@ -325,7 +325,7 @@ impl Predictor {
         Ok(found)
     }
 
-    /// Predicted imprints (metres, raw orientation) of the fingers that the generator can start from, as large as the
+    /// Predicted imprints (meters, raw orientation) of the fingers that the generator can start from, as large as the
     /// measured ones.
     pub(super) fn imprints(&mut self, sample: &Sample, cx: &JobCx) -> anyhow::Result<PerPad<DepthMap>> {
         let conditions = self.conditions(sample)?;

@@ -40,11 +40,11 @@ pub(super) struct FanArgs {
 
 /// The predictions of one finger.
 pub(super) struct FingerSeeds {
-    /// Metres, one per seed.
+    /// Meters, one per seed.
     pub imprints: Vec<Arc<DepthMap>>,
     /// Around their mean.
     pub spread: Spread,
-    /// Mean over the seeds of the spread of the decoder's channels, metres; `None` with a single channel.
+    /// Mean over the seeds of the spread of the decoder's channels, meters; `None` with a single channel.
     pub channels: Option<DepthMap>,
 }
 
@@ -70,17 +70,17 @@ pub(super) fn predict(
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SeedFigures {
     seeds: Vec<u64>,
-    /// Of the spread over all pixels, metres.
+    /// Of the spread over all pixels, meters.
     spread_mean_m: Option<f64>,
     spread_max_m: Option<f64>,
-    /// Of the spread of the decoder's channels, metres.
+    /// Of the spread of the decoder's channels, meters.
     channels_mean_m: Option<f64>,
     /// Of the mean over the seeds, against the measurement.
     mean_psnr_db: Option<f64>,
     mean_ssim: Option<f64>,
 }
 
-/// Writes mean and spreads as `STEM_{mean,spread,channels}.npy` (metres) and pictures of the spreads (0.0001 mm steps)
+/// Writes mean and spreads as `STEM_{mean,spread,channels}.npy` (meters) and pictures of the spreads (0.0001 mm steps)
 /// and of the mean (0.001 mm steps from -20 mm). PSNR and SSIM are of the mean.
 pub(super) fn write(
     stem: &Path,
@@ -98,7 +98,7 @@ pub(super) fn write(
         let Some(map) = map else { continue };
         npz::write_npy(&file(what, "npy"), map)?;
         let (from, step) = if what == "mean" { (0.02, 1e6) } else { (0.0, 1e7) };
-        images::write_grey16(&file(what, "png"), &map.map(|&d| ((d + from) * step).clamp(0.0, 65535.0) as u16))?;
+        images::write_gray16(&file(what, "png"), &map.map(|&d| ((d + from) * step).clamp(0.0, 65535.0) as u16))?;
     }
     let finite = |v: f64| v.is_finite().then_some(v);
     let mean_of = |map: &DepthMap| finite(crate::domain::postprocess::Stats::of(map).mean);

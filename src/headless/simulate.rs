@@ -38,7 +38,7 @@ pub(super) struct SimulateArgs {
     #[arg(long, default_value = "plain", conflicts_with = "faults", value_parser = condition())]
     condition: Condition,
     /// Writes five touches with one known fault each (wrong CAD, foreign body, blank finger, straight rod, STL in
-    /// millimetres) instead: to learn what each looks like in the studio.
+    /// millimeters) instead: to learn what each looks like in the studio.
     #[arg(long, conflicts_with_all = ["tools", "grasps", "seed"])]
     faults: bool,
     /// Which of the lab's layouts.

@@ -42,7 +42,7 @@ pub(super) struct StatsArgs {
 struct Report {
     file: String,
     failed: Vec<String>,
-    /// Gain and offset (metres) of the shift these statistics make: `gain · raw + offset`.
+    /// Gain and offset (meters) of the shift these statistics make: `gain · raw + offset`.
     gain: f64,
     offset_m: f64,
     #[serde(flatten)]

@@ -54,7 +54,7 @@ pub(super) struct WatchArgs {
     /// The registration.
     #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = parse_engines())]
     engine: Engines,
-    /// What is written beside NAME.t2t.json: imprints in metres and masks as .npz or .pt, 16-bit pictures (0.001 mm
+    /// What is written beside NAME.t2t.json: imprints in meters and masks as .npz or .pt, 16-bit pictures (0.001 mm
     /// steps from -20 mm) as .png.
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Save::Npz, Save::Png])]
     save: Vec<Save>,

@@ -76,7 +76,7 @@ impl ToolClassifier {
         self.spec.output.classes.iter().position(|name| name == tool)
     }
 
-    /// Says of each imprint (metres, raw orientation, any size) which tool made it.
+    /// Says of each imprint (meters, raw orientation, any size) which tool made it.
     ///
     /// Pixels without measurement (NaN) are given to the graph as 0 m.
     ///

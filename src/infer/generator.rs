@@ -132,7 +132,7 @@ impl Generator {
 
     /// Predicts what the Soft Bubble feels where the GelSlim felt `difference` (signed, 0..255 scale, any size).
     ///
-    /// The result is in the decoder's range and orientation; [`Generator::depth`] turns it into metres.
+    /// The result is in the decoder's range and orientation; [`Generator::depth`] turns it into meters.
     /// `progress` is called before each sampling step; `Break` cancels within one step.
     ///
     /// # Errors
@@ -177,7 +177,7 @@ impl Generator {
         self.run(&[difference], &items, config, &mut progress)
     }
 
-    /// The depth in metres, in the raw orientation of the lab's bubble files, as the user wants it read.
+    /// The depth in meters, in the raw orientation of the lab's bubble files, as the user wants it read.
     ///
     /// # Errors
     /// [`PostprocessError::NoStatistics`] for the paper's shift without statistics.
@@ -185,7 +185,7 @@ impl Generator {
         self.spec.depth_chain(mode)?.run(raw)
     }
 
-    /// What the user sees of a prediction: depth in metres, or a color sensor's difference, in the sensor's own raw
+    /// What the user sees of a prediction: depth in meters, or a color sensor's difference, in the sensor's own raw
     /// orientation.
     ///
     /// # Errors
@@ -357,7 +357,7 @@ impl Denoiser for BundleDenoiser<'_> {
 }
 
 /// The picture ([`crate::domain::sample::PadTouch::picture`]) as the condition encoder wants it: scaled, resized,
-/// normalised, turned; `[channels, height, width]`.
+/// normalized, turned; `[channels, height, width]`.
 ///
 /// # Errors
 /// [`GenerateError::BadImage`] for an image without pixels or with values that are not numbers.
@@ -368,14 +368,14 @@ pub fn prepare(difference: &RgbGrid, input: &GeneratorInput) -> Result<Tensor, G
     }
     let scale = match input.scale {
         InputScale::Unit => 1.0 / 255.0,
-        InputScale::Byte | InputScale::Metres => 1.0,
+        InputScale::Byte | InputScale::Meters => 1.0,
     };
     let [width, height] = input.size;
     let resized = input.resampling.resize_rgb(difference, width, height);
     let turned = if input.rotation_deg == 180 { resized.rotated_180() } else { resized };
     let plane = |c: usize| {
-        let normalise = move |p: &[f32; 3]| ((f64::from(p[c]) * scale - input.mean[c]) / input.std[c]) as f32;
-        turned.as_slice().iter().map(normalise).collect::<Vec<f32>>()
+        let normalize = move |p: &[f32; 3]| ((f64::from(p[c]) * scale - input.mean[c]) / input.std[c]) as f32;
+        turned.as_slice().iter().map(normalize).collect::<Vec<f32>>()
     };
     let channels = input.channels();
     let data = (0..channels).flat_map(plane).collect();
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn the_image_is_scaled_normalised_and_turned() {
+    fn the_image_is_scaled_normalized_and_turned() {
         let image = Grid::from_vec(2, 2, vec![[51.0, 0.0, 0.0], [0.0; 3], [0.0; 3], [0.0, 255.0, 0.0]]).unwrap();
         let unit = prepare(&image, &input(InputScale::Unit, 0)).unwrap();
         assert_eq!(unit.shape(), [3, 2, 2]);

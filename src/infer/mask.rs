@@ -67,7 +67,7 @@ impl MaskModel {
         self.engine
     }
 
-    /// The contact mask of an imprint (metres, raw orientation), at the imprint's size, and what it is made of in the end
+    /// The contact mask of an imprint (meters, raw orientation), at the imprint's size, and what it is made of in the end
     /// ([`settled_model`]).
     ///
     /// # Errors

@@ -21,7 +21,7 @@ use crate::io::{files, folders};
 
 /// The format and its version, in every file.
 const FORMAT: &str = "touch2touch-prediction-1";
-/// How the files are recognised: nothing else in the folder is ever touched.
+/// How the files are recognized: nothing else in the folder is ever touched.
 const SUFFIX: &str = ".prediction";
 /// No file with a longer first line, or more values, is one of ours.
 const MAX_HEADER: usize = 1 << 16;

@@ -1,15 +1,15 @@
 //! Grasps with a known truth, as numpy archives: what registration is measured and tested on.
 //!
-//! A folder holds `case_*.npz` and `tool_KK.stl` (metres, object frame). Each archive has, for the right and the left
+//! A folder holds `case_*.npz` and `tool_KK.stl` (meters, object frame). Each archive has, for the right and the left
 //! finger in this order:
 //!
 //! | array | shape | meaning |
 //! | --- | --- | --- |
-//! | `depth_ref`, `depth` | 2 x H x W, f32 | metres along the optical axis; a dropped pixel is 0 or NaN |
+//! | `depth_ref`, `depth` | 2 x H x W, f32 | meters along the optical axis; a dropped pixel is 0 or NaN |
 //! | `mask`, `mask_clean` | 2 x H x W, u8 | contact as a learned mask has it, and as it is |
 //! | `K` | 2 x 3 x 3 | intrinsics of the full camera image |
 //! | `T` | 2 x 4 x 4 | camera to grasp frame, nominal: the true one is a little off |
-//! | `theta_deg`, `yz` | -, 2 | `grasp_from_object`: degrees about +x, metres |
+//! | `theta_deg`, `yz` | -, 2 | `grasp_from_object`: degrees about +x, meters |
 //! | `tool`, `stratum` | - | number of the tool's file; 0 nominal, 1 hard, 2 degenerate |
 
 mod simulated;
@@ -46,7 +46,7 @@ pub enum Stratum {
 /// One grasp of both fingers with its truth. Fingers are indexed as in the lab's rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Case {
-    /// Reference minus depth, metres; NaN, and where the camera said 0 the reference itself (which lifts to depth 0).
+    /// Reference minus depth, meters; NaN, and where the camera said 0 the reference itself (which lifts to depth 0).
     pub imprints: [DepthMap; 2],
     /// Nominal cameras.
     pub cameras: [DepthCamera; 2],
@@ -102,7 +102,7 @@ pub enum CaseError {
 pub struct CaseSet {
     /// Name (without ending) and content of each case.
     pub cases: Vec<(String, Case)>,
-    /// CAD models by number, metres.
+    /// CAD models by number, meters.
     pub tools: BTreeMap<usize, TriMesh>,
 }
 

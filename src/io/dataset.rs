@@ -30,8 +30,8 @@ use super::stl::MeshError;
 pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
 pub use grow::{Growth, OUTPUT_MARK, RIG_FILE, cameras_of, is_output};
-pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_metres};
-pub use tool_scale::{ToolFile, ToolScale, UNIT_FILE, read_in_metres, read_tool};
+pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_meters};
+pub use tool_scale::{ToolFile, ToolScale, UNIT_FILE, read_in_meters, read_tool};
 
 /// Which kind of source a dataset is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,7 +96,7 @@ pub struct Dataset {
     pub index: Index,
     /// What is wrong with it, as far as names and folders tell.
     pub problems: Vec<Problem>,
-    /// What the numbers of the CAD files mean; without it, what [`UNIT_FILE`] beside them says, else metres.
+    /// What the numbers of the CAD files mean; without it, what [`UNIT_FILE`] beside them says, else meters.
     pub tool_scale: Option<ToolScale>,
     /// The sensors that its touches were felt with.
     pub rig: Arc<Rig>,
@@ -226,10 +226,10 @@ impl Dataset {
             .unwrap_or_else(|message| Err(LoadError::Bug { files: self.pair_files(id), message }))
     }
 
-    /// The tool's CAD model in metres and the object frame; `None` where the dataset has none.
+    /// The tool's CAD model in meters and the object frame; `None` where the dataset has none.
     ///
     /// # Errors
-    /// [`MeshError`] if there is a file that cannot be used, or whose size cannot be metres.
+    /// [`MeshError`] if there is a file that cannot be used, or whose size cannot be meters.
     pub fn tool_mesh(&self, tool: &str) -> Result<Option<TriMesh>, MeshError> {
         Ok(self.tool_with_notes(tool)?.map(|file| file.mesh))
     }
@@ -297,7 +297,7 @@ impl Dataset {
         }
     }
 
-    /// [`Dataset::vqvae_tile`] brought to metres, raw orientation and 175 x 140 px, as the measured imprint is.
+    /// [`Dataset::vqvae_tile`] brought to meters, raw orientation and 175 x 140 px, as the measured imprint is.
     ///
     /// # Errors
     /// As [`Dataset::load`].

@@ -29,7 +29,7 @@ const BATCH: usize = 16;
 /// thread and may end the examination.
 ///
 /// What is looked for: files that cannot be read, keys and shapes, NaN and infinities, imprints and CAD models that
-/// are not in metres, depths, intrinsics, quaternions, finger sides and poses that cannot be a bubble's, and pixels
+/// are not in meters, depths, intrinsics, quaternions, finger sides and poses that cannot be a bubble's, and pixels
 /// that do not survive the way from depth to cloud and back.
 pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>) -> DoctorReport {
     let total = dataset.index.pairs.len();
@@ -117,7 +117,7 @@ impl Turned {
         Some(Problem {
             file,
             what: format!(
-                "{} of {examined} pairs do not lie upright, as this one ({laid}); the light's colours tell",
+                "{} of {examined} pairs do not lie upright, as this one ({laid}); the light's colors tell",
                 self.pairs
             ),
             hint: "usual for pictures made for training; both pictures of such a pair are read upright".into(),

@@ -1,7 +1,7 @@
 //! Masks for UNet training: `{train,val,test}/{imgs,masks}/<stem>.png`, as the lab's loader takes them.
 //!
-//! * image: 8-bit grey, `(imprint + 0.0116) / 0.0341 * 255`, cut to whole numbers, limited to 0..255;
-//! * mask: 8-bit grey, 0 and 255;
+//! * image: 8-bit gray, `(imprint + 0.0116) / 0.0341 * 255`, cut to whole numbers, limited to 0..255;
+//! * mask: 8-bit gray, 0 and 255;
 //! * per image exactly one mask of the same stem and size, nothing else in the folders.
 //!
 //! Source: `utils/data_loading.py` lines 22-30, 111-126 and 253-296 of the lab's UNet repository, and
@@ -28,9 +28,9 @@ use crate::domain::rig::{PadId, Rig};
 pub use check::{CheckReport, check_folder};
 use staging::Staging;
 
-/// The imprint that becomes 0, metres.
+/// The imprint that becomes 0, meters.
 pub const IMAGE_LO_M: f64 = -0.0116;
-/// The imprint that becomes 255, metres.
+/// The imprint that becomes 255, meters.
 pub const IMAGE_HI_M: f64 = 0.0225;
 /// Names of the parts, in the order of [`ExportReport::counts`].
 pub const PARTS: [&str; 3] = ["train", "val", "test"];
@@ -207,7 +207,7 @@ impl<E: std::fmt::Display> From<E> for LoadFailure {
     }
 }
 
-/// Writes `entries` to `folder`; `load(i)` gives the imprint (metres, raw orientation) and mask of `entries[i]`.
+/// Writes `entries` to `folder`; `load(i)` gives the imprint (meters, raw orientation) and mask of `entries[i]`.
 ///
 /// Everything is written and checked in a new folder beside `folder` and put in its place only when it is right; a
 /// previous export there is replaced. Same entries, config and content: same bytes.
@@ -271,8 +271,8 @@ pub fn export(
         for (kind, picture) in [("imgs", &image), ("masks", &mask)] {
             let relative = format!("{}/{kind}/{stem}.png", PARTS[part]);
             let path = root.join(&relative);
-            images::write_grey8(&path, picture)?;
-            if images::read_grey8(&path)? != *picture {
+            images::write_gray8(&path, picture)?;
+            if images::read_gray8(&path)? != *picture {
                 mismatches.push(Problem {
                     file: folder.join(&relative),
                     what: "the file reads back differently".into(),
@@ -320,14 +320,14 @@ fn sha256(bytes: &[u8]) -> String {
 /// The loader's 8-bit image of an imprint, in 32-bit arithmetic as the lab's script has it.
 fn image_from_imprint(imprint: &DepthMap, report: &mut ExportReport) -> Grid<u8> {
     let range = (IMAGE_HI_M - IMAGE_LO_M) as f32;
-    imprint.map(|&metres| {
-        let metres = if metres.is_finite() {
-            metres
+    imprint.map(|&meters| {
+        let meters = if meters.is_finite() {
+            meters
         } else {
             report.unmeasured_px += 1;
             0.0
         };
-        let value = (metres - IMAGE_LO_M as f32) / range * 255.0;
+        let value = (meters - IMAGE_LO_M as f32) / range * 255.0;
         if !(0.0..256.0).contains(&value) {
             report.out_of_range_px += 1;
         }

@@ -78,7 +78,7 @@ fn decode(path: &Path) -> Result<DynamicImage, PictureError> {
     let io = |source| PictureError::Io { file: path.to_owned(), source };
     let bytes = files::read(path, MAX_BYTES).map_err(io)?;
     let jpeg = bytes.starts_with(&[0xff, 0xd8]);
-    // A JPEG decoder fills what is cut off with grey: the end mark tells a whole file from one being written.
+    // A JPEG decoder fills what is cut off with gray: the end mark tells a whole file from one being written.
     if jpeg && !bytes.trim_ascii_end().ends_with(&[0xff, 0xd9]) {
         let cut = std::io::Error::new(std::io::ErrorKind::UnexpectedEof, "the end of the JPEG is missing");
         return Err(PictureError::Decode { file: path.to_owned(), source: image::ImageError::IoError(cut) });
@@ -101,7 +101,7 @@ fn grid<T: Copy>(width: u32, height: u32, pixels: Vec<T>) -> Grid<T> {
     Grid::from_vec(width, height, pixels).expect("a decoder fills every pixel")
 }
 
-/// Reads any PNG or JPEG as colour on the 0..255 scale; grey is repeated, 16 bits are scaled down, alpha is dropped.
+/// Reads any PNG or JPEG as color on the 0..255 scale; gray is repeated, 16 bits are scaled down, alpha is dropped.
 ///
 /// # Errors
 /// [`PictureError`].
@@ -117,11 +117,11 @@ pub fn read_rgb(path: &Path) -> Result<RgbGrid, PictureError> {
     })
 }
 
-/// Reads any PNG or JPEG as grey on the 0..255 scale; 16 bits keep their fractions, colour is weighted, alpha is dropped.
+/// Reads any PNG or JPEG as gray on the 0..255 scale; 16 bits keep their fractions, color is weighted, alpha is dropped.
 ///
 /// # Errors
 /// [`PictureError`].
-pub fn read_grey(path: &Path) -> Result<Grid<f32>, PictureError> {
+pub fn read_gray(path: &Path) -> Result<Grid<f32>, PictureError> {
     let image = decode(path)?;
     let (w, h) = (image.width(), image.height());
     Ok(match image {
@@ -135,14 +135,14 @@ pub fn read_grey(path: &Path) -> Result<Grid<f32>, PictureError> {
     })
 }
 
-/// Reads a PNG that must be 8-bit grey without alpha, value by value.
+/// Reads a PNG that must be 8-bit gray without alpha, value by value.
 ///
 /// # Errors
 /// [`PictureError::Kind`] for any other kind.
-pub fn read_grey8(path: &Path) -> Result<Grid<u8>, PictureError> {
+pub fn read_gray8(path: &Path) -> Result<Grid<u8>, PictureError> {
     match decode(path)? {
         DynamicImage::ImageLuma8(image) => Ok(grid(image.width(), image.height(), image.into_raw())),
-        other => Err(wrong_kind(path, &other, "8-bit grey")),
+        other => Err(wrong_kind(path, &other, "8-bit gray")),
     }
 }
 
@@ -150,25 +150,25 @@ fn wrong_kind(file: &Path, image: &DynamicImage, expected: &'static str) -> Pict
     PictureError::Kind { file: file.to_owned(), found: format!("{:?}", image.color()), expected }
 }
 
-/// Writes 8-bit grey.
+/// Writes 8-bit gray.
 ///
 /// # Errors
 /// [`PictureError`].
-pub fn write_grey8(path: &Path, picture: &Grid<u8>) -> Result<(), PictureError> {
+pub fn write_gray8(path: &Path, picture: &Grid<u8>) -> Result<(), PictureError> {
     encode(path, picture.as_slice(), picture.size(), ExtendedColorType::L8)
 }
 
-/// Writes 16-bit grey.
+/// Writes 16-bit gray.
 ///
 /// # Errors
 /// [`PictureError`].
-pub fn write_grey16(path: &Path, picture: &Grid<u16>) -> Result<(), PictureError> {
+pub fn write_gray16(path: &Path, picture: &Grid<u16>) -> Result<(), PictureError> {
     // The encoder takes native-endian bytes and writes big-endian ones.
     let bytes: Vec<u8> = picture.as_slice().iter().flat_map(|v| v.to_ne_bytes()).collect();
     encode(path, &bytes, picture.size(), ExtendedColorType::L16)
 }
 
-/// Writes 8-bit colour; values are rounded and limited to 0..255, NaN becomes 0.
+/// Writes 8-bit color; values are rounded and limited to 0..255, NaN becomes 0.
 ///
 /// # Errors
 /// [`PictureError`].
@@ -192,17 +192,17 @@ mod tests {
     fn every_kind_survives_the_round_trip() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("p.png");
-        let grey = Grid::from_fn(5, 3, |x, y| (x * 50 + y) as u8);
-        write_grey8(&path, &grey).unwrap();
-        assert_eq!(read_grey8(&path).unwrap(), grey);
-        assert_eq!(read_grey(&path).unwrap(), grey.map(|&v| f32::from(v)));
+        let gray = Grid::from_fn(5, 3, |x, y| (x * 50 + y) as u8);
+        write_gray8(&path, &gray).unwrap();
+        assert_eq!(read_gray8(&path).unwrap(), gray);
+        assert_eq!(read_gray(&path).unwrap(), gray.map(|&v| f32::from(v)));
         let deep = Grid::from_fn(4, 3, |x, y| (x * 20000 + y) as u16);
-        write_grey16(&path, &deep).unwrap();
-        assert!((read_grey(&path).unwrap()[(3, 0)] - 60000.0 / 257.0).abs() < 1e-3);
-        let colour = Grid::from_fn(3, 2, |x, y| [x as f32 * 100.0, y as f32, 7.4]);
-        write_rgb8(&path, &colour).unwrap();
+        write_gray16(&path, &deep).unwrap();
+        assert!((read_gray(&path).unwrap()[(3, 0)] - 60000.0 / 257.0).abs() < 1e-3);
+        let color = Grid::from_fn(3, 2, |x, y| [x as f32 * 100.0, y as f32, 7.4]);
+        write_rgb8(&path, &color).unwrap();
         assert_eq!(read_rgb(&path).unwrap()[(2, 1)], [200.0, 1.0, 7.0]);
-        assert!(read_grey8(&path).unwrap_err().to_string().contains("expected 8-bit grey"));
+        assert!(read_gray8(&path).unwrap_err().to_string().contains("expected 8-bit gray"));
     }
 
     #[test]
@@ -211,20 +211,20 @@ mod tests {
         let path = dir.path().join("p.png");
         let side = MAX_SIDE as usize;
         for size in [[side + 1, 1], [1, side + 1]] {
-            write_grey8(&path, &Grid::filled(size[0], size[1], 3)).unwrap();
+            write_gray8(&path, &Grid::filled(size[0], size[1], 3)).unwrap();
             let error = read_rgb(&path).unwrap_err();
             assert!(matches!(error, PictureError::TooLarge { .. }), "{error}");
             assert!(error.to_string().contains("4097") && error.to_string().contains("p.png"), "{error}");
         }
-        write_grey8(&path, &Grid::filled(side, 1, 3)).unwrap();
-        assert_eq!(read_grey(&path).unwrap().size(), [side, 1]);
+        write_gray8(&path, &Grid::filled(side, 1, 3)).unwrap();
+        assert_eq!(read_gray(&path).unwrap().size(), [side, 1]);
     }
 
     #[test]
     fn damaged_pictures_are_errors() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("p.png");
-        write_grey8(&path, &Grid::filled(40, 40, 3)).unwrap();
+        write_gray8(&path, &Grid::filled(40, 40, 3)).unwrap();
         let whole = std::fs::read(&path).unwrap();
         for length in [0, 5, 20, whole.len() / 2] {
             std::fs::write(&path, &whole[..length]).unwrap();

@@ -26,9 +26,9 @@ pub struct ShiftStatistics {
     pub measured_pixels: u64,
     /// Pixels that were no numbers and are left out, predicted and measured.
     pub left_out: [u64; 2],
-    /// Smallest and largest raw prediction and measurement, metres.
+    /// Smallest and largest raw prediction and measurement, meters.
     pub extremes_m: [[f64; 2]; 2],
-    /// The figures, metres.
+    /// The figures, meters.
     pub stats: ShiftStats,
 }
 

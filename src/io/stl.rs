@@ -46,9 +46,9 @@ pub enum MeshError {
         /// Position of the triangle in the file.
         triangle: usize,
     },
-    /// The model is too large or too small to be a tool in metres.
+    /// The model is too large or too small to be a tool in meters.
     #[error(
-        "the CAD model is {} long, which cannot be metres: scale it by {offered} ({})",
+        "the CAD model is {} long, which cannot be meters: scale it by {offered} ({})",
         number(*size),
         file.display()
     )]
@@ -57,7 +57,7 @@ pub enum MeshError {
         file: PathBuf,
         /// Longest side of the bounding box, in the file's unit.
         size: f64,
-        /// The factor that would bring it to metres.
+        /// The factor that would bring it to meters.
         offered: f64,
     },
     /// Neither the unit that was named nor any other makes the model as large as a tool.
@@ -117,7 +117,7 @@ impl MeshError {
                 "tools are 4 mm to 0.4 m long: name the right unit in unit.txt beside the model or with --tool-scale, or \
                  export the model again"
             }
-            Self::UnitFile { .. } => "write m, cm, mm, um, in, auto or a factor to metres into the file",
+            Self::UnitFile { .. } => "write m, cm, mm, um, in, auto or a factor to meters into the file",
             Self::NotFinite { .. } | Self::Empty { .. } => "repair the mesh in the CAD program and export it again",
         }
     }
@@ -132,11 +132,11 @@ fn number(size: f64) -> String {
 /// A mesh as read, with what was noticed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StlFile {
-    /// The mesh in the file's own unit, which should be metres.
+    /// The mesh in the file's own unit, which should be meters.
     pub mesh: TriMesh,
     /// Triangles left out because they have no area.
     pub degenerate: usize,
-    /// The factor that would bring the mesh to metres, where its size says that it is in another unit.
+    /// The factor that would bring the mesh to meters, where its size says that it is in another unit.
     pub suggested_scale: Option<f64>,
 }
 
@@ -253,10 +253,10 @@ fn weld(path: &Path, corners: Vec<[[f32; 3]; 3]>) -> Result<StlFile, MeshError> 
     Ok(StlFile { mesh, degenerate, suggested_scale })
 }
 
-/// The factor that brings a model to metres whose size says that it is in another unit.
+/// The factor that brings a model to meters whose size says that it is in another unit.
 fn suggested_scale(mesh: &TriMesh) -> Option<f64> {
     let [lo, hi] = mesh.bounds()?;
-    crate::domain::units::scale_to_metres((hi - lo).max_element()).filter(|&scale| scale != 1.0)
+    crate::domain::units::scale_to_meters((hi - lo).max_element()).filter(|&scale| scale != 1.0)
 }
 
 /// Writes a binary STL; coordinates are rounded to 32 bits.

@@ -134,7 +134,7 @@ impl StudioApp {
         self.inbox.is_empty() && self.state.tasks.is_idle()
     }
 
-    /// Where a point of the grasp frame (metres) appeared in a 3D pane when it was last drawn. For tests.
+    /// Where a point of the grasp frame (meters) appeared in a 3D pane when it was last drawn. For tests.
     pub fn on_screen(&self, source: ImprintSource, p: [f64; 3]) -> Option<egui::Pos2> {
         self.local.scenes[source as usize].on_screen(p.into())
     }
@@ -304,15 +304,15 @@ impl StudioApp {
                 let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
                 ctx.send_viewport_cmd(ViewportCommand::Fullscreen(!full));
             }
-            UiRequest::ToggleMaximised => {
-                self.local.maximised = match self.local.maximised {
+            UiRequest::ToggleMaximized => {
+                self.local.maximized = match self.local.maximized {
                     Some(_) => None,
                     None => self.local.hovered_pane.or(Some(Pane::Measured)),
                 };
             }
             UiRequest::ResetWorkspace => {
                 let workspace = self.state.settings.workspace;
-                self.local.maximised = None;
+                self.local.maximized = None;
                 self.trees.insert(workspace, layout::default_tree(workspace));
                 self.store_layout(workspace);
             }
@@ -334,7 +334,7 @@ impl StudioApp {
         if workspace != own {
             self.inbox.push(Command::SetWorkspace(workspace));
         }
-        self.local.maximised = None;
+        self.local.maximized = None;
         if let Some(tree) = self.trees.get_mut(&workspace)
             && let Some(id) = tree.tiles.find_pane(&pane)
         {
@@ -400,7 +400,7 @@ impl eframe::App for StudioApp {
             let (state, over) = (cx.state, cx.local.hovered_before);
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
             for action in shortcuts::pressed(&ctx, covered, possible) {
-                if action == Action::CancelJobs && cx.local.maximised.take().is_some() {
+                if action == Action::CancelJobs && cx.local.maximized.take().is_some() {
                     continue;
                 }
                 match action.command(state) {
@@ -425,8 +425,8 @@ impl eframe::App for StudioApp {
             bars::bottom(&mut cx, ui);
             cx.local.readout = None;
             let frame = egui::Frame::new().fill(cx.p.frame);
-            egui::CentralPanel::default().frame(frame).show(ui, |ui| match cx.local.maximised {
-                Some(p) => pane::show_maximised(&mut cx, ui, p),
+            egui::CentralPanel::default().frame(frame).show(ui, |ui| match cx.local.maximized {
+                Some(p) => pane::show_maximized(&mut cx, ui, p),
                 None => {
                     let mut docking = Docking { cx: &mut cx, edited: false };
                     tree.ui(&mut docking, ui);

@@ -14,7 +14,7 @@ use super::widget::colorbar::gradient;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::Command;
-use crate::app::inspect::{BasinColour, InspectCommand};
+use crate::app::inspect::{BasinColor, InspectCommand};
 use crate::app::keys::PoseBits;
 use crate::app::state::Lookup;
 use crate::domain::align::basin::{Arrival, Axis, Basin, Cell, Plane};
@@ -24,15 +24,15 @@ use crate::domain::units;
 
 /// Room for the numbers at the left and below, points.
 const MARGIN: egui::Vec2 = vec2(30.0, 28.0);
-/// Height of the colour bar with its numbers, points.
+/// Height of the color bar with its numbers, points.
 const BAR: f32 = 30.0;
 /// Height of the lines of figures, points.
 const FIGURES: f32 = 58.0;
-/// The error of the last colour, degrees.
+/// The error of the last color, degrees.
 const MOST_DEG: f64 = 20.0;
 /// Every how many columns and rows an arrow is drawn.
 const ARROWS: usize = 3;
-/// Colours of the ends, cheapest first; apart for colour-blind eyes, and none of them a side's.
+/// Colors of the ends, cheapest first; apart for color-blind eyes, and none of them a side's.
 const ENDS: [Color32; 4] = [
     Color32::from_rgb(0x00, 0x9e, 0x73),
     Color32::from_rgb(0xcc, 0x79, 0xa7),
@@ -77,7 +77,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
 }
 
-/// What is varied, and what is coloured.
+/// What is varied, and what is colored.
 fn controls(cx: &mut Cx<'_>, ui: &mut Ui) {
     let inspect = cx.state.inspect.clone();
     ui.horizontal(|ui| {
@@ -91,19 +91,19 @@ fn controls(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
     });
     ui.horizontal(|ui| {
-        for colour in BasinColour::iter() {
-            let text = RichText::new(colour.name()).size(12.0);
-            let possible = colour != BasinColour::Error || cx.state.truth().is_some();
-            let button = ui.add_enabled(possible, egui::Button::selectable(inspect.colour == colour, text));
-            let button = button.accessible_name(format!("Colour by {}", colour.name().to_lowercase()));
-            let tip = match colour {
-                BasinColour::Cost => "Root of the cost per point where the run ended",
-                BasinColour::Error => "Angle between where the run ended and the truth",
-                BasinColour::Winner => "Which place the run ended at: ends within 1° and 1 mm are one place",
+        for color in BasinColor::iter() {
+            let text = RichText::new(color.name()).size(12.0);
+            let possible = color != BasinColor::Error || cx.state.truth().is_some();
+            let button = ui.add_enabled(possible, egui::Button::selectable(inspect.color == color, text));
+            let button = button.accessible_name(format!("Color by {}", color.name().to_lowercase()));
+            let tip = match color {
+                BasinColor::Cost => "Root of the cost per point where the run ended",
+                BasinColor::Error => "Angle between where the run ended and the truth",
+                BasinColor::Winner => "Which place the run ended at: ends within 1° and 1 mm are one place",
             };
             let button = button.on_hover_text(tip).on_disabled_hover_text("The true pose of this pair is not known");
             if button.clicked() {
-                cx.push(Command::Inspect(InspectCommand::Colour(colour)));
+                cx.push(Command::Inspect(InspectCommand::Color(color)));
             }
         }
     });
@@ -123,7 +123,7 @@ impl Map<'_> {
         vec2(self.rect.width() / columns as f32, self.rect.height() / rows as f32)
     }
 
-    /// Where values of the two axes (radians, metres) lie: the first and last start are centres of cells.
+    /// Where values of the two axes (radians, meters) lie: the first and last start are centers of cells.
     fn place(&self, values: [f64; 2]) -> Pos2 {
         let inner = self.rect.shrink2(self.cell_size() * 0.5);
         let share: [f32; 2] = std::array::from_fn(|i| {
@@ -185,10 +185,10 @@ fn click(cx: &mut Cx<'_>, response: &Response, hovered: Option<&Cell>) {
     }
 }
 
-/// From an arrival to a colour.
+/// From an arrival to a color.
 struct Scale {
-    colour: BasinColour,
-    /// Of the values, millimetres or degrees.
+    color: BasinColor,
+    /// Of the values, millimeters or degrees.
     range: [f64; 2],
     truth: Option<PlanarPose>,
     ends: usize,
@@ -197,12 +197,12 @@ struct Scale {
 impl Scale {
     fn of(cx: &Cx<'_>, basin: &Basin) -> Self {
         let truth = cx.state.truth();
-        let colour = match cx.state.inspect.colour {
-            BasinColour::Error if truth.is_none() => BasinColour::Cost,
-            colour => colour,
+        let color = match cx.state.inspect.color {
+            BasinColor::Error if truth.is_none() => BasinColor::Cost,
+            color => color,
         };
-        let mut scale = Self { colour, range: [0.0, MOST_DEG], truth, ends: basin.basins.len() };
-        if colour == BasinColour::Cost {
+        let mut scale = Self { color, range: [0.0, MOST_DEG], truth, ends: basin.basins.len() };
+        if color == BasinColor::Cost {
             let values = basin.cells.iter().filter_map(|c| scale.value(c.arrival.as_ref()?));
             let [lo, hi] = values.fold([f64::INFINITY, 0.0], |[lo, hi]: [f64; 2], v| [lo.min(v), hi.max(v)]);
             // Ends that differ by less than a twentieth are the same place: rounding must not look like a landscape.
@@ -211,17 +211,17 @@ impl Scale {
         scale
     }
 
-    /// Millimetres or degrees.
+    /// Millimeters or degrees.
     fn value(&self, arrival: &Arrival) -> Option<f64> {
-        match self.colour {
-            BasinColour::Cost => Some(units::mm(arrival.cost_m2.max(0.0).sqrt())).filter(|v| v.is_finite()),
-            BasinColour::Error => Some(units::angle_error(arrival.end.theta_rad, self.truth?.theta_rad).to_degrees()),
-            BasinColour::Winner => None,
+        match self.color {
+            BasinColor::Cost => Some(units::mm(arrival.cost_m2.max(0.0).sqrt())).filter(|v| v.is_finite()),
+            BasinColor::Error => Some(units::angle_error(arrival.end.theta_rad, self.truth?.theta_rad).to_degrees()),
+            BasinColor::Winner => None,
         }
     }
 
     fn color(&self, p: &Palette, arrival: &Arrival) -> Color32 {
-        if self.colour == BasinColour::Winner {
+        if self.color == BasinColor::Winner {
             return end_color(p, arrival.basin);
         }
         let [lo, hi] = self.range;
@@ -235,7 +235,7 @@ impl Scale {
         let font = FontId::proportional(10.0);
         let bar = Rect::from_min_size(rect.min + vec2(0.0, 2.0), vec2(rect.width(), 8.0));
         let y = bar.bottom() + 2.0;
-        if self.colour == BasinColour::Winner {
+        if self.color == BasinColor::Winner {
             let shown = self.ends.min(ENDS.len() + 1);
             let width = bar.width() / shown.max(1) as f32;
             for i in 0..shown {
@@ -254,8 +254,8 @@ impl Scale {
             let [r, g, b] = ColorMap::Viridis.rgb8(t);
             Color32::from_rgb(r, g, b)
         });
-        let (decimals, what, more) = match self.colour {
-            BasinColour::Error => (0, "angle error at the end, °", "+"),
+        let (decimals, what, more) = match self.color {
+            BasinColor::Error => (0, "angle error at the end, °", "+"),
             _ => (2, "√cost at the end, mm", ""),
         };
         let [lo, hi] = self.range;

@@ -22,7 +22,7 @@ const ROW: f32 = 40.0;
 /// Width of a thumbnail, points.
 const THUMB: f32 = 44.0;
 
-/// The colour of a review state.
+/// The color of a review state.
 pub(super) fn review_color(p: &Palette, review: Review) -> Color32 {
     match review {
         Review::Todo => p.weak,

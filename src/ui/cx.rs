@@ -32,7 +32,7 @@ pub(super) struct Cx<'a> {
     pub local: &'a mut Local,
     /// The graphics device; `None` if the window has none that can draw 3D.
     pub device: Result<&'a Device, &'a str>,
-    /// The colours of the theme.
+    /// The colors of the theme.
     pub p: &'static Palette,
 }
 
@@ -49,7 +49,7 @@ impl Cx<'_> {
         }
     }
 
-    /// A button for an action: its tooltip has the shortcut, and it is greyed out when it can do nothing.
+    /// A button for an action: its tooltip has the shortcut, and it is grayed out when it can do nothing.
     pub(super) fn action_button(&mut self, ui: &mut Ui, action: Action, text: &str) -> Response {
         let command = action.command(self.state);
         let response = ui.add_enabled(command.is_some(), egui::Button::new(text)).accessible_name(action.name());
@@ -119,7 +119,7 @@ pub(super) struct Local {
     pub scenes: [SceneView; 2],
     /// Points on the device, by [`ImprintSource`].
     pub scene_clouds: [Option<SceneCloud>; 2],
-    /// Colours of the contact points, by [`ImprintSource`].
+    /// Colors of the contact points, by [`ImprintSource`].
     pub layer_colors: [Option<LayerColors>; 2],
     /// The handles of the pose tool.
     pub gizmo: Gizmo,
@@ -131,7 +131,7 @@ pub(super) struct Local {
     pub played_at: Option<f64>,
     /// Counts what was made for the renderer.
     pub revision: u64,
-    /// Half the range of the error's colours, millimetres.
+    /// Half the range of the error's colors, millimeters.
     pub error_mm: f32,
     /// The filter being typed.
     pub filter: String,
@@ -146,7 +146,7 @@ pub(super) struct Local {
     /// The command palette.
     pub palette: PaletteState,
     /// The pane that fills the window.
-    pub maximised: Option<Pane>,
+    pub maximized: Option<Pane>,
     /// The pane under the pointer.
     pub hovered_pane: Option<Pane>,
     /// The same in the frame before: keys come before the panes.
@@ -201,7 +201,7 @@ impl Local {
             hover_claimed: false,
             dialogs: Dialogs::new(native_dialogs),
             palette: PaletteState::default(),
-            maximised: None,
+            maximized: None,
             hovered_pane: None,
             hovered_before: None,
             painting: None,
@@ -220,7 +220,7 @@ impl Local {
     }
 }
 
-/// The colour of a side.
+/// The color of a side.
 pub(super) fn side_color(p: &Palette, source: ImprintSource) -> egui::Color32 {
     match source {
         ImprintSource::Measured => p.truth,

@@ -13,7 +13,7 @@ use super::widget::{brush_cursor, empty};
 use crate::app::command::{Command, Hover, Pane};
 use crate::app::keys::{ImprintSource, MaskVersion, ShiftMode};
 use crate::app::results::Preview;
-use crate::app::settings::{ColourMap, ColourRange, MaskTool};
+use crate::app::settings::{ColorMap, ColorRange, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::grid::{DepthMap, RgbGrid};
@@ -23,23 +23,23 @@ use crate::domain::units;
 use crate::domain::upright::Turn;
 use crate::work::error::TaskError;
 
-/// The colours of the mask and of contact points, everywhere: apart from every colour of the maps.
+/// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
 pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
 
-/// The shared range of imprints, metres.
+/// The shared range of imprints, meters.
 pub(super) fn range_of(state: &State) -> Range {
     Range { lo: state.settings.range.min_m, hi: state.settings.range.max_m }
 }
 
-/// The colour map of imprints.
+/// The color map of imprints.
 pub(super) fn map_of(state: &State) -> ColorMap {
-    match state.settings.colour_map {
-        ColourMap::Viridis => ColorMap::Viridis,
-        ColourMap::Grey => ColorMap::Gray,
+    match state.settings.color_map {
+        ColorMap::Viridis => ColorMap::Viridis,
+        ColorMap::Gray => ColorMap::Gray,
     }
 }
 
-/// What every millimetre of this sample must be labelled with; empty where lengths are measured.
+/// What every millimeter of this sample must be labeled with; empty where lengths are measured.
 pub(super) fn scale_note(state: &State) -> &'static str {
     match state.sample().ready().map(|s| s.scale) {
         Some(Scale::Assumed) => "assumed scale",
@@ -159,7 +159,7 @@ fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histog
         return;
     }
     let range = cx.state.settings.range;
-    let default = ColourRange::default();
+    let default = ColorRange::default();
     let bar = Colorbar {
         label: "Depth range",
         map: map_of(cx.state),
@@ -171,10 +171,10 @@ fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histog
     };
     match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {
         Some(Asked::Range(r)) => {
-            cx.push(Command::SetRange(ColourRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..range }));
+            cx.push(Command::SetRange(ColorRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..range }));
         }
         Some(Asked::Auto) => cx.push(Command::RangeFromShown),
-        Some(Asked::Lock(locked)) => cx.push(Command::SetRange(ColourRange { locked, ..range })),
+        Some(Asked::Lock(locked)) => cx.push(Command::SetRange(ColorRange { locked, ..range })),
         None => {}
     }
 }
@@ -453,7 +453,7 @@ fn depth_pane(
     histogram
 }
 
-/// A prediction on its way, in the colours and the place of the result: nothing can be painted or measured on it.
+/// A prediction on its way, in the colors and the place of the result: nothing can be painted or measured on it.
 fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Preview>) -> Option<Histogram> {
     let pane = Pane::Predicted;
     let mut view = cx.local.bubble_view;
@@ -520,7 +520,7 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     output.caption(Align2::RIGHT_TOP, &right, color);
 }
 
-/// The value under the pointer, in millimetres and in the unit that is stored.
+/// The value under the pointer, in millimeters and in the unit that is stored.
 fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, depth: &DepthMap, px: [f32; 2]) {
     let Some((x, y)) = output.map.pixel(px) else { return };
     let Some(v) = depth.get(x, y).copied() else { return };
@@ -610,7 +610,7 @@ fn paint_stroke(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, pane: Pane, sou
     }
 }
 
-/// The small square in the colour of a side, beside the pane's title.
+/// The small square in the color of a side, beside the pane's title.
 pub(super) fn side_mark(ui: &mut Ui, p: &Palette, source: ImprintSource) {
     let (rect, _) = ui.allocate_exact_size(vec2(8.0, 8.0), eframe::egui::Sense::hover());
     ui.painter().rect_filled(rect, 2.0, side_color(p, source));

@@ -20,10 +20,10 @@ use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::units;
 use crate::work::layers::LayerResult;
 
-/// The colours of residuals: perceptually uniform, and told apart by colour-blind eyes.
+/// The colors of residuals: perceptually uniform, and told apart by color-blind eyes.
 pub(super) const RESIDUAL_MAP: ColorMap = ColorMap::Viridis;
 
-/// The colour of a reason: the palette of Okabe and Ito, made to be told apart by colour-blind eyes.
+/// The color of a reason: the palette of Okabe and Ito, made to be told apart by color-blind eyes.
 pub(super) fn reason_rgb(reason: Reason) -> [u8; 3] {
     match reason {
         Reason::Inlier => [0x00, 0x9e, 0x73],
@@ -82,7 +82,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
 }
 
-/// Which side the pane is about, and which layer colours the points.
+/// Which side the pane is about, and which layer colors the points.
 fn choice(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
@@ -98,7 +98,7 @@ fn choice(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     });
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
-        ui.label(caption("Colour", cx.p));
+        ui.label(caption("Color", cx.p));
         for layer in Layer::iter() {
             let text = RichText::new(layer.name()).size(SMALL);
             let on = cx.state.workbench.layer == layer;
@@ -111,7 +111,7 @@ fn choice(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     });
 }
 
-/// Residuals by size, in the colours that they have in 3D, with the width of the kernel.
+/// Residuals by size, in the colors that they have in 3D, with the width of the kernel.
 fn histogram(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
     ui.label(section("Residuals", cx.p)).on_hover_text("Distance of the contact points to the model");
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 52.0), Sense::hover());

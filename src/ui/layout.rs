@@ -98,9 +98,9 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let metrics = b.tabs(&[Metrics, Log]);
             let top = b.row(&[(gel, 1.0), (measured, 1.0), (predicted, 1.0)]);
             let bottom = b.row(&[(error, 1.0), (scene_p, 1.0), (scene_m, 1.0)]);
-            let centre = b.column(&[(top, 0.86), (bottom, 1.14)]);
+            let center = b.column(&[(top, 0.86), (bottom, 1.14)]);
             let right = b.column(&[(generate, 1.0), (metrics, 1.0)]);
-            b.row(&[(browser, 0.165), (centre, 0.625), (right, 0.21)])
+            b.row(&[(browser, 0.165), (center, 0.625), (right, 0.21)])
         }
         Workspace::Align => {
             let browser = b.tabs(&[Browser]);
@@ -109,9 +109,9 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let basin = b.tabs(&[BasinMap, Layers, Poses]);
             let metrics = b.tabs(&[Metrics, Generate, Log]);
             let scenes = b.row(&[(scene_m, 1.0), (scene_p, 1.0)]);
-            let centre = b.column(&[(scenes, 1.15), (steps, 0.85)]);
+            let center = b.column(&[(scenes, 1.15), (steps, 0.85)]);
             let right = b.column(&[(basin, 1.2), (metrics, 0.8)]);
-            b.row(&[(browser, 0.13), (centre, 0.64), (right, 0.23)])
+            b.row(&[(browser, 0.13), (center, 0.64), (right, 0.23)])
         }
         Workspace::Label => {
             let browser = b.tabs(&[Browser]);
@@ -121,9 +121,9 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let masks = b.tabs(&[Masks]);
             let metrics = b.tabs(&[Metrics, Log]);
             let below = b.row(&[(gel, 1.0), (scene, 1.4)]);
-            let centre = b.column(&[(images, 1.25), (below, 0.75)]);
+            let center = b.column(&[(images, 1.25), (below, 0.75)]);
             let right = b.column(&[(masks, 1.25), (metrics, 0.75)]);
-            b.row(&[(browser, 0.165), (centre, 0.625), (right, 0.21)])
+            b.row(&[(browser, 0.165), (center, 0.625), (right, 0.21)])
         }
         Workspace::Evaluate => {
             let left = b.tabs(&[Browser]);
@@ -131,8 +131,8 @@ pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
             let (measured, predicted, error) = (b.tabs(&[Measured]), b.tabs(&[Predicted]), b.tabs(&[Error, Ledger]));
             let right = b.tabs(&[Metrics, Generate, SceneMeasured, Log]);
             let images = b.row(&[(measured, 1.0), (predicted, 1.0), (error, 1.0)]);
-            let centre = b.column(&[(table, 1.2), (images, 0.9)]);
-            b.row(&[(left, 0.165), (centre, 0.625), (right, 0.21)])
+            let center = b.column(&[(table, 1.2), (images, 0.9)]);
+            b.row(&[(left, 0.165), (center, 0.625), (right, 0.21)])
         }
     };
     Tree::new(tree_id(workspace), root, b.0)

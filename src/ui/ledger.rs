@@ -158,7 +158,7 @@ fn flags(cx: &Cx<'_>, ui: &mut Ui, flags: &[Flag]) {
 fn stages(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
     ui.add_space(2.0);
     ui.label(section("Stages", cx.p)).on_hover_text(
-        "From the decoder (no unit, -1 to 1) to metres. Pictures and histograms span each stage's own values",
+        "From the decoder (no unit, -1 to 1) to meters. Pictures and histograms span each stage's own values",
     );
     for record in &found.ledger.stages {
         stage(cx, ui, record, finger);
@@ -168,8 +168,8 @@ fn stages(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
 fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: PadId) {
     let width = ui.available_width();
     let (rect, response) = ui.allocate_exact_size(vec2(width, THUMB.y + 4.0), Sense::hover());
-    let metres = record.stage.is_metres();
-    let (unit, scale, digits) = if metres { ("mm", 1e3, 2) } else { ("", 1.0, 2) };
+    let meters = record.stage.is_meters();
+    let (unit, scale, digits) = if meters { ("mm", 1e3, 2) } else { ("", 1.0, 2) };
     let s = &record.stats;
     let number = |v: f64| if v.is_finite() { fixed(v * scale, digits) } else { "–".to_owned() };
     let figures = [("min", s.min), ("mean", s.mean), ("std", s.std), ("max", s.max)].map(|(n, v)| (n, number(v)));
@@ -218,7 +218,7 @@ fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: PadId) {
     );
     if plot {
         let area = Rect::from_min_max(pos2(right, rect.top() + 3.0), pos2(rect.right() - 2.0, rect.bottom() - 3.0));
-        let color = if metres { side_color(cx.p, ImprintSource::Predicted) } else { cx.p.weak };
+        let color = if meters { side_color(cx.p, ImprintSource::Predicted) } else { cx.p.weak };
         plots::histogram(&painter, area, &record.histogram, scale, color, cx.p);
     }
     painter.hline(rect.x_range(), rect.bottom() + 0.5, Stroke::new(1.0, cx.p.line));

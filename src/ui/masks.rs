@@ -91,7 +91,7 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
             new.threshold_m = mm * 1e-3;
             response
-                .on_hover_text("Pixels pushed in further than this, millimetres. Default 5.00; double-click resets");
+                .on_hover_text("Pixels pushed in further than this, millimeters. Default 5.00; double-click resets");
         }
         MaskSource::TopPercent => {
             let slider = egui::Slider::new(&mut new.top_percent, 0.0..=60.0).fixed_decimals(1).suffix(" %");

@@ -135,7 +135,7 @@ fn absent_short(absent: Absent) -> &'static str {
 fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(4.0);
     ui.label(section("Prediction against truth", cx.p)).on_hover_text(
-        "PSNR and SSIM of the imprints in metres with the lab's peak of 22.5 mm as range; where the source lost its \
+        "PSNR and SSIM of the imprints in meters with the lab's peak of 22.5 mm as range; where the source lost its \
          scale, both images are scaled to 0..1 one by one (min-max)",
     );
     let fingers = cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f));
@@ -225,17 +225,17 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut rows: Vec<(&str, Option<Color32>, Stats, bool)> = Vec::new();
     if let Some(recipe) = cx.state.chosen(finger).cloned() {
         if let Some(found) = cx.state.ledger(finger).shown() {
-            // The channels are of the pane "Depth chain"; here it is the way to metres.
+            // The channels are of the pane "Depth chain"; here it is the way to meters.
             for record in found.ledger.stages.iter().filter(|r| !matches!(r.stage, Stage::Channel(_) | Stage::Resized))
             {
                 let name = match record.stage {
                     Stage::Reduced => "Decoder",
-                    Stage::Metres => "Metres",
+                    Stage::Meters => "Meters",
                     Stage::Turned => "Predicted",
                     _ => "Shift",
                 };
                 let color = (record.stage == Stage::Turned).then(|| side_color(cx.p, ImprintSource::Predicted));
-                rows.push((name, color, record.stats, record.stage.is_metres()));
+                rows.push((name, color, record.stats, record.stage.is_meters()));
             }
         }
         if let Lookup::Ready(c) = cx.state.comparison(finger) {
@@ -272,9 +272,9 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
     let width = ((ui.available_width() - 76.0) / 4.0).clamp(34.0, 64.0);
     let heads = ["min", "mean", "std", "max"].map(|h| (h.to_owned(), cx.p.weak));
     line(ui, ("mm", cx.p.weak), &heads, width);
-    for (name, color, stats, metres) in rows {
+    for (name, color, stats, meters) in rows {
         let numbers = [stats.min, stats.mean, stats.std, stats.max].map(|v| {
-            let v = if metres { units::mm(v) } else { v };
+            let v = if meters { units::mm(v) } else { v };
             (if v.is_finite() { format!("{v:.2}") } else { "–".to_owned() }, cx.p.strong)
         });
         line(ui, (name, color.unwrap_or(cx.p.text)), &numbers, width);

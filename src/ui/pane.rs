@@ -48,9 +48,9 @@ fn tooltip(pane: Pane) -> &'static str {
         Pane::Browser => "The pairs of what is open",
         Pane::GelRaw => "The GelSlim image during the touch, rotated to line up with the bubble",
         Pane::GelReference => "The GelSlim image without contact, rotated to line up with the bubble",
-        Pane::GelDifference => "Touched minus untouched, around mid grey: what the generator sees",
+        Pane::GelDifference => "Touched minus untouched, around mid gray: what the generator sees",
         Pane::Measured => "What the Soft Bubble measured; dashed: what the GelSlim sees of it",
-        Pane::Predicted => "What the generator predicts from the GelSlim image, in the same colours",
+        Pane::Predicted => "What the generator predicts from the GelSlim image, in the same colors",
         Pane::Error => "Predicted minus measured: blue too shallow, red too deep",
         Pane::SceneMeasured => "The measured surface on the CAD model, grasp frame",
         Pane::ScenePredicted => "The predicted surface on the CAD model, grasp frame",
@@ -61,7 +61,7 @@ fn tooltip(pane: Pane) -> &'static str {
         Pane::Masks => "Corrects the contact mask",
         Pane::Layers => "Residuals, drop reasons, distances both ways and the weak direction of a registration",
         Pane::Poses => "Truth, measurement and prediction against each other, per finger and joint",
-        Pane::Ledger => "Everything between the decoder and the metres, stage by stage",
+        Pane::Ledger => "Everything between the decoder and the meters, stage by stage",
         Pane::Metrics => "The figures of this pair",
         Pane::Table => "The figures of all pairs so far",
         Pane::Results => "The paper's results table of the open data set",
@@ -155,9 +155,9 @@ impl Behavior<Pane> for Docking<'_, '_> {
         match tiles.get(tile) {
             Some(Tile::Pane(pane)) => {
                 if response.double_clicked() {
-                    self.cx.local.maximised = Some(*pane);
+                    self.cx.local.maximized = Some(*pane);
                 }
-                response.on_hover_text(format!("{}. Drag to move, double-click to maximise", tooltip(*pane)))
+                response.on_hover_text(format!("{}. Drag to move, double-click to maximize", tooltip(*pane)))
             }
             _ => response,
         }
@@ -176,12 +176,12 @@ impl Behavior<Pane> for Docking<'_, '_> {
         ui.add_space(4.0);
         let response = ui
             .add(egui::Button::new("").frame(false).min_size(vec2(16.0, 16.0)))
-            .accessible_name(format!("Maximise {}", title(*pane)));
+            .accessible_name(format!("Maximize {}", title(*pane)));
         let color = if response.hovered() { self.cx.p.strong } else { self.cx.p.weak };
         let square = egui::Rect::from_center_size(response.rect.center(), vec2(8.0, 8.0));
         ui.painter().rect_stroke(square, 1.0, Stroke::new(1.25, color), egui::StrokeKind::Inside);
         if response.on_hover_text("Let this pane fill the window (`)").clicked() {
-            self.cx.local.maximised = Some(*pane);
+            self.cx.local.maximized = Some(*pane);
         }
         help_mark(self.cx, ui, *pane);
     }
@@ -236,7 +236,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
 }
 
 /// One pane over the whole window, with the way back.
-pub(super) fn show_maximised(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
     let full = ui.available_rect_before_wrap();
     ui.painter().rect_filled(full, 0.0, cx.p.frame);
     let bar = egui::Rect::from_min_size(full.min, vec2(full.width(), 26.0));
@@ -245,7 +245,7 @@ pub(super) fn show_maximised(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
             ui.label(super::theme::title(title(pane)));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.button(RichText::new("Back to all panes").size(SMALL)).on_hover_text("` or Esc").clicked() {
-                    cx.local.maximised = None;
+                    cx.local.maximized = None;
                 }
                 help_mark(cx, ui, pane);
             });

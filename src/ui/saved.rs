@@ -34,7 +34,7 @@ fn clock(since_epoch: Duration) -> String {
     format!("{:02}:{:02}:{:02} UTC", s / 3600, s / 60 % 60, s % 60)
 }
 
-/// The state in words, with its colour.
+/// The state in words, with its color.
 pub(super) fn text(cx: &Cx<'_>) -> (String, Color32) {
     if cx.state.document.unsaved.contains(cx.state.pair_name()) {
         return ("saving…".into(), cx.p.caution);

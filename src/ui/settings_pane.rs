@@ -7,7 +7,7 @@ use super::cx::Cx;
 use super::theme::{caption, section};
 use crate::app::action::Action;
 use crate::app::command::Command;
-use crate::app::settings::{ColourMap, MAX_CACHE_MIB, Theme};
+use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
 use crate::infer::engine::EngineChoice;
 
 /// The pane.
@@ -23,7 +23,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.label(section("Window", cx.p));
     ui.horizontal(|ui| {
         for (theme, name) in [(Theme::Dark, "Dark"), (Theme::Light, "Light")] {
-            if ui.radio(settings.theme == theme, name).on_hover_text("Colours of the window").clicked() {
+            if ui.radio(settings.theme == theme, name).on_hover_text("Colors of the window").clicked() {
                 cx.out.push(Command::SetTheme(theme));
             }
         }
@@ -38,10 +38,10 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
     ui.label(section("Images", cx.p));
     ui.horizontal(|ui| {
-        for map in ColourMap::iter() {
-            let radio = ui.radio(settings.colour_map == map, map.name());
-            if radio.on_hover_text("Colours of depth").clicked() {
-                cx.out.push(Command::SetColourMap(map));
+        for map in ColorMap::iter() {
+            let radio = ui.radio(settings.color_map == map, map.name());
+            if radio.on_hover_text("Colors of depth").clicked() {
+                cx.out.push(Command::SetColorMap(map));
             }
         }
     });

@@ -24,7 +24,7 @@ const COLUMNS: [(&str, f32, bool, &str); 8] = [
     ("Finger", 0.7, false, "Which finger's prediction"),
     ("PSNR dB", 0.8, true, "Prediction against truth; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed"),
     ("SSIM", 0.7, true, "Structural similarity; range 22.5 mm, or both scaled to 0..1 where the scale is assumed"),
-    ("Error mm", 0.8, true, "Mean absolute error of the prediction, millimetres"),
+    ("Error mm", 0.8, true, "Mean absolute error of the prediction, millimeters"),
     ("Angle° meas.", 1.0, true, "Angle error of the pose from the measured imprint, degrees"),
     ("Angle° pred.", 1.0, true, "Angle error of the pose from the predicted imprint, degrees"),
 ];

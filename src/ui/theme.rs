@@ -1,8 +1,8 @@
-//! Colours, type and spacing: the data is the brightest thing on the screen.
+//! Colors, type and spacing: the data is the brightest thing on the screen.
 //!
-//! Everything around the data is a neutral grey. One accent marks what is selected or running; red, amber and green
-//! only speak of state. Truth and prediction have the same two colours in every pane, plot and table (blue and orange:
-//! they stay apart for colour-blind eyes); the CAD model is a calm third.
+//! Everything around the data is a neutral gray. One accent marks what is selected or running; red, amber and green
+//! only speak of state. Truth and prediction have the same two colors in every pane, plot and table (blue and orange:
+//! they stay apart for color-blind eyes); the CAD model is a calm third.
 
 use std::sync::Arc;
 
@@ -20,7 +20,7 @@ pub const BODY: f32 = 13.0;
 /// Headings.
 pub const HEADING: f32 = 16.0;
 
-/// The colours of one theme.
+/// The colors of one theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Palette {
     /// Behind images and 3D views.

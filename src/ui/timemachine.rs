@@ -106,7 +106,7 @@ fn play(cx: &mut Cx<'_>, ui: &Ui) {
 pub(super) fn pose_text(grasp_from_object: PlanarPose) -> String {
     let lab = units::wrap_angle(-grasp_from_object.theta_rad);
     let PlanarPose { y_m, z_m, .. } = grasp_from_object;
-    let mm = |metres: f64| units::fixed(units::mm(metres), 2);
+    let mm = |meters: f64| units::fixed(units::mm(meters), 2);
     format!("{}, y {}, z {} mm", units::text_deg(lab), mm(y_m), mm(z_m))
 }
 

@@ -18,7 +18,7 @@ pub struct Clouds {
 /// The surface points of one finger, one per pixel with a measurement, row by row.
 #[derive(Clone, Debug, Default)]
 pub struct FingerCloud {
-    /// Positions, metres, grasp frame.
+    /// Positions, meters, grasp frame.
     pub points: Vec<DVec3>,
     /// The raw bubble pixel `(x, y)` of each point.
     pub pixels: Vec<[u16; 2]>,

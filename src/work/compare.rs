@@ -5,23 +5,23 @@ use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::metrics::{self, Split, SsimRange};
 use crate::domain::sample::Scale;
 
-/// The peak of the lab's PSNR, metres.
+/// The peak of the lab's PSNR, meters.
 pub const LAB_PEAK_M: f64 = 0.0225;
 
 /// A prediction against the measurement of the same touch.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// Predicted minus measured, metres; NaN where either is.
+    /// Predicted minus measured, meters; NaN where either is.
     pub error: DepthMap,
     /// Peak signal-to-noise ratio as the lab computes it, decibels; `None` if it is not defined.
     pub psnr_db: Option<f64>,
     /// Structural similarity as the lab computes it; `None` if it is not defined.
     pub ssim: Option<f64>,
-    /// Mean absolute error, metres; NaN without a pixel to compare.
+    /// Mean absolute error, meters; NaN without a pixel to compare.
     pub mae_m: f64,
-    /// Whether PSNR and SSIM are of metres, or (assumed scale) of images stretched to 0..1 each.
+    /// Whether PSNR and SSIM are of meters, or (assumed scale) of images stretched to 0..1 each.
     pub scale: Scale,
-    /// The same figures inside and outside the GelSlim's footprint, errors in metres; `None` where nobody asked.
+    /// The same figures inside and outside the GelSlim's footprint, errors in meters; `None` where nobody asked.
     pub split: Option<Split>,
 }
 
@@ -77,7 +77,7 @@ pub fn compare_parts(
     let Some(seen) = seen else { return Ok(whole) };
     let mut split = metrics::split(predicted, measured, seen, LAB_PEAK_M).map_err(fail)?;
     if scale == Scale::Assumed {
-        // Lengths stay in the assumed metres; PSNR and SSIM are of the stretched images, as those of the whole are.
+        // Lengths stay in the assumed meters; PSNR and SSIM are of the stretched images, as those of the whole are.
         let (p, m) = (metrics::unit_range(predicted), metrics::unit_range(measured));
         let unit = metrics::split(&p, &m, seen, 1.0).map_err(fail)?;
         for (part, unit) in

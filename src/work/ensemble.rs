@@ -12,9 +12,9 @@ use crate::domain::postprocess::{DepthChain, ShiftMode};
 /// Several predictions of one touch against each other.
 #[derive(Clone, Debug)]
 pub struct Ensemble {
-    /// Around their mean, metres.
+    /// Around their mean, meters.
     pub spread: Spread,
-    /// Mean over them of the spread of the decoder's channels, metres; `None` for a decoder of one channel.
+    /// Mean over them of the spread of the decoder's channels, meters; `None` for a decoder of one channel.
     pub channels: Option<DepthMap>,
 }
 
@@ -25,7 +25,7 @@ impl Ensemble {
     }
 }
 
-/// Mean and spreads of several predictions, `imprints` being the same in metres.
+/// Mean and spreads of several predictions, `imprints` being the same in meters.
 ///
 /// # Errors
 /// If there is none, or their sizes differ.

@@ -42,7 +42,7 @@ pub enum MaskBy {
     Cad,
     /// The simulator's true contact, whatever the imprint.
     Truth,
-    /// Imprint depth above so many metres.
+    /// Imprint depth above so many meters.
     Threshold(f32),
 }
 
@@ -59,7 +59,7 @@ pub struct Setup {
     pub mask: MaskBy,
     /// The registration.
     pub engine: Engine,
-    /// How decoder outputs become metres.
+    /// How decoder outputs become meters.
     pub shift: ShiftMode,
     /// Sampling steps instead of each bundle's own; not for bundles that draw in one step.
     pub steps: Option<u32>,

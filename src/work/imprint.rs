@@ -1,4 +1,4 @@
-//! A decoder's picture to metres: [`imprint`].
+//! A decoder's picture to meters: [`imprint`].
 
 use super::error::TaskError;
 use super::prediction::{Chains, Prediction};
@@ -11,17 +11,17 @@ use crate::domain::sample::{PadTouch, Sample};
 /// Longest side of a thumbnail, pixels.
 const THUMBNAIL_PX: usize = 44;
 
-/// A prediction in metres, as large as the bubble image `size` (`[width, height]`).
+/// A prediction in meters, as large as the bubble image `size` (`[width, height]`).
 ///
 /// # Errors
 /// If the bundle has no such range mapping, or its steps do not fit its output.
 pub fn imprint(prediction: &Prediction, shift: ShiftMode, size: [usize; 2]) -> Result<DepthMap, TaskError> {
     let what = format!("Range mapping \"{}\"", shift.label());
     let chain = chain(prediction, shift)?;
-    in_metres(&chain, &prediction.raw, size).map_err(|err| TaskError::from_error(&what, &err))
+    in_meters(&chain, &prediction.raw, size).map_err(|err| TaskError::from_error(&what, &err))
 }
 
-/// The prediction of one finger of a sample in metres, as large as its bubble image; without one, the bundle's own size
+/// The prediction of one finger of a sample in meters, as large as its bubble image; without one, the bundle's own size
 /// is kept.
 ///
 /// # Errors
@@ -48,17 +48,17 @@ pub fn color(prediction: &Prediction, size: [usize; 2]) -> Result<Option<RgbGrid
     Ok(Some(if fits { color } else { bilinear_rgb(&color, size[0], size[1]) }))
 }
 
-/// A decoder's picture in metres, as large as the bubble image `size` (`[width, height]`; with a zero in it the chain's
+/// A decoder's picture in meters, as large as the bubble image `size` (`[width, height]`; with a zero in it the chain's
 /// own size is kept).
 ///
 /// # Errors
 /// If the chain does not fit the picture.
-pub fn in_metres(chain: &DepthChain, raw: &RawPrediction, size: [usize; 2]) -> Result<DepthMap, PostprocessError> {
+pub fn in_meters(chain: &DepthChain, raw: &RawPrediction, size: [usize; 2]) -> Result<DepthMap, PostprocessError> {
     let depth = chain.run(raw)?;
     if depth.size() == size || size.contains(&0) { Ok(depth) } else { Ok(bilinear(&depth, size[0], size[1])) }
 }
 
-/// The steps from a prediction to metres.
+/// The steps from a prediction to meters.
 ///
 /// # Errors
 /// If the bundle has no such range mapping, or the statistics of a refit are of another bundle.
@@ -66,7 +66,7 @@ pub fn chain(prediction: &Prediction, shift: ShiftMode) -> Result<DepthChain, Ta
     chain_of(&prediction.chains, &prediction.bundle, shift)
 }
 
-/// The steps to metres among the ways that a bundle of this identity offers.
+/// The steps to meters among the ways that a bundle of this identity offers.
 ///
 /// # Errors
 /// As [`chain`].

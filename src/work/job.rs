@@ -51,13 +51,13 @@ pub struct PreviewPicture {
     pub step: u32,
     /// Steps in all.
     pub of: u32,
-    /// As the model sees it now, metres, as large as the bubble image.
+    /// As the model sees it now, meters, as large as the bubble image.
     pub depth: DepthMap,
 }
 
 /// Receives pictures on the way of the items of one call, by their position in it.
 pub trait Previews: Send + Sync {
-    /// How a picture of an item after `step` steps would become metres; `None` if nobody would look at it. Nothing is
+    /// How a picture of an item after `step` steps would become meters; `None` if nobody would look at it. Nothing is
     /// computed then.
     fn wants(&self, item: usize, step: u32) -> Option<ShiftMode>;
 

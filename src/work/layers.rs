@@ -16,7 +16,7 @@ pub struct LayerResult {
     pub grasp_from_object: PlanarPose,
     /// The reason of every pixel.
     pub reasons: PerPad<Grid<Reason>>,
-    /// Residual (metres) and weight of every contact point, in the order of the cloud.
+    /// Residual (meters) and weight of every contact point, in the order of the cloud.
     pub fits: PerPad<Vec<PointFit>>,
     /// Pixels per reason.
     pub counts: PerPad<ReasonCounts>,
@@ -24,9 +24,9 @@ pub struct LayerResult {
     pub histogram: Vec<u32>,
     /// Contact points with a larger residual than the range.
     pub above: u32,
-    /// Largest residual of the histogram and of the heat map, metres.
+    /// Largest residual of the histogram and of the heat map, meters.
     pub range_m: f64,
-    /// Width of the narrowest kernel, metres; `None` for an engine without one.
+    /// Width of the narrowest kernel, meters; `None` for an engine without one.
     pub kernel_m: Option<f64>,
     /// Distances in both directions; `None` without points on one side.
     pub directions: Option<Directions>,
@@ -55,7 +55,7 @@ impl LayerResult {
 pub const BARS: usize = 40;
 /// Range of the histogram and of the heat map in widths of the kernel: where the gate is, and a little beyond.
 const RANGE_KERNELS: f64 = 4.0;
-/// The same for an engine without a kernel, metres.
+/// The same for an engine without a kernel, meters.
 const RANGE_M: f64 = 4e-3;
 
 /// What the layers show of a recorded registration of `clouds` with the masks they were made with.

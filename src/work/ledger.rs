@@ -12,11 +12,11 @@ use crate::domain::postprocess::{ChainReading, DepthChain, Ledger, Mapping, Shif
 pub struct LedgerResult {
     /// Every stage, the result against the truth, and what is implausible.
     pub ledger: Ledger,
-    /// The same picture in every way to metres.
+    /// The same picture in every way to meters.
     pub readings: Vec<ChainReading>,
 }
 
-/// The ways to metres to be compared: all that a bundle has, and `shift` where it is a data set's own.
+/// The ways to meters to be compared: all that a bundle has, and `shift` where it is a data set's own.
 fn reading_chains(shift: ShiftMode, chain: impl Fn(ShiftMode) -> Option<DepthChain>) -> Vec<(ShiftMode, DepthChain)> {
     let own = matches!(shift, ShiftMode::Refit(_)).then_some(shift);
     ShiftMode::ALL.into_iter().chain(own).filter_map(|mode| Some((mode, chain(mode)?))).collect()

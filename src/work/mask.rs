@@ -13,11 +13,11 @@ use crate::domain::sample::PadTouch;
 /// An automatic mask's recipe.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum MaskRecipe {
-    /// Imprint above a depth in metres.
+    /// Imprint above a depth in meters.
     Threshold(Bits),
     /// The deepest share of the pixels, in percent.
     TopPercent(Bits),
-    /// Within a distance (metres) of the CAD model at the true pose.
+    /// Within a distance (meters) of the CAD model at the true pose.
     Cad(Bits),
     /// A mask model, by its bundle's identity.
     Unet(Arc<str>),

@@ -9,7 +9,7 @@ use strum::IntoEnumIterator as _;
 
 use super::bundles::BundleInfo;
 use super::error::TaskError;
-use super::imprint::in_metres;
+use super::imprint::in_meters;
 use super::job::{JobCx, PreviewPicture};
 use super::prediction::{Chains, Prediction};
 use crate::domain::contact::ContactMask;
@@ -64,7 +64,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What becomes of a bundle's pictures: ways to metres, steps to a color picture, and how large its condition is.
+/// What becomes of a bundle's pictures: ways to meters, steps to a color picture, and how large its condition is.
 #[derive(Clone, Debug, Default)]
 struct Ways {
     chains: Chains,
@@ -108,7 +108,7 @@ impl Models {
         }
     }
 
-    /// The ways to metres that a generator's bundle offers; none for another kind.
+    /// The ways to meters that a generator's bundle offers; none for another kind.
     ///
     /// # Errors
     /// If the bundle cannot be opened.
@@ -266,7 +266,7 @@ impl Models {
         kept
     }
 
-    /// What the mask model says of an imprint in metres, and what the mask is made of in the end.
+    /// What the mask model says of an imprint in meters, and what the mask is made of in the end.
     ///
     /// # Errors
     /// If the model cannot be loaded or run.
@@ -329,7 +329,7 @@ impl Observer for Follow<'_> {
     fn preview(&mut self, after: Progress, item: usize, raw: RawPrediction) {
         let Some((at, shift)) = self.shift(after, item) else { return };
         let Some(Ok(chain)) = self.chains.get(&shift) else { return };
-        if let (Ok(depth), Some(previews)) = (in_metres(chain, &raw, self.wanted[at].size), self.cx.previews()) {
+        if let (Ok(depth), Some(previews)) = (in_meters(chain, &raw, self.wanted[at].size), self.cx.previews()) {
             previews.show(at, PreviewPicture { step: after.step, of: after.of, depth });
         }
     }

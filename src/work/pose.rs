@@ -23,7 +23,7 @@ pub struct PoseResult {
     pub truth_rad: Option<f64>,
     /// Size of the angle's error, where the truth is known.
     pub error_rad: Option<f64>,
-    /// Root mean square of the residuals, metres.
+    /// Root mean square of the residuals, meters.
     pub rms_m: f64,
     /// Contact points registered.
     pub num_points: usize,

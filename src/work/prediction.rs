@@ -5,15 +5,15 @@ use std::sync::Arc;
 
 use crate::domain::postprocess::{ColorChain, DepthChain, RawPrediction, ShiftMode};
 
-/// Per range mapping the steps to metres, or why it cannot be done.
+/// Per range mapping the steps to meters, or why it cannot be done.
 pub type Chains = Arc<BTreeMap<ShiftMode, Result<DepthChain, String>>>;
 
-/// A prediction: the decoder's picture, with the ways to metres.
+/// A prediction: the decoder's picture, with the ways to meters.
 #[derive(Clone, Debug)]
 pub struct Prediction {
     /// The decoder's picture.
     pub raw: RawPrediction,
-    /// The ways to metres that its bundle offers.
+    /// The ways to meters that its bundle offers.
     pub chains: Chains,
     /// The steps to a color sensor's picture; `None` where it is depth that was predicted.
     pub color: Option<ColorChain>,

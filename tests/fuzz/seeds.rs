@@ -207,11 +207,11 @@ pub(super) fn picture(picture: &image::DynamicImage, format: image::ImageFormat)
 pub(super) fn pictures() -> Vec<Seed> {
     use image::{DynamicImage as D, ImageFormat};
     let kinds: [(&str, D); 5] = [
-        ("grey", D::new_luma8(24, 20)),
-        ("deep grey", D::new_luma16(24, 20)),
-        ("colour", D::new_rgb8(24, 20)),
-        ("colour with alpha", D::new_rgba8(24, 20)),
-        ("deep colour", D::new_rgb16(24, 20)),
+        ("gray", D::new_luma8(24, 20)),
+        ("deep gray", D::new_luma16(24, 20)),
+        ("color", D::new_rgb8(24, 20)),
+        ("color with alpha", D::new_rgba8(24, 20)),
+        ("deep color", D::new_rgb16(24, 20)),
     ];
     let mut seeds: Vec<Seed> =
         kinds.iter().map(|(name, kind)| good(name, Content::Png(picture(kind, ImageFormat::Png)))).collect();

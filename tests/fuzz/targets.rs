@@ -19,7 +19,7 @@ use touch2touch::infer::engine::EngineKind;
 use touch2touch::infer::recipe::Recipe;
 use touch2touch::infer::store::Store;
 use touch2touch::io::cases::{Case, Stratum};
-use touch2touch::io::dataset::{Dataset, UNIT_FILE, read_in_metres};
+use touch2touch::io::dataset::{Dataset, UNIT_FILE, read_in_meters};
 use touch2touch::io::masks::{MaskStore, StoredMask, StoredReview};
 use touch2touch::io::pt::Tensor;
 use touch2touch::io::statistics::{Provenance, ShiftStatistics};
@@ -226,7 +226,7 @@ fn place_unit(dir: &Path, bytes: &[u8]) -> PathBuf {
 
 fn read_unit(dir: &Path, file: &Path) -> Outcome {
     // The refusal is about the model where the unit can be read but makes it impossible.
-    read_in_metres(&dir.join("a.stl"), None).map(drop).map_err(|err| {
+    read_in_meters(&dir.join("a.stl"), None).map(drop).map_err(|err| {
         let named = err.file() == file || err.file().ends_with("a.stl");
         assert!(named, "{err}");
         format!("{err} {}", file.display())
@@ -234,8 +234,8 @@ fn read_unit(dir: &Path, file: &Path) -> Outcome {
 }
 
 fn read_picture(_: &Path, file: &Path) -> Outcome {
-    drop(images::read_grey8(file));
-    images::read_grey(file).map_err(said)?;
+    drop(images::read_gray8(file));
+    images::read_gray(file).map_err(said)?;
     images::read_rgb(file).map(drop).map_err(said)
 }
 

@@ -47,7 +47,7 @@ fn a_written_touch_reads_back_whole() {
             assert_eq!(ba.truth.as_ref().unwrap().contact, bb.truth.as_ref().unwrap().contact);
             let (ca, cb) = (ba.camera.as_ref().unwrap(), bb.camera.as_ref().unwrap());
             assert_eq!((&ca.depth_reference, ca.intrinsics), (&cb.depth_reference, cb.intrinsics));
-            // Frames are stored as 32-bit numbers around half a metre: 6e-8 each.
+            // Frames are stored as 32-bit numbers around half a meter: 6e-8 each.
             assert!(ca.grasp_from_camera.abs_diff_eq(cb.grasp_from_camera, 5e-7));
         }
     }
@@ -214,10 +214,10 @@ fn picture_folders() {
     for name in ["b2", "b10"] {
         images::write_rgb8(&file(&format!("{name}_gelslim.png")), &Grid::from_fn(64, 48, |x, _| [x as f32; 3]))
             .unwrap();
-        images::write_grey8(&file(&format!("{name}_bubble.png")), &Grid::from_fn(128, 128, |x, y| (x + y) as u8))
+        images::write_gray8(&file(&format!("{name}_bubble.png")), &Grid::from_fn(128, 128, |x, y| (x + y) as u8))
             .unwrap();
     }
-    images::write_grey8(&file("lone_bubble.png"), &Grid::filled(8, 8, 1)).unwrap();
+    images::write_gray8(&file("lone_bubble.png"), &Grid::filled(8, 8, 1)).unwrap();
     std::fs::write(file("b10_bubble.png"), b"\x89PNG broken").unwrap();
     std::fs::write(file("notes.txt"), b"x").unwrap();
     let dataset = Dataset::open(dir.path()).unwrap();

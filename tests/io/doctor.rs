@@ -57,7 +57,7 @@ fn good_data_has_no_problem_and_every_spoilt_one_is_found() {
     let has = |problems: Vec<String>, word: &str| {
         assert!(problems.iter().any(|p| p.contains(word)), "{word}: {problems:#?}");
     };
-    has(spoilt(|s| bubbles(s, |b| b.imprint = b.imprint.map(|v| v * 1e3))), "millimetres?");
+    has(spoilt(|s| bubbles(s, |b| b.imprint = b.imprint.map(|v| v * 1e3))), "millimeters?");
     has(spoilt(|s| bubbles(s, |b| b.imprint[(4, 4)] = 0.5)), "single pixels are far off");
     has(spoilt(|s| bubbles(s, |b| b.imprint = Grid::filled(175, 140, 0.0))), "everywhere");
     has(
@@ -74,7 +74,7 @@ fn good_data_has_no_problem_and_every_spoilt_one_is_found() {
             camera.depth_reference = camera.depth_reference.map(|v| v * by);
         });
     };
-    has(spoilt(|s| scale_reference(s, 1e3)), "out of the bubble's range: millimetres?");
+    has(spoilt(|s| scale_reference(s, 1e3)), "out of the bubble's range: millimeters?");
     has(spoilt(|s| bubbles(s, |b| b.camera.as_mut().unwrap().grasp_from_camera.translation *= 20.0)), "past the grasp");
     has(
         spoilt(|s| {
@@ -84,7 +84,7 @@ fn good_data_has_no_problem_and_every_spoilt_one_is_found() {
         "same side",
     );
     has(spoilt(|s| s.grasp_from_object.as_mut().unwrap().theta_rad = 12.0), "degrees?");
-    has(spoilt(|s| s.grasp_from_object.as_mut().unwrap().y_m = 4.0), "millimetres?");
+    has(spoilt(|s| s.grasp_from_object.as_mut().unwrap().y_m = 4.0), "millimeters?");
     has(
         spoilt(|s| {
             let images = s.pads[lab::RIGHT].as_mut().unwrap().color_mut().unwrap().images.as_mut().unwrap();
@@ -95,7 +95,7 @@ fn good_data_has_no_problem_and_every_spoilt_one_is_found() {
 }
 
 #[test]
-fn cad_in_millimetres_is_found_and_progress_can_end_it() {
+fn cad_in_millimeters_is_found_and_progress_can_end_it() {
     let dir = tempfile::tempdir().unwrap();
     write_tools(dir.path(), &[("rod", true, tetrahedron(50.0)), ("cross", false, tetrahedron(0.05))]).unwrap();
     for i in 0..20 {
@@ -103,7 +103,7 @@ fn cad_in_millimetres_is_found_and_progress_can_end_it() {
     }
     let report = doctor(dir.path());
     assert_eq!(report.problems.len(), 1, "{:#?}", report.problems);
-    assert!(report.problems[0].what.contains("cannot be metres: scale it by 0.001"));
+    assert!(report.problems[0].what.contains("cannot be meters: scale it by 0.001"));
     let dataset = Dataset::open(dir.path()).unwrap();
     let mut calls = Vec::new();
     let stopped = examine(&dataset, &mut |done, total| {
@@ -132,7 +132,7 @@ fn the_doctor_and_loading_give_the_same_verdict() {
     write_tools(dir.path(), &[("rod", true, tetrahedron(50.0))]).unwrap();
     let unit = dir.path().join("tools_stls/unit.txt");
     for (text, verdict) in [
-        (None, Some("cannot be metres")),
+        (None, Some("cannot be meters")),
         (Some("mm"), None),
         (Some("auto"), None),
         (Some("in"), Some("unit.txt")),

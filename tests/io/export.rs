@@ -65,10 +65,10 @@ fn the_folder_is_what_the_loader_accepts() {
     let (image, _) =
         first.iter().find(|(name, _)| name.ends_with("data_3_right.png") && name.contains("imgs")).unwrap();
     assert!(image.contains("pattern_31_rod"));
-    let pixels = images::read_grey8(&folder.join(image)).unwrap();
+    let pixels = images::read_gray8(&folder.join(image)).unwrap();
     // 0.0 -> 0.0116 / 0.0341 * 255 = 86.7, cut; unmeasured counts as 0; outside is limited.
     assert_eq!(&pixels.row(0)[..6], &[0, 86, 255, 255, 86, 0]);
-    let mask = images::read_grey8(&folder.join(image.replace("imgs", "masks"))).unwrap();
+    let mask = images::read_gray8(&folder.join(image.replace("imgs", "masks"))).unwrap();
     assert!(mask.as_slice().iter().all(|v| [0, 255].contains(v)));
     // Again over the previous export: same bytes; nothing else is left beside it.
     run(&folder, 20, &config).unwrap();
@@ -116,8 +116,8 @@ fn the_check_finds_what_the_loader_would_trip_over() {
         tree(&folder).into_iter().map(|(n, _)| n).filter(|n| n.starts_with("train/masks")).collect();
     let file = |i: usize| folder.join(&names[i]);
     std::fs::remove_file(file(0)).unwrap();
-    images::write_grey8(&file(1), &Grid::filled(175, 140, 7)).unwrap();
-    images::write_grey8(&file(2), &Grid::filled(17, 14, 255)).unwrap();
+    images::write_gray8(&file(1), &Grid::filled(175, 140, 7)).unwrap();
+    images::write_gray8(&file(2), &Grid::filled(17, 14, 255)).unwrap();
     images::write_rgb8(&file(3), &Grid::filled(175, 140, [0.0; 3])).unwrap();
     std::fs::write(file(4), b"no picture").unwrap();
     std::fs::write(folder.join("train/imgs/.DS_Store"), b"x").unwrap();

@@ -7,7 +7,7 @@ use std::time::Duration;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::rig::lab;
 use touch2touch::infer::bundle::Bundle;
-use touch2touch::io::dataset::{Dataset, read_in_metres};
+use touch2touch::io::dataset::{Dataset, read_in_meters};
 use touch2touch::io::masks::MaskStore;
 use touch2touch::io::{cases, images, npz, pt, statistics, stl};
 
@@ -41,7 +41,7 @@ fn no_reader_waits_for_a_pipe_or_reads_a_device() {
         ("a.npz", |file| error(npz::read(file))),
         ("case_0.npz", |file| error(cases::CaseSet::open(file.parent().unwrap()))),
         ("a.stl", |file| error(stl::read(file))),
-        ("unit.txt", |file| error(read_in_metres(&file.with_file_name("t.stl"), None))),
+        ("unit.txt", |file| error(read_in_meters(&file.with_file_name("t.stl"), None))),
         ("a.png", |file| error(images::read_rgb(file))),
         ("a_gelslim.png", |file| error(Dataset::open(file.parent().unwrap()).unwrap().load(PairId(0)))),
         ("data_0.pt", |file| error(Dataset::open(file.parent().unwrap()).unwrap().load(PairId(0)))),

@@ -105,7 +105,7 @@ fn the_real_pictures_open_without_a_problem() {
     assert_eq!(dataset.problems, []);
     assert_eq!(dataset.index.pairs[7].name, "07");
     let mut squares = [0f64; 3];
-    // Pictures that the lab's colour jitter left alone; see the module's documentation of the gain.
+    // Pictures that the lab's color jitter left alone; see the module's documentation of the gain.
     let clean = [2, 3, 7, 8, 12, 13, 14, 16, 17, 19, 21, 22, 23, 24, 26, 32, 33, 34, 35];
     for i in 0..36 {
         let loaded = dataset.load_with_counts(PairId(i)).unwrap();

@@ -44,7 +44,7 @@ fn e20_a_deviation_of_zero_is_not_divided_by() {
             assert!(found.flags.iter().any(|f| f.kind == FlagKind::NoSpread), "{pred_std}: {:?}", found.flags);
         }
     }
-    // Relative: the same picture in nanometres is judged the same.
+    // Relative: the same picture in nanometers is judged the same.
     let tiny = ShiftStats { pred_mean: 0.0126e-6, pred_std: 0.0015e-6, gt_mean: 0.0, gt_std: 1.0 };
     assert!(!tiny.has_no_spread(0.0225e-6) && tiny.has_no_spread(0.0225));
 }

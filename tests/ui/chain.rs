@@ -35,7 +35,7 @@ fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
     rig.send(Command::SetWorkspace(Workspace::Label));
     rig.send(Command::Generate);
     rig.send(Command::SetWorkspace(Workspace::Evaluate));
-    rig.take("Maximise Error");
+    rig.take("Maximize Error");
     assert!(!rig.harness.state().state().selection.panes.contains(&Pane::Ledger));
     let chains = rig.chains();
     rig.send(Command::SetShift(ShiftMode::Raw));
@@ -58,14 +58,14 @@ fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
     assert!(rig.harness.query_all_by_label_contains(&what).next().is_some(), "{what}");
     rig.shoot("test-depth-chain-raw");
     // A reading is taken by a click; the flag goes.
-    rig.take("Maximise Depth chain");
+    rig.take("Maximize Depth chain");
     rig.take("Reading Exact inverse");
     let state = rig.harness.state().state();
     assert_eq!(state.settings.shift, ShiftMode::ExactInverse);
     let found = state.ledger(lab::RIGHT).ready().unwrap();
     assert!(found.ledger.flags.iter().all(|f| f.kind != FlagKind::DoubledMapping), "{:?}", found.ledger.flags);
     rig.take("Depth chain of the left finger");
-    rig.shoot("test-depth-chain-maximised");
+    rig.shoot("test-depth-chain-maximized");
     assert_eq!(rig.harness.state().state().selection.finger, lab::LEFT);
     assert!(rig.harness.state().state().ledger(lab::LEFT).ready().is_some());
 }
@@ -132,7 +132,7 @@ fn pictures_of_the_depth_chain() {
             rig.send(Command::SetTheme(theme));
             rig.send(Command::SetShift(ShiftMode::ExactInverse));
             rig.shoot(&format!("{name}-chain-{theme:?}").to_lowercase());
-            rig.take("Maximise Depth chain");
+            rig.take("Maximize Depth chain");
             rig.send(Command::SetShift(ShiftMode::Raw));
             rig.shoot(&format!("{name}-chain-full-{theme:?}").to_lowercase());
             rig.take("Back to all panes");

@@ -153,12 +153,12 @@ fn a_click_on_the_map_loads_that_run() {
     rig.settle();
     assert_eq!(rig.harness.state().state().inspection().ready().unwrap().num_runs(), own);
     // Out of sight the map is not computed, even when what it is made from changes.
-    rig.harness.get_by_label("Maximise Time machine").click();
+    rig.harness.get_by_label("Maximize Time machine").click();
     rig.harness.step();
     rig.settle();
     let maps = rig.harness.state().state().results.basins.len();
     rig.send(Command::SetMaskSource(MaskSource::Cad));
-    rig.send(Command::Inspect(InspectCommand::Colour(touch2touch::app::inspect::BasinColour::Winner)));
+    rig.send(Command::Inspect(InspectCommand::Color(touch2touch::app::inspect::BasinColor::Winner)));
     assert_eq!(rig.harness.state().state().results.basins.len(), maps);
     assert_eq!(rig.harness.state().state().results.inspections.len(), 3, "the time machine is still on screen");
 }

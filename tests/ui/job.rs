@@ -229,7 +229,7 @@ fn no_pane_asks_for_what_it_does_not_show() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     // One pane alone: its panes are all that is computed for.
     rig.send(Command::SetWorkspace(Workspace::Label));
-    rig.harness.get_by_label("Maximise Mask").click();
+    rig.harness.get_by_label("Maximize Mask").click();
     rig.settle();
     let state = rig.harness.state().state();
     assert_eq!(state.selection.panes.iter().copied().collect::<Vec<_>>(), vec![Pane::Masks]);

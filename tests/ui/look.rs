@@ -2,7 +2,7 @@
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::Command;
-use touch2touch::app::inspect::{BasinColour, InspectCommand};
+use touch2touch::app::inspect::{BasinColor, InspectCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{MaskSource, Theme, Workspace};
 use touch2touch::app::workbench::{Layer, SceneTool, WorkbenchCommand};
@@ -32,7 +32,7 @@ fn every_workspace_draws_in_both_themes() {
             let mut colors: Vec<[u8; 4]> = image.pixels().map(|p| p.0).collect();
             colors.sort_unstable();
             colors.dedup();
-            assert!(colors.len() > 500, "{workspace:?} {theme:?}: {} colours", colors.len());
+            assert!(colors.len() > 500, "{workspace:?} {theme:?}: {} colors", colors.len());
         }
     }
 }
@@ -58,7 +58,7 @@ fn pictures_for_the_docs() {
         rig.send(Command::Inspect(InspectCommand::Pin));
         rig.send(Command::Inspect(InspectCommand::By(4)));
         rig.shoot(&format!("{name}-demo-align"));
-        rig.send(Command::Inspect(InspectCommand::Colour(BasinColour::Winner)));
+        rig.send(Command::Inspect(InspectCommand::Color(BasinColor::Winner)));
         rig.send(Command::Inspect(InspectCommand::Start(Some(STRAY))));
         rig.shoot(&format!("{name}-demo-align-start"));
         rig.send(Command::Inspect(InspectCommand::Start(None)));

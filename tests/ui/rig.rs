@@ -28,7 +28,7 @@ use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::ui::{Options, StudioApp};
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
-use touch2touch::work::imprint::in_metres;
+use touch2touch::work::imprint::in_meters;
 use touch2touch::work::job::{JobCx, PreviewPicture};
 use touch2touch::work::models::Wanted;
 use touch2touch::work::prediction::Prediction;
@@ -129,7 +129,7 @@ impl Services for QuickGenerator {
             for (at, item) in wanted.iter().enumerate() {
                 if let Some((previews, shift)) = cx.previews().and_then(|p| Some((p, p.wants(at, 4)?))) {
                     let raw = RawPrediction { channels: vec![picture(item.difference, item.seed)] };
-                    let depth = in_metres(chains[&shift].as_ref().unwrap(), &raw, item.size).unwrap();
+                    let depth = in_meters(chains[&shift].as_ref().unwrap(), &raw, item.size).unwrap();
                     previews.show(at, PreviewPicture { step: 4, of: steps, depth });
                 }
             }

@@ -61,7 +61,7 @@ fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
     effects.push(Effect::Generate { ticket, recipes, bundle, source, sample });
 }
 
-/// The seed after `seed`: scattered, so that neighbours share nothing, and short enough to be read out.
+/// The seed after `seed`: scattered, so that neighbors share nothing, and short enough to be read out.
 ///
 /// Source: the finaliser of SplitMix64 (Steele et al. 2014), cut to 32 bits.
 fn next_seed(seed: u64) -> u64 {

@@ -63,7 +63,7 @@ pub(super) fn step(state: &mut State, command: InspectCommand) {
         }
         InspectCommand::Lines(lines) => state.inspect.lines = lines,
         InspectCommand::Plane(plane) => state.inspect.plane = plane,
-        InspectCommand::Colour(colour) => state.inspect.colour = colour,
+        InspectCommand::Color(color) => state.inspect.color = color,
         InspectCommand::StopBasin => {
             // What failed is not wanted any more, until somebody asks for it again; the runtime stops it.
             if let Ok(Some(key)) = state.basin_key()

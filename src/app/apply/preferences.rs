@@ -3,7 +3,7 @@
 use super::super::command::Command;
 use super::super::effect::Effect;
 use super::super::keys::ImprintSource;
-use super::super::settings::{ColourRange, GenerateSettings, MaskTool, Settings};
+use super::super::settings::{ColorRange, GenerateSettings, MaskTool, Settings};
 use super::super::state::State;
 use super::save_settings;
 
@@ -21,7 +21,7 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
             follow_range(state);
         }
         Command::RangeFromShown => range_from_shown(state),
-        Command::SetColourMap(map) => settings.colour_map = map,
+        Command::SetColorMap(map) => settings.color_map = map,
         Command::SetShift(shift) => settings.shift = shift,
         Command::SetGenerate(generate) => {
             // Whoever changes a number of a preset has left it.
@@ -94,7 +94,7 @@ fn range_from_shown(state: &mut State) {
     let at = |values: &mut Vec<f32>, index: usize| *values.select_nth_unstable_by(index, f32::total_cmp).1;
     let last = values.len() - 1;
     let (min_m, max_m) = (at(&mut values, cut), at(&mut values, last - cut));
-    let range = ColourRange { min_m, max_m, ..state.settings.range };
+    let range = ColorRange { min_m, max_m, ..state.settings.range };
     if range.is_valid() {
         state.settings.range = range;
     }

@@ -9,7 +9,7 @@ use super::masks;
 use crate::domain::hand::{self, AcceptedPose, HandCost, HandPose};
 use crate::work::error::TaskError;
 
-/// Width of the kernel that costs of poses by hand are counted with, metres: the narrowest of the registration.
+/// Width of the kernel that costs of poses by hand are counted with, meters: the narrowest of the registration.
 const KERNEL_M: f64 = 1e-3;
 
 pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut Vec<Effect>) {

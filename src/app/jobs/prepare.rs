@@ -169,7 +169,7 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             }
             job(
                 Lane::Compute,
-                "Prediction in metres".into(),
+                "Prediction in meters".into(),
                 Box::new(move |_| Ok(Computed::Depth(Arc::new(imprint::imprint(&prediction, shift, size)?)))),
             )
         }

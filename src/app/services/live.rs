@@ -130,7 +130,7 @@ impl DataSource for LiveSource {
         match self.dataset.tool_mesh(tool) {
             Ok(Some(mesh)) => Ok(mesh),
             Ok(None) => Err(TaskError::new(what, format!("there is no {tool}.stl in the data set"))
-                .with_hint("Put it into data/tools_stls, in metres and the object frame.")),
+                .with_hint("Put it into data/tools_stls, in meters and the object frame.")),
             Err(err) => Err(TaskError::from_error(what, &err).with_hint(err.hint())),
         }
     }
@@ -298,9 +298,9 @@ mod tests {
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
-        let grey = crate::domain::grid::Grid::from_fn(32, 32, |x, y| (x * 4 + y) as u8);
+        let gray = crate::domain::grid::Grid::from_fn(32, 32, |x, y| (x * 4 + y) as u8);
         let rgb = RgbGrid::from_fn(32, 32, |x, y| [x as f32, y as f32, 9.0]);
-        crate::io::images::write_grey8(&folder.join("a_bubble.png"), &grey).unwrap();
+        crate::io::images::write_gray8(&folder.join("a_bubble.png"), &gray).unwrap();
         crate::io::images::write_rgb8(&folder.join("a_gelslim.png"), &rgb).unwrap();
     }
 

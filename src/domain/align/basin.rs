@@ -10,7 +10,7 @@ use super::{AlignError, AlignReport, Prior, Stop};
 use crate::domain::frames::PlanarPose;
 use crate::domain::units::{angle_error, wrap_angle};
 
-/// Ends closer than this are one: radians and metres.
+/// Ends closer than this are one: radians and meters.
 pub const SAME_RAD: f64 = 1.0 / 180.0 * std::f64::consts::PI;
 /// See [`SAME_RAD`].
 pub const SAME_M: f64 = 1e-3;
@@ -36,14 +36,14 @@ pub enum Plane {
 pub enum Axis {
     /// The angle in the lab's sense, radians.
     Angle,
-    /// y of the object's origin in the grasp frame, metres.
+    /// y of the object's origin in the grasp frame, meters.
     Y,
-    /// z of the same, metres.
+    /// z of the same, meters.
     Z,
 }
 
 impl Axis {
-    /// The coordinate of a pose (`grasp_from_object`), radians or metres.
+    /// The coordinate of a pose (`grasp_from_object`), radians or meters.
     pub fn of(self, grasp_from_object: PlanarPose) -> f64 {
         match self {
             Self::Angle => -wrap_angle(grasp_from_object.theta_rad),
@@ -81,7 +81,7 @@ pub struct BasinConfig {
     pub size: [usize; 2],
     /// Largest size of the angle, radians.
     pub angle_rad: f64,
-    /// Largest size of y and z, metres.
+    /// Largest size of y and z, meters.
     pub shift_m: f64,
     /// Where the gripper can hold a tool: drawn, and the reason for the range.
     pub prior: Prior,
@@ -94,7 +94,7 @@ impl BasinConfig {
         Self { plane, size: [31, 21], angle_rad: 2.0 * prior.theta_rad, shift_m: 2.0 * prior.shift_m, prior }
     }
 
-    /// Largest size of a coordinate, radians or metres.
+    /// Largest size of a coordinate, radians or meters.
     pub fn reach(&self, axis: Axis) -> f64 {
         if axis == Axis::Angle { self.angle_rad } else { self.shift_m }
     }
@@ -117,7 +117,7 @@ pub struct Arrival {
     pub applied: PlanarPose,
     /// Where it ended, `grasp_from_object`.
     pub end: PlanarPose,
-    /// Cost per point there, square metres; comparable within the map.
+    /// Cost per point there, square meters; comparable within the map.
     pub cost_m2: f64,
     /// Share of the points near the surface there.
     pub inlier_share: f64,
@@ -145,7 +145,7 @@ pub struct Cell {
 pub struct End {
     /// The cheapest of them, `grasp_from_object`.
     pub end: PlanarPose,
-    /// Its cost, square metres.
+    /// Its cost, square meters.
     pub cost_m2: f64,
     /// Starts of the grid that lead here.
     pub starts: usize,
@@ -175,7 +175,7 @@ impl Basin {
         self.cells.get(row * self.config.size[0] + column)
     }
 
-    /// The cell whose start is nearest to a place in the plane (radians or metres per axis).
+    /// The cell whose start is nearest to a place in the plane (radians or meters per axis).
     pub fn nearest_cell(&self, at: [f64; 2]) -> Option<&Cell> {
         let axes = self.config.plane.axes();
         let index: [usize; 2] = std::array::from_fn(|i| {
@@ -197,7 +197,7 @@ impl Basin {
     }
 }
 
-/// Whether two poses are the same place: within a degree and a millimetre.
+/// Whether two poses are the same place: within a degree and a millimeter.
 pub fn is_same_place(a: PlanarPose, b: PlanarPose) -> bool {
     angle_error(a.theta_rad, b.theta_rad) <= SAME_RAD && (a.y_m - b.y_m).hypot(a.z_m - b.z_m) <= SAME_M
 }

@@ -18,7 +18,7 @@ const WIDER: [f64; 2] = [24.0 / 22.5, 1.2];
 const NEGLIGIBLE: f64 = 1e-4;
 /// Boxes of the angle to start from, half as wide as this, radians.
 const SLAB_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
-/// Cuts in a row; boxes are then some nanometres wide.
+/// Cuts in a row; boxes are then some nanometers wide.
 const DEEPEST: usize = 48;
 
 /// Poses about a middle one.
@@ -26,7 +26,7 @@ const DEEPEST: usize = 48;
 struct Region {
     middle: State,
     extent: Extent,
-    /// No pose in it costs less, square metres, all points together.
+    /// No pose in it costs less, square meters, all points together.
     lower: f64,
 }
 
@@ -35,9 +35,9 @@ struct Proof<'a, 's> {
     search: &'a mut Search<'s>,
     kernel: f64,
     centroid: DVec2,
-    /// Largest size of y and z of a pose, metres, `grasp_from_object`.
+    /// Largest size of y and z of a pose, meters, `grasp_from_object`.
     shift_m: f64,
-    /// Distance of the outermost point from the centroid, metres.
+    /// Distance of the outermost point from the centroid, meters.
     radius: f64,
     gap: f64,
     best: Progress,

@@ -1,7 +1,7 @@
 //! The rigid motion that brings pairs of points closest, without iteration.
 //!
 //! Neither form can return a reflection, so nothing has to be repaired afterwards, and neither has a unit. Sums are
-//! taken about the centroids in f64: an offset of a thousand kilometres costs a millimetre-sized cloud no angle.
+//! taken about the centroids in f64: an offset of a thousand kilometers costs a millimeter-sized cloud no angle.
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{Matrix4, Vector4};

@@ -23,9 +23,9 @@ pub enum Surface<'a> {
 pub struct Match {
     /// Position in the list of points offered.
     pub point: usize,
-    /// The counterpart, `(y, z)`, metres, grasp frame.
+    /// The counterpart, `(y, z)`, meters, grasp frame.
     pub foot_yz: DVec2,
-    /// Distance that the point pays for, metres.
+    /// Distance that the point pays for, meters.
     pub residual_m: f64,
     /// Weight in [0, 1] under the kernel.
     pub weight: f64,
@@ -41,7 +41,7 @@ pub struct Matches {
 }
 
 impl Matches {
-    /// Median and largest residual of the list, metres; `None` without a match.
+    /// Median and largest residual of the list, meters; `None` without a match.
     pub fn median_and_max_m(&self) -> Option<[f64; 2]> {
         let mut all: Vec<f64> = self.list.iter().map(|m| m.residual_m).collect();
         all.sort_by(f64::total_cmp);
@@ -51,7 +51,7 @@ impl Matches {
 
 /// Correspondences of at most `most` points, evenly thinned; points that are not finite have none.
 ///
-/// `points_yz` are `(y, z)` in the grasp frame, metres; `kernel_m` is the width of the Geman-McClure kernel, infinite
+/// `points_yz` are `(y, z)` in the grasp frame, meters; `kernel_m` is the width of the Geman-McClure kernel, infinite
 /// without one. A pose that is not finite has no correspondences.
 pub fn correspondences(
     points_yz: &[DVec2],
@@ -85,7 +85,7 @@ pub fn correspondences(
     Matches { list, of }
 }
 
-/// The nearest point of the silhouette and the distance to it, metres; a point on the silhouette is its own.
+/// The nearest point of the silhouette and the distance to it, meters; a point on the silhouette is its own.
 fn foot_on_silhouette(field: &DistanceField, at: DVec2) -> (DVec2, f64) {
     let sample = field.sample(at);
     let residual = sample.distance.max(0.0);
@@ -105,7 +105,7 @@ fn foot_on_silhouette(field: &DistanceField, at: DVec2) -> (DVec2, f64) {
 pub struct ModelPoints(Vec<DVec2>);
 
 impl ModelPoints {
-    /// From `(y, z)` in the object frame, metres; points that are not finite are left out.
+    /// From `(y, z)` in the object frame, meters; points that are not finite are left out.
     pub fn new(points_yz: &[DVec2]) -> Self {
         let mut points: Vec<DVec2> = points_yz.iter().copied().filter(|p| p.is_finite()).collect();
         points.sort_by(|a, b| a.x.total_cmp(&b.x));

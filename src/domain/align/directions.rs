@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::icp::Samples;
 use crate::domain::frames::PlanarPose;
 
-/// Distances up to this count as overlap, metres.
+/// Distances up to this count as overlap, meters.
 const OVERLAP_M: f64 = 1e-3;
-/// The gate of the lab's fitness, metres.
+/// The gate of the lab's fitness, meters.
 const LAB_GATE_M: f64 = 0.015;
 
 /// Distances between contacts and model points, seen along the closing axis, at the final pose.
@@ -26,18 +26,18 @@ pub struct Directions {
 /// One direction of [`Directions`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Distances {
-    /// Root mean square of all distances, metres.
+    /// Root mean square of all distances, meters.
     pub rms_m: f64,
     /// Share of the distances up to 1 mm.
     pub overlap: f64,
     /// Share of the distances up to 15 mm: the "fitness" that the lab computes and does not use.
     pub fitness_15mm: f64,
-    /// Root mean square of those, metres; from model to scene it is by this that the lab chooses among starts.
+    /// Root mean square of those, meters; from model to scene it is by this that the lab chooses among starts.
     pub rms_15mm_m: f64,
 }
 
 impl Directions {
-    /// Of contacts (`(y, z)`, grasp frame, metres; those that are not finite are left out) and model points at a
+    /// Of contacts (`(y, z)`, grasp frame, meters; those that are not finite are left out) and model points at a
     /// pose. `None` if one side is empty. A few milliseconds.
     pub fn at(contacts: &[DVec2], model: &Samples, grasp_from_object: PlanarPose) -> Option<Self> {
         let object_from_grasp = grasp_from_object.inverse();

@@ -2,7 +2,7 @@
 //!
 //! The mesh is projected along x (the closing axis) onto the y-z plane of the object frame. Outside the silhouette
 //! the stored distances are exact: to the nearest projected edge. Inside they are exact to about a tenth of a
-//! millimetre, which is enough because registration charges nothing there.
+//! millimeter, which is enough because registration charges nothing there.
 
 pub(super) mod batch;
 
@@ -10,9 +10,9 @@ use glam::DVec2;
 
 use crate::domain::mesh::TriMesh;
 
-/// Cell size, metres.
+/// Cell size, meters.
 pub const CELL_M: f64 = 0.25e-3;
-/// Border around the silhouette, metres: the prior's shift plus what a scene adds before it counts as lost anyway.
+/// Border around the silhouette, meters: the prior's shift plus what a scene adds before it counts as lost anyway.
 const MARGIN_M: f64 = 0.012;
 /// Why a mesh has no field.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -26,9 +26,9 @@ pub enum FieldError {
         /// Position in the list of triangles.
         triangle: usize,
     },
-    /// The bounding box cannot be a tool in metres.
+    /// The bounding box cannot be a tool in meters.
     #[error(
-        "the mesh is {} long, which cannot be metres{}",
+        "the mesh is {} long, which cannot be meters{}",
         crate::domain::units::significant(*.size),
         .scale.map_or(String::new(), |s| format!(": scale it by {s}"))
     )]
@@ -43,7 +43,7 @@ pub enum FieldError {
 /// Value and slope of the field at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldSample {
-    /// Signed distance, metres, negative inside the silhouette.
+    /// Signed distance, meters, negative inside the silhouette.
     pub distance: f64,
     /// Its derivative by y and z; length about 1 outside.
     pub gradient: DVec2,
@@ -51,12 +51,12 @@ pub struct FieldSample {
     pub on_grid: bool,
 }
 
-/// Signed distance to the silhouette in the y-z plane of the object frame, on a regular grid, metres.
+/// Signed distance to the silhouette in the y-z plane of the object frame, on a regular grid, meters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DistanceField {
     columns: usize,
     rows: usize,
-    /// Centre of cell (0, 0).
+    /// Center of cell (0, 0).
     origin: DVec2,
     /// Row by row: y runs along a row, z over the rows.
     values: Vec<f32>,
@@ -69,7 +69,7 @@ impl DistanceField {
     /// that are not finite are left out.
     ///
     /// # Errors
-    /// [`FieldError`] if nothing is left, an index is wrong, or the size cannot be metres.
+    /// [`FieldError`] if nothing is left, an index is wrong, or the size cannot be meters.
     pub fn from_mesh(mesh: &TriMesh) -> Result<Self, FieldError> {
         let corners = mesh.vertices.len();
         if let Some(triangle) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= corners)) {
@@ -88,7 +88,7 @@ impl DistanceField {
         }
         let [low, high] = bounds.ok_or(FieldError::Empty)?;
         let size = (high - low).max_element();
-        let scale = crate::domain::units::scale_to_metres(size);
+        let scale = crate::domain::units::scale_to_meters(size);
         if scale != Some(1.0) {
             return Err(FieldError::Units { size, scale });
         }
@@ -105,7 +105,7 @@ impl DistanceField {
         [self.columns, self.rows]
     }
 
-    /// The stored value of a cell, metres, and its centre `(y, z)`; `None` outside the grid.
+    /// The stored value of a cell, meters, and its center `(y, z)`; `None` outside the grid.
     pub fn cell(&self, column: usize, row: usize) -> Option<(DVec2, f32)> {
         (column < self.columns && row < self.rows).then(|| {
             let at = self.origin + DVec2::new(column as f64, row as f64) * CELL_M;
@@ -113,7 +113,7 @@ impl DistanceField {
         })
     }
 
-    /// Signed distance (metres) and slope at `(y, z)` in the object frame, bilinear between cell centres.
+    /// Signed distance (meters) and slope at `(y, z)` in the object frame, bilinear between cell centers.
     ///
     /// A point that is not finite gives NaN.
     #[inline]
@@ -164,7 +164,7 @@ impl DistanceField {
 /// No candidate yet.
 const NONE: u32 = u32::MAX;
 
-/// Working grid in cell units: cell `(i, j)` has its centre at `(i, j)`.
+/// Working grid in cell units: cell `(i, j)` has its center at `(i, j)`.
 struct Raster {
     columns: usize,
     rows: usize,
@@ -198,10 +198,10 @@ impl Raster {
                 if cell.owner == NONE || cell.squared > 2.3 {
                     continue;
                 }
-                let centre = DVec2::new(column as f64, row as f64);
+                let center = DVec2::new(column as f64, row as f64);
                 let segment = &segments[cell.owner as usize];
-                let foot = segment.nearest(centre);
-                let away = (centre - foot).try_normalize().unwrap_or_else(|| segment.along.perp());
+                let foot = segment.nearest(center);
+                let away = (center - foot).try_normalize().unwrap_or_else(|| segment.along.perp());
                 let half = away.try_normalize().unwrap_or(DVec2::X).perp() * 0.7;
                 pieces.push(Segment::new(foot - half, foot + half));
                 interior.seed_around(pieces.len() as u32 - 1, foot, &pieces);
@@ -222,9 +222,9 @@ impl Raster {
         values
     }
 
-    /// Which cell centres lie in or on a projected triangle.
+    /// Which cell centers lie in or on a projected triangle.
     fn fill(&self, triangles: &[[DVec2; 3]]) -> Vec<bool> {
-        /// Centres this close to an edge (in cells) count as inside, so that shared edges leave no gaps.
+        /// Centers this close to an edge (in cells) count as inside, so that shared edges leave no gaps.
         const TOUCH: f64 = 1e-9;
         let mut inside = vec![false; self.columns * self.rows];
         for t in triangles {
@@ -281,9 +281,9 @@ impl Segment {
     }
 }
 
-/// Nearest-segment transform: every member cell learns its nearest segment by asking its neighbours for theirs.
+/// Nearest-segment transform: every member cell learns its nearest segment by asking its neighbors for theirs.
 ///
-/// The grid has a border of one cell that never takes part, so that neighbours need no bounds check.
+/// The grid has a border of one cell that never takes part, so that neighbors need no bounds check.
 struct Sweep {
     columns: usize,
     rows: usize,
@@ -315,8 +315,8 @@ impl Sweep {
     }
 
     #[inline]
-    fn offer(&mut self, at: usize, centre: DVec2, id: u32, segments: &[Segment]) {
-        let squared = (segments[id as usize].nearest(centre) - centre).length_squared();
+    fn offer(&mut self, at: usize, center: DVec2, id: u32, segments: &[Segment]) {
+        let squared = (segments[id as usize].nearest(center) - center).length_squared();
         let cell = &mut self.cells[at];
         if squared < cell.squared {
             *cell = SweepCell { squared, owner: id };
@@ -345,7 +345,7 @@ impl Sweep {
         }
     }
 
-    /// Two passes over the grid, each asking the neighbours that were visited before, there and back in a row.
+    /// Two passes over the grid, each asking the neighbors that were visited before, there and back in a row.
     fn spread(&mut self, segments: &[Segment]) {
         let s = self.stride;
         for row in 0..self.rows {
@@ -376,17 +376,17 @@ impl Sweep {
         at: usize,
         column: usize,
         row: usize,
-        neighbours: [usize; N],
+        neighbors: [usize; N],
         segments: &[Segment],
     ) {
         let cell = self.cells[at];
         if cell.squared <= 0.0 {
             return;
         }
-        // Neighbours mostly agree with each other and with the cell: ask about each segment once.
+        // Neighbors mostly agree with each other and with the cell: ask about each segment once.
         let (own, mut last) = (cell.owner, NONE);
-        for neighbour in neighbours {
-            let id = self.cells[neighbour].owner;
+        for neighbor in neighbors {
+            let id = self.cells[neighbor].owner;
             if id != NONE && id != last && id != own {
                 last = id;
                 self.offer(at, DVec2::new(column as f64, row as f64), id, segments);

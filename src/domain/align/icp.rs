@@ -3,7 +3,7 @@
 //!
 //! These are the peers of the default registration, and the step to all six degrees of freedom.
 //!
-//! Source: Besl and McKay, A method for registration of 3-D shapes, 1992; Chen and Medioni, Object modelling by
+//! Source: Besl and McKay, A method for registration of 3-D shapes, 1992; Chen and Medioni, Object modeling by
 //! registration of multiple range images, 1992.
 
 mod policy;
@@ -25,7 +25,7 @@ use problem::{Problem, State, Sums};
 pub(super) use samples::Matcher;
 pub use samples::Samples;
 
-/// A step that moves no point by more than about this, metres, ends the search with a wide kernel.
+/// A step that moves no point by more than about this, meters, ends the search with a wide kernel.
 const STEP_COARSE_M: f64 = 5e-5;
 /// Damping at the start and at the end of patience, per unit of weight.
 const DAMPING_START: f64 = 1e-3;
@@ -33,7 +33,7 @@ const DAMPING_MAX: f64 = 1e4;
 /// Fewest pairs, as a share, that must be near at the end: below, there is nothing to align.
 const MIN_SHARE: f64 = 0.05;
 
-/// An ICP. Lengths in metres.
+/// An ICP. Lengths in meters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct IcpConfig {
     /// What the contacts are compared with.

@@ -28,9 +28,9 @@ pub const LAB_MIN_POINTS: usize = 4;
 pub const LAB_MODEL_POINTS: usize = 5000;
 /// Starts of the lab's multi-start variant.
 pub const LAB_STARTS: usize = 10;
-/// Distance below which a contact counts as an inlier in the report, metres; the loop itself does not use it.
+/// Distance below which a contact counts as an inlier in the report, meters; the loop itself does not use it.
 const INLIER_M: f64 = 1e-3;
-/// Beyond this, metres, the lab's choice among starts does not look.
+/// Beyond this, meters, the lab's choice among starts does not look.
 const GATE_M: f64 = 0.015;
 
 /// A property of the lab's multi-start variant that spoils poses without a word.
@@ -114,14 +114,14 @@ pub fn lab_starts(seed: u64) -> Vec<PlanarPose> {
 /// What the lab's loop compares with.
 #[derive(Clone, Debug)]
 pub struct LabModel {
-    /// Metres, object frame.
+    /// Meters, object frame.
     points: Arc<[DVec3]>,
     /// The same along the closing axis, in the same order.
     flat: Samples,
 }
 
 impl LabModel {
-    /// From points of the surface, metres, object frame. Those that are not finite are left out.
+    /// From points of the surface, meters, object frame. Those that are not finite are left out.
     pub fn new(points: &[DVec3]) -> Self {
         let points: Arc<[DVec3]> = points.iter().copied().filter(|p| p.is_finite()).collect();
         let pairs: Vec<(DVec3, DVec3)> = points.iter().map(|p| (p.with_x(0.0), DVec3::ZERO)).collect();
@@ -152,7 +152,7 @@ impl Register for LabIcpConfig {
     }
 }
 
-/// Aligns model points (object frame) to contact points (grasp frame), metres.
+/// Aligns model points (object frame) to contact points (grasp frame), meters.
 ///
 /// Points that are not finite are dropped and counted. The reported cost is the mean squared distance in the plane.
 ///
@@ -354,7 +354,7 @@ fn rigid(scene: &[DVec2], scene_mean: DVec2, model: impl Fn(usize) -> DVec2) -> 
     PlanarPose { theta_rad, y_m: shift.x, z_m: shift.y }
 }
 
-/// The number of [`PaperTrap::RmseChoice`]: over the model points with a contact within the gate, in space, metres.
+/// The number of [`PaperTrap::RmseChoice`]: over the model points with a contact within the gate, in space, meters.
 /// Zero if there is none, as in the lab's tool for it.
 fn gated_rmse(model: &LabModel, contacts: &Samples, pose: PlanarPose) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);

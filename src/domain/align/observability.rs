@@ -13,7 +13,7 @@ use crate::domain::units::fixed;
 ///
 /// Separates straight rods (at most 0.0084) from tools with an angle or a junction (at least 0.0229).
 pub const DEGENERATE_BELOW: f64 = 0.015;
-/// Points this far outside the silhouette, metres, still tell about it.
+/// Points this far outside the silhouette, meters, still tell about it.
 const REACH_M: f64 = 0.002;
 /// Fewer telling points than this tell nothing.
 const MIN_TELLING: usize = 8;
@@ -25,12 +25,12 @@ pub struct Observability {
     /// [`ANGLE_SCALE_M`], so all are comparable; the two shifts alone would add up to 1.
     pub eigenvalues: [f64; 3],
     /// The motion of the tool that changes the residuals least, in the grasp frame: angle times
-    /// [`ANGLE_SCALE_M`], y, z; unit length, sign arbitrary. The angle turns about `centre`.
+    /// [`ANGLE_SCALE_M`], y, z; unit length, sign arbitrary. The angle turns about `center`.
     pub weakest: [f64; 3],
     /// The three motions that belong to `eigenvalues`, in the same order and form as `weakest` (which is the first).
     pub motions: [[f64; 3]; 3],
-    /// Mean of the telling points, `(y, z)`, metres, grasp frame.
-    pub centre: DVec2,
+    /// Mean of the telling points, `(y, z)`, meters, grasp frame.
+    pub center: DVec2,
     /// Points up to 2 mm outside the silhouette: those that tell.
     pub telling: usize,
     /// Whether the weakest motion is not determined.
@@ -38,11 +38,11 @@ pub struct Observability {
 }
 
 impl Observability {
-    /// The weakest motion in words, such as `slides along (y 0.05, z 1.00)` or `turns about its centre`.
+    /// The weakest motion in words, such as `slides along (y 0.05, z 1.00)` or `turns about its center`.
     pub fn weakest_text(&self) -> String {
         let [turn, y, z] = self.weakest;
         if turn.abs() > y.hypot(z) {
-            "turns about its centre".to_owned()
+            "turns about its center".to_owned()
         } else {
             // One of the two opposite signs, always the same one.
             let sign = if z < 0.0 || (z == 0.0 && y < 0.0) { -1.0 } else { 1.0 };
@@ -62,7 +62,7 @@ impl Observability {
         let scale = share / (y.hypot(z) / SHIFT_M).max(turn.abs() / TURN_RAD).max(1e-9);
         let origin = DVec2::new(grasp_from_object.y_m, grasp_from_object.z_m);
         let moved =
-            self.centre + DVec2::from_angle(turn * scale).rotate(origin - self.centre) + DVec2::new(y, z) * scale;
+            self.center + DVec2::from_angle(turn * scale).rotate(origin - self.center) + DVec2::new(y, z) * scale;
         PlanarPose { theta_rad: grasp_from_object.theta_rad + turn * scale, y_m: moved.x, z_m: moved.y }
     }
 
@@ -84,13 +84,13 @@ impl Observability {
         let direction = DVec2::from_angle(0.5 * c[1][2].atan2(half));
         let length = |square: f64| square.max(0.0).sqrt();
         MotionEllipse {
-            centre: self.centre,
+            center: self.center,
             half_axes: [direction * length(mean + spread), direction.perp() * length(mean - spread)],
             turn_rad: length(c[0][0]) / ANGLE_SCALE_M,
         }
     }
 
-    /// Standard deviations of angle (radians), y and z (metres) if the distances had independent errors of `noise_m`:
+    /// Standard deviations of angle (radians), y and z (meters) if the distances had independent errors of `noise_m`:
     /// what noise alone does. A wrong mask does more.
     pub fn deviations(&self, noise_m: f64) -> [f64; 3] {
         let n = self.telling.max(1) as f64;
@@ -105,15 +105,15 @@ impl Observability {
 /// Shifts and turns of equal effect on the fit, about the mean of the telling points.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct MotionEllipse {
-    /// Its middle, `(y, z)`, metres, grasp frame.
-    pub centre: DVec2,
-    /// Half axes of the shifts, `(y, z)`, metres, the longer one first.
+    /// Its middle, `(y, z)`, meters, grasp frame.
+    pub center: DVec2,
+    /// Half axes of the shifts, `(y, z)`, meters, the longer one first.
     pub half_axes: [DVec2; 2],
     /// The same for the angle, radians.
     pub turn_rad: f64,
 }
 
-/// Looks at the slopes of all points near the outline, at the given pose. Points are `(y, z)`, metres, grasp frame;
+/// Looks at the slopes of all points near the outline, at the given pose. Points are `(y, z)`, meters, grasp frame;
 /// those that are not finite are ignored. Too few telling points count as degenerate with zero eigenvalues.
 pub fn observability(points_yz: &[DVec2], field: &DistanceField, grasp_from_object: PlanarPose) -> Observability {
     let finite: Vec<DVec2> = points_yz.iter().copied().filter(|p| p.is_finite()).collect();
@@ -122,26 +122,26 @@ pub fn observability(points_yz: &[DVec2], field: &DistanceField, grasp_from_obje
     of_cloud(&cloud, centroid, field, State::from_pose(grasp_from_object, centroid))
 }
 
-/// The same for a cloud about its centroid (`(y, z)`, metres, grasp frame).
+/// The same for a cloud about its centroid (`(y, z)`, meters, grasp frame).
 pub(super) fn of_cloud(cloud: &Cloud, centroid: DVec2, field: &DistanceField, state: State) -> Observability {
     let moments = field.moments(cloud, state, REACH_M);
     let count = moments.count;
     // From the object frame, where the field is, back to the hand.
     let turn = DVec2::from_angle(-state.phi);
     let arm = if count > 0 { moments.arms / count as f64 } else { DVec2::ZERO };
-    let centre = centroid + turn.rotate(arm);
+    let center = centroid + turn.rotate(arm);
     let unknown = Observability {
         eigenvalues: [0.0; 3],
         weakest: [0.0, 1.0, 0.0],
         motions: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
-        centre,
+        center,
         telling: count,
         degenerate: true,
     };
     if count < MIN_TELLING {
         return unknown;
     }
-    // Slopes by the angle were taken about the centroid; about the telling points' own centre they are
+    // Slopes by the angle were taken about the centroid; about the telling points' own center they are
     // j0 - slope . perp(arm).
     let [m00, m01, m02, m11, m12, m22] = moments.products.map(|m| m / count as f64);
     let p = arm.perp();
@@ -162,7 +162,7 @@ pub(super) fn of_cloud(cloud: &Cloud, centroid: DVec2, field: &DistanceField, st
         eigenvalues,
         weakest: motions[0],
         motions,
-        centre,
+        center,
         telling: count,
         degenerate: eigenvalues[0] < DEGENERATE_BELOW,
     }
@@ -201,14 +201,14 @@ mod tests {
     }
 
     #[test]
-    fn a_disc_turns_about_its_centre() {
+    fn a_disc_turns_about_its_center() {
         let field = DistanceField::from_mesh(&disc(0.01, 96)).unwrap();
         let points: Vec<DVec2> = (0..2000).map(|i| DVec2::from_angle(f64::from(i)) * 0.0104).collect();
         let pose = PlanarPose { theta_rad: 0.0, y_m: 0.001, z_m: -0.002 };
         let at: Vec<DVec2> = points.iter().map(|p| pose.transform_yz(*p)).collect();
         let o = observability(&at, &field, pose);
         assert!(o.degenerate);
-        assert_eq!(o.weakest_text(), "turns about its centre");
+        assert_eq!(o.weakest_text(), "turns about its center");
         let moved = o.moved_along_weakest(pose, 1.0);
         assert!(((moved.theta_rad - pose.theta_rad).abs().to_degrees() - 2.0).abs() < 1e-6);
         assert!((moved.y_m - pose.y_m).hypot(moved.z_m - pose.z_m) < 1e-4, "about its own middle");

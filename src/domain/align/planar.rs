@@ -28,12 +28,12 @@ use crate::domain::mesh::sampling::spread;
 const MIN_SHARE: f64 = 0.05;
 /// Points of the descent before the last.
 const MIDDLE_POINTS: usize = 512;
-/// What a start can be expected to bridge, metres: the prior's shift and the sweep of its angle.
+/// What a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
 const REACH_M: f64 = 0.012;
 
 /// Finds the planar pose under which the points lie on the tool's silhouette.
 ///
-/// Points are `(y, z)` in the grasp frame, metres; those that are not finite are dropped and counted. The result does
+/// Points are `(y, z)` in the grasp frame, meters; those that are not finite are dropped and counted. The result does
 /// not depend on threads, clocks or earlier calls.
 ///
 /// # Errors
@@ -426,7 +426,7 @@ fn several(prior: &Prior) -> Vec<PlanarPose> {
         .to_vec()
 }
 
-/// The width that decides, metres; [`check`] has seen that there is one.
+/// The width that decides, meters; [`check`] has seen that there is one.
 fn final_kernel(config: &AlignConfig) -> f64 {
     config.kernels_m.last().copied().unwrap_or(f64::NAN)
 }

@@ -6,7 +6,7 @@ use super::{AlignConfig, AlignError, AlignReport, Cleaned, DistanceField, align,
 use crate::domain::frames::PlanarPose;
 use crate::domain::tool::ToolModel;
 
-/// What a start can be expected to bridge, metres: the prior's shift and the sweep of its angle.
+/// What a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
 const REACH_M: f64 = 0.012;
 /// Fewest points, as a share, that must lie within [`REACH_M`] of the silhouette at one start.
 const MIN_SHARE: f64 = 0.05;
@@ -19,17 +19,17 @@ pub struct Scene<'a> {
 }
 
 impl<'a> Scene<'a> {
-    /// Points in the grasp frame, metres. Those that are not finite are dropped and counted by the registrations.
+    /// Points in the grasp frame, meters. Those that are not finite are dropped and counted by the registrations.
     pub fn new(points: &'a [DVec3]) -> Self {
         Self { points, yz: points.iter().map(|p| DVec2::new(p.y, p.z)).collect() }
     }
 
-    /// The points in the grasp frame, metres.
+    /// The points in the grasp frame, meters.
     pub fn points(&self) -> &'a [DVec3] {
         self.points
     }
 
-    /// The same points along the closing axis: `(y, z)`, metres.
+    /// The same points along the closing axis: `(y, z)`, meters.
     pub fn yz(&self) -> &[DVec2] {
         &self.yz
     }
@@ -72,7 +72,7 @@ impl Register for AlignConfig {
 
 /// The finite points of a scene.
 pub(super) struct CleanScene {
-    /// Metres, grasp frame.
+    /// Meters, grasp frame.
     pub(super) points: Vec<DVec3>,
     /// For each offered point whether it is in `points`.
     pub(super) kept: Vec<bool>,
@@ -95,7 +95,7 @@ pub(super) fn clean_scene(scene: &Scene<'_>, needed: usize) -> Result<CleanScene
     Ok(CleanScene { points, kept, centroid: DVec3::new(x, centroid.x, centroid.y), not_finite })
 }
 
-/// Refuses points of which next to none come near the silhouette at any start: a nearest neighbour always exists,
+/// Refuses points of which next to none come near the silhouette at any start: a nearest neighbor always exists,
 /// and its distance alone does not say that there is nothing to align.
 pub(super) fn check_overlap(
     yz: impl Iterator<Item = DVec2> + Clone,

@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::field::batch::{Cloud, State, Sums};
 use super::{DistanceField, Stop, TraceStep};
 
-/// A step that moves no point by more than about this, metres, ends the search with the narrowest kernel.
+/// A step that moves no point by more than about this, meters, ends the search with the narrowest kernel.
 const STEP_FINE_M: f64 = 5e-6;
 /// The same for the wider kernels, whose end is only the next start.
 const STEP_COARSE_M: f64 = 5e-5;
@@ -19,7 +19,7 @@ const DAMPING_MAX: f64 = 1e4;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Progress {
     pub(super) state: State,
-    /// Per point, square metres; of the kernel and the points that were used last.
+    /// Per point, square meters; of the kernel and the points that were used last.
     pub(super) cost: f64,
     pub(super) inliers: usize,
     pub(super) inlier_squares: f64,
@@ -101,9 +101,9 @@ impl<'a> Search<'a> {
     /// The last descents: on the middle cloud, then on all points. Of those, the ones deep inside the silhouette cost
     /// nothing and change nothing, so only the others are looked up, as long as no point moves as far as that.
     pub(super) fn refine(&mut self, run: usize, at: &mut Progress, middle: &Cloud, points: &Cloud, kernel: f64) {
-        /// Depth, metres, below which a point rests: several times what the last descent moves.
+        /// Depth, meters, below which a point rests: several times what the last descent moves.
         const DEEP_M: f64 = 5e-4;
-        /// The stored depth may be too great by this much, metres.
+        /// The stored depth may be too great by this much, meters.
         const DEPTH_ERROR_M: f64 = 1.5e-4;
         if middle.len() < points.len() {
             self.descend(run, at, middle, kernel, STEP_MIDDLE_M);

@@ -7,12 +7,12 @@ use rand_chacha::ChaCha8Rng;
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
 
-/// An axis-aligned box with half sizes `half` about `centre`, closed, facing outwards.
-pub(crate) fn cuboid(centre: DVec3, half: DVec3) -> TriMesh {
+/// An axis-aligned box with half sizes `half` about `center`, closed, facing outwards.
+pub(crate) fn cuboid(center: DVec3, half: DVec3) -> TriMesh {
     let vertices = (0..8)
         .map(|i| {
             let sign = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-            centre + half * DVec3::new(sign(0), sign(1), sign(2))
+            center + half * DVec3::new(sign(0), sign(1), sign(2))
         })
         .collect();
     let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
@@ -65,7 +65,7 @@ pub(crate) fn filled(
         .collect()
 }
 
-/// A flat disc across the closing axis, radius in metres, closed.
+/// A flat disc across the closing axis, radius in meters, closed.
 pub(crate) fn disc(radius: f64, sides: u32) -> TriMesh {
     let mut mesh =
         TriMesh { vertices: vec![DVec3::new(-0.003, 0.0, 0.0), DVec3::new(0.003, 0.0, 0.0)], ..TriMesh::default() };

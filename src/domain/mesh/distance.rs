@@ -37,8 +37,8 @@ struct Node {
     start: u32,
     count: u32,
     right: u32,
-    /// Area-weighted centre, sum of area times normal, and the radius around the centre: the far-field dipole.
-    centre: DVec3,
+    /// Area-weighted center, sum of area times normal, and the radius around the center: the far-field dipole.
+    center: DVec3,
     moment: DVec3,
     radius: f64,
 }
@@ -82,12 +82,12 @@ impl MeshDistance {
         Ok(Self { nodes, triangles })
     }
 
-    /// Distance to the nearest triangle, metres, without a sign. NaN for a point that is not finite.
+    /// Distance to the nearest triangle, meters, without a sign. NaN for a point that is not finite.
     pub fn unsigned(&self, p: DVec3) -> f64 {
         if p.is_finite() { self.nearest_below(p, f64::INFINITY).sqrt() } else { f64::NAN }
     }
 
-    /// The nearest point of the surface within `limit_m` (metres, may be infinite) and the unit normal of its
+    /// The nearest point of the surface within `limit_m` (meters, may be infinite) and the unit normal of its
     /// triangle, as the mesh is wound. `None` if there is none, or `p` is not finite.
     pub fn closest(&self, p: DVec3, limit_m: f64) -> Option<(DVec3, DVec3)> {
         if !p.is_finite() {
@@ -98,7 +98,7 @@ impl MeshDistance {
         Some((nearest_on_triangle(t, p), (*b - *a).cross(*c - *a).try_normalize()?))
     }
 
-    /// Signed distance, metres, negative inside. NaN for a point that is not finite.
+    /// Signed distance, meters, negative inside. NaN for a point that is not finite.
     pub fn signed(&self, p: DVec3) -> f64 {
         let distance = self.unsigned(p);
         if distance.is_finite() && self.contains(p) { -distance } else { distance }
@@ -114,7 +114,7 @@ impl MeshDistance {
         let mut stack = vec![0u32];
         while let Some(index) = stack.pop() {
             let node = &self.nodes[index as usize];
-            let offset = node.centre - p;
+            let offset = node.center - p;
             let length = offset.length();
             if length > FAR * node.radius {
                 solid_angle += offset.dot(node.moment) / (length * length * length);
@@ -129,7 +129,7 @@ impl MeshDistance {
         (solid_angle / (4.0 * PI)).abs() > 0.5
     }
 
-    /// Whether the signed distance is at most `limit_m` (metres, not negative): near the surface, or inside.
+    /// Whether the signed distance is at most `limit_m` (meters, not negative): near the surface, or inside.
     ///
     /// Much cheaper than [`Self::signed`] for points far away. `false` for a point that is not finite.
     pub fn within(&self, p: DVec3, limit_m: f64) -> bool {
@@ -203,18 +203,18 @@ fn build(nodes: &mut Vec<Node>, triangles: &mut [[DVec3; 3]], start: usize, end:
     let corners = || part.iter().flatten();
     let first = part[0][0];
     let (low, high) = corners().fold((first, first), |(l, h), p| (l.min(*p), h.max(*p)));
-    let (mut centre, mut moment, mut area) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+    let (mut center, mut moment, mut area) = (DVec3::ZERO, DVec3::ZERO, 0.0);
     for [a, b, c] in part.iter() {
         let n = 0.5 * (*b - *a).cross(*c - *a);
-        centre += (*a + *b + *c) / 3.0 * n.length();
+        center += (*a + *b + *c) / 3.0 * n.length();
         moment += n;
         area += n.length();
     }
-    centre /= area;
-    let radius = corners().map(|p| p.distance(centre)).fold(0.0, f64::max);
+    center /= area;
+    let radius = corners().map(|p| p.distance(center)).fold(0.0, f64::max);
     let index = nodes.len();
     let count = if part.len() <= LEAF { part.len() } else { 0 };
-    nodes.push(Node { low, high, start: start as u32, count: count as u32, right: 0, centre, moment, radius });
+    nodes.push(Node { low, high, start: start as u32, count: count as u32, right: 0, center, moment, radius });
     if count == 0 {
         let size = high - low;
         let axis = if size.x >= size.y && size.x >= size.z { 0 } else { usize::from(size.z > size.y) + 1 };

@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{TriMesh, triangle_area};
 
 impl TriMesh {
-    /// `count` points on the surface, metres, object frame; each triangle gets a share by its area.
+    /// `count` points on the surface, meters, object frame; each triangle gets a share by its area.
     ///
     /// The same seed gives the same points on every machine. Triangles without an area or with corners that are
     /// not finite get none; a mesh without any area gives an empty list.

@@ -13,7 +13,7 @@ const ENOUGH: usize = 10;
 const MAD: f64 = 1.4826;
 /// A spread below this share of the values' size is rounding.
 const RELATIVE_NO_SPREAD: f64 = 1e-6;
-/// Half the range of a histogram of equal values, metres.
+/// Half the range of a histogram of equal values, meters.
 const HALF_RANGE_M: f64 = 5e-4;
 
 /// How many pixels have which truth and which prediction.

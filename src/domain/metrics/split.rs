@@ -16,10 +16,10 @@ pub struct Figures {
     pub psnr_db: Option<f64>,
     /// Mean of the structural similarity's map over these pixels; `None` if it is not defined.
     pub ssim: Option<f64>,
-    /// Mean absolute error, in the unit of the images (written out, these are metres); `None` without a pixel.
+    /// Mean absolute error, in the unit of the images (written out, these are meters); `None` without a pixel.
     #[serde(rename = "mae_m")]
     pub mae: Option<f64>,
-    /// Mean error (prediction minus truth), in the unit of the images (written out, metres); `None` without a pixel.
+    /// Mean error (prediction minus truth), in the unit of the images (written out, meters); `None` without a pixel.
     #[serde(rename = "bias_m")]
     pub bias: Option<f64>,
 }

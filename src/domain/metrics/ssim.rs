@@ -77,10 +77,10 @@ pub fn ssim_ranges(prediction: &Grid<f32>, truth: &Grid<f32>, ranges: &[SsimRang
 
     let (width, height) = (prediction.width(), prediction.height());
     // Ignored pixels take the truth's mean in both images.
-    let centred = |pick: fn((f32, f32)) -> f32| -> Vec<f64> {
+    let centered = |pick: fn((f32, f32)) -> f32| -> Vec<f64> {
         pairs().map(|(p, t)| if valid(p, t) { f64::from(pick((p, t))) - offset } else { 0.0 }).collect()
     };
-    let (p, t) = (centred(|(p, _)| p), centred(|(_, t)| t));
+    let (p, t) = (centered(|(p, _)| p), centered(|(_, t)| t));
     let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
     // Outside the image the lab pads with zero, which is -offset once the offset is taken out.
     let blur = |values: &[f64], outside: f64| convolve(values, width, height, outside);
@@ -106,7 +106,7 @@ pub fn ssim_ranges(prediction: &Grid<f32>, truth: &Grid<f32>, ranges: &[SsimRang
     Ok(ranges.iter().map(of_range).collect())
 }
 
-/// The normalised Gaussian of the window, one axis.
+/// The normalized Gaussian of the window, one axis.
 fn window() -> [f64; WINDOW] {
     let mut weights = std::array::from_fn(|i| {
         let x = i as f64 - (WINDOW / 2) as f64;

@@ -20,7 +20,7 @@ pub struct ColorChain {
 /// A prediction as a person looks at it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Picture {
-    /// Of a depth sensor: the imprint, metres.
+    /// Of a depth sensor: the imprint, meters.
     Depth(DepthMap),
     /// Of a color sensor: the difference of touched and untouched image, 0..255 scale.
     Color(RgbGrid),

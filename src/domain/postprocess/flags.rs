@@ -13,9 +13,9 @@ const TURNED_BY: f64 = 0.1;
 const TURNED_AT_LEAST: f64 = 0.3;
 /// A correlation below this means that prediction and truth have little in common.
 const UNLIKE: f64 = 0.3;
-/// Root mean square disagreement of the channels that is worth a word, metres.
+/// Root mean square disagreement of the channels that is worth a word, meters.
 const CHANNELS_APART_M: f64 = 5e-4;
-/// How far a fitted slope may be from 1, and an offset from 0 (metres).
+/// How far a fitted slope may be from 1, and an offset from 0 (meters).
 const SLOPE_OFF: f64 = 0.15;
 const OFFSET_OFF_M: f64 = 1e-3;
 /// How far a shift's gain may be from the exact inverse's 2.
@@ -156,7 +156,7 @@ impl List {
         self.add(
             severity,
             FlagKind::Clamped,
-            Stage::Metres,
+            Stage::Meters,
             [
                 format!(
                     "{clamped} of {count} decoder values ({}) were outside -1 to 1 and were clamped.",
@@ -176,7 +176,7 @@ impl List {
         if n < 2 {
             return;
         }
-        let metres_per_unit = (chain.range.max_m - chain.range.min_m) / 2.0;
+        let meters_per_unit = (chain.range.max_m - chain.range.min_m) / 2.0;
         let (mut sum, mut count) = (0.0, 0usize);
         for i in 0..raw.channels[0].len() {
             let values = || raw.channels.iter().map(|c| f64::from(c.as_slice()[i]));
@@ -187,7 +187,7 @@ impl List {
                 count += 1;
             }
         }
-        let apart_m = metres_per_unit * (sum / count.max(1) as f64).sqrt();
+        let apart_m = meters_per_unit * (sum / count.max(1) as f64).sqrt();
         if apart_m > CHANNELS_APART_M {
             self.add(
                 Severity::Caution,
@@ -381,5 +381,5 @@ impl List {
 
 /// A value of a stage with its unit.
 fn value(stage: &StageRecord, value: f64) -> String {
-    if stage.stage.is_metres() { text_mm(value) } else { format!("{value:.3}") }
+    if stage.stage.is_meters() { text_mm(value) } else { format!("{value:.3}") }
 }

@@ -21,10 +21,10 @@ const RELATIVE_NO_SPREAD: f64 = 1e-6;
 pub enum Stage {
     /// One channel of the decoder's picture, counted from 1.
     Channel(u8),
-    /// The channels made one. (For metres each channel is clamped and mapped first, as the lab does.)
+    /// The channels made one. (For meters each channel is clamped and mapped first, as the lab does.)
     Reduced,
-    /// De-normalised.
-    Metres,
+    /// De-normalized.
+    Meters,
     /// After the shift.
     Shifted,
     /// At the imprint's size.
@@ -39,15 +39,15 @@ impl Stage {
         match self {
             Stage::Channel(n) => format!("Decoder channel {n}"),
             Stage::Reduced => "Channels to one".into(),
-            Stage::Metres => "De-normalised".into(),
+            Stage::Meters => "De-normalized".into(),
             Stage::Shifted => "Shift".into(),
             Stage::Resized => "Resized".into(),
             Stage::Turned => "Rotated".into(),
         }
     }
 
-    /// Whether the image is in metres; before that it is in the decoder's -1 to 1.
-    pub fn is_metres(self) -> bool {
+    /// Whether the image is in meters; before that it is in the decoder's -1 to 1.
+    pub fn is_meters(self) -> bool {
         !matches!(self, Stage::Channel(_) | Stage::Reduced)
     }
 }
@@ -164,7 +164,7 @@ pub struct Orientation {
 /// The result against the measured imprint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Against {
-    /// The joint histogram (truth to the right, prediction up) with its line, metres.
+    /// The joint histogram (truth to the right, prediction up) with its line, meters.
     pub joint: Joint,
     /// Correlations.
     pub orientation: Orientation,
@@ -189,7 +189,7 @@ impl Ledger {
     }
 }
 
-/// Runs the chain and tells everything about it. `truth` is the measured imprint (metres, raw orientation); a result of
+/// Runs the chain and tells everything about it. `truth` is the measured imprint (meters, raw orientation); a result of
 /// another size is resized to it for the comparison.
 ///
 /// # Errors
@@ -242,22 +242,22 @@ pub fn correlation(a: &Grid<f32>, b: &Grid<f32>) -> Option<f64> {
     (spread(aa, size_a) && spread(bb, size_b)).then(|| ab / (aa.sqrt() * bb.sqrt())).filter(|r| r.is_finite())
 }
 
-/// What another way to metres would have made of the same picture.
+/// What another way to meters would have made of the same picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChainReading {
     /// Its name.
     pub name: String,
     /// How the decoder's range is read.
     pub mapping: Mapping,
-    /// Gain and offset (metres) of the shift after it.
+    /// Gain and offset (meters) of the shift after it.
     pub shift: [f64; 2],
-    /// Figures of the result, metres.
+    /// Figures of the result, meters.
     pub stats: Stats,
     /// The line through the joint histogram.
     pub line: Option<Line>,
     /// Peak signal-to-noise ratio against the truth, decibels.
     pub psnr_db: Option<f64>,
-    /// Root mean square error, metres.
+    /// Root mean square error, meters.
     pub rms_m: Option<f64>,
 }
 

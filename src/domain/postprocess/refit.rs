@@ -98,9 +98,9 @@ impl RefitShift {
 /// Statistics in the making: one pass over predictions and measurements.
 #[derive(Clone, Debug, Default)]
 pub struct ShiftFit {
-    /// Raw predictions in metres (doubled mapping), at the decoder's size.
+    /// Raw predictions in meters (doubled mapping), at the decoder's size.
     pub predicted: Moments,
-    /// Measured imprints, metres.
+    /// Measured imprints, meters.
     pub measured: Moments,
     /// Touches added.
     pub touches: u64,
@@ -117,8 +117,8 @@ impl ShiftFit {
         raw: &RawPrediction,
         measured: &DepthMap,
     ) -> Result<(), PostprocessError> {
-        let metres = chain.metres(raw)?;
-        self.predicted.extend(metres.as_slice().iter().map(|&v| f64::from(v)));
+        let meters = chain.meters(raw)?;
+        self.predicted.extend(meters.as_slice().iter().map(|&v| f64::from(v)));
         self.measured.extend(measured.as_slice().iter().map(|&v| f64::from(v)));
         self.touches += 1;
         Ok(())

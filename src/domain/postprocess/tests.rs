@@ -30,7 +30,7 @@ fn the_doubled_mapping_is_half_of_depth_plus_maximum_and_the_inverse_undoes_it()
     let raw = chain().with_mode(ShiftMode::Raw, None).unwrap().run(&picture()).unwrap();
     let inverse = chain().with_mode(ShiftMode::ExactInverse, None).unwrap().run(&picture()).unwrap();
     for ((&d, &r), &i) in correct.as_slice().iter().zip(raw.as_slice()).zip(inverse.as_slice()) {
-        // f32 metres: half a micrometre would be 5e-7.
+        // f32 meters: half a micrometer would be 5e-7.
         assert!((f64::from(r) - (f64::from(d) + MAX) / 2.0).abs() < 1e-8);
         assert!((i - d).abs() < 1e-8);
         assert!(f64::from(r) >= (MIN + MAX) / 2.0, "the raw value can never be below the middle of the range");
@@ -85,14 +85,14 @@ fn the_ledger_tells_every_step_and_its_numbers() {
     let (depth, ledger) = chain.run_with_ledger(&raw).unwrap();
     use Stage::*;
     let stages = ledger.iter().map(|s| s.stage).collect::<Vec<_>>();
-    assert_eq!(stages, [Channel(1), Reduced, Metres, Shifted, Resized, Turned]);
+    assert_eq!(stages, [Channel(1), Reduced, Meters, Shifted, Resized, Turned]);
     assert_eq!((ledger[0].stats.min, ledger[0].stats.max, ledger[0].stats.count), (-2.0, 1.0, 2));
     assert!(ledger[2].note.as_deref().unwrap().starts_with("1 values outside"));
     assert!((ledger[5].stats.mean - (MIN + MAX) / 2.0).abs() < 1e-8);
     assert!((ledger[5].stats.std - (MAX - MIN) / 2.0).abs() < 1e-8);
     assert_eq!(ledger[5].image, depth);
     assert!(ledger.iter().all(|s| s.histogram.counts.iter().sum::<u32>() == 2 && s.invalid == 0));
-    assert_eq!(chain.metres(&raw).unwrap(), ledger[2].image);
+    assert_eq!(chain.meters(&raw).unwrap(), ledger[2].image);
 }
 
 #[test]

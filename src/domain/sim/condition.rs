@@ -10,9 +10,9 @@ use crate::domain::grid::RgbGrid;
 use crate::domain::rig::lab;
 use crate::domain::sample::Sample;
 
-/// Largest distance along y and z between the grasps of a misaligned pair, metres.
+/// Largest distance along y and z between the grasps of a misaligned pair, meters.
 pub const MISALIGNMENT_M: f64 = 0.008;
-/// How far beyond the grasp an ambiguous pair's pattern begins, metres: out of the GelSlim's 18 mm, within the bubble's
+/// How far beyond the grasp an ambiguous pair's pattern begins, meters: out of the GelSlim's 18 mm, within the bubble's
 /// 74 mm.
 const SHAFT_M: f64 = 0.018;
 /// Ends the name of a tool that was put on a bare shaft.

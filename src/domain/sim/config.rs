@@ -13,7 +13,7 @@ pub struct SimConfig {
     pub gelslim: GelSlimConfig,
 }
 
-/// A Soft Bubble and its depth camera. Lengths in metres.
+/// A Soft Bubble and its depth camera. Lengths in meters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BubbleConfig {
     /// How far the dome would reach past the tool's surface if the tool were not there.
@@ -22,8 +22,8 @@ pub struct BubbleConfig {
     pub dome_rise_m: f64,
     /// Semi-axes of the rim along y and z.
     pub rim_semi_axes_m: [f64; 2],
-    /// Where the rim's centre is along z.
-    pub rim_centre_z_m: f64,
+    /// Where the rim's center is along z.
+    pub rim_center_z_m: f64,
     /// Share of the displaced air that stays in the bubble and makes the rest bulge, 0..1.
     pub air_kept: f64,
     /// Deviation of the camera's noise in one frame.
@@ -36,7 +36,7 @@ pub struct BubbleConfig {
     pub speckle_m: f64,
     /// Speckles per pixel.
     pub speckle_density: f64,
-    /// Weight of each neighbour in the camera's blur, 0..0.33.
+    /// Weight of each neighbor in the camera's blur, 0..0.33.
     pub blur: f32,
     /// Share of the pixels at a depth step that fly between its two sides.
     pub flying_share: f64,
@@ -56,7 +56,7 @@ impl Default for BubbleConfig {
             press_m: 0.0123,
             dome_rise_m: 0.0145,
             rim_semi_axes_m: [0.046, 0.066],
-            rim_centre_z_m: 0.006,
+            rim_center_z_m: 0.006,
             air_kept: 0.45,
             noise_m: 0.000_6,
             drift_m: 0.000_25,
@@ -73,7 +73,7 @@ impl Default for BubbleConfig {
     }
 }
 
-/// A GelSlim. Lengths in metres, brightness on the 0..255 scale.
+/// A GelSlim. Lengths in meters, brightness on the 0..255 scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GelSlimConfig {
     /// How deep the tool is pushed in.
@@ -100,8 +100,8 @@ pub struct GelSlimConfig {
     pub saturation: f64,
     /// Darkening of steep slopes.
     pub shadow: f64,
-    /// Slow colour change from touch to touch.
-    pub colour_drift: f64,
+    /// Slow color change from touch to touch.
+    pub color_drift: f64,
     /// Distance of the markers.
     pub marker_pitch_m: f64,
     /// Radius of a marker.
@@ -144,7 +144,7 @@ impl Default for GelSlimConfig {
             base: [78.0, 102.0, 147.0],
             saturation: 150.0,
             shadow: 14.0,
-            colour_drift: 2.0,
+            color_drift: 2.0,
             marker_pitch_m: 0.001_42,
             marker_radius_m: 0.000_135,
             marker_phase: [0.2, 0.4],
@@ -176,7 +176,7 @@ impl SimConfig {
         // Published imprints stay pushed in up to the wrist's edge of the picture and bulge beyond the tip: a larger,
         // steeper dome whose middle lies nearer the wrist than the nominal one's. Its range is narrow, because a GelSlim
         // image does not tell which bubble belongs to it: a wide range would only blur what is learnt.
-        let rim_centre_z_m = noise.uniform(-0.02, -0.012);
+        let rim_center_z_m = noise.uniform(-0.02, -0.012);
         let rim_semi_axes_m = [noise.uniform(0.053, 0.059), noise.uniform(0.073, 0.081)];
         let lean_rad = noise.uniform(-0.015, 0.065);
         let decay_m = noise.uniform(0.000_5, 0.001_6);
@@ -185,7 +185,7 @@ impl SimConfig {
             press_m: around(0.0145, 0.06),
             dome_rise_m: around(0.02, 0.08),
             rim_semi_axes_m,
-            rim_centre_z_m,
+            rim_center_z_m,
             air_kept: around(0.58, 0.15),
             noise_m: around(b.noise_m, 0.4),
             drift_m: around(b.drift_m, 0.6),
@@ -212,7 +212,7 @@ impl SimConfig {
             base: g.base.map(|a| around(a, 0.15)),
             saturation: around(g.saturation, 0.3),
             shadow: around(g.shadow, 0.8),
-            colour_drift: around(g.colour_drift, 0.8),
+            color_drift: around(g.color_drift, 0.8),
             marker_pitch_m: around(g.marker_pitch_m, 0.12),
             marker_radius_m: around(g.marker_radius_m, 0.2),
             marker_phase: [around(0.5, 1.0), around(0.5, 1.0)],

@@ -9,7 +9,7 @@ use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::rig::{PadId, lab};
 use crate::domain::sensor::Intrinsics;
 
-/// Membrane points up to this far from the tool count as contact, metres: the lab labels its masks so.
+/// Membrane points up to this far from the tool count as contact, meters: the lab labels its masks so.
 pub const CONTACT_DISTANCE_M: f64 = 0.001;
 
 /// Steepest slope of a membrane: that of the tools' bevels.
@@ -40,7 +40,7 @@ impl Rays {
     }
 }
 
-/// Depth of the free dome, metres.
+/// Depth of the free dome, meters.
 pub(super) fn dome_depth(rays: &Rays, dome: &Dome) -> DepthMap {
     let origin = rays.origin();
     DepthMap::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| dome_hit(origin, rays.direction(u, v), dome) as f32)
@@ -48,7 +48,7 @@ pub(super) fn dome_depth(rays: &Rays, dome: &Dome) -> DepthMap {
 
 /// Depth at which a ray meets the dome: its height over the dome is a quadratic in depth, negative at the camera.
 fn dome_hit(origin: DVec3, d: DVec3, dome: &Dome) -> f64 {
-    let o = (DVec2::new(origin.y, origin.z) - dome.centre) / dome.semi;
+    let o = (DVec2::new(origin.y, origin.z) - dome.center) / dome.semi;
     let e = DVec2::new(d.y, d.z) / dome.semi;
     let a = dome.rise * e.length_squared();
     let b = d.x + 2.0 * dome.rise * o.dot(e);
@@ -56,7 +56,7 @@ fn dome_hit(origin: DVec3, d: DVec3, dome: &Dome) -> f64 {
     2.0 * -c / (b + (b * b - 4.0 * a * c).max(0.0).sqrt())
 }
 
-/// Depth of the pressed membrane, metres, and where it lies on the tool.
+/// Depth of the pressed membrane, meters, and where it lies on the tool.
 pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap, Mask) {
     let origin = rays.origin();
     let mut contact = Mask::filled(lab::BUBBLE.width, lab::BUBBLE.height, false);
@@ -101,7 +101,7 @@ pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap,
     (depth, contact)
 }
 
-/// Reference minus depth as the camera measures it, metres.
+/// Reference minus depth as the camera measures it, meters.
 ///
 /// * the camera's finite pixels: a slight blur;
 /// * white noise, correlated over about a pixel, growing with the distance squared;
@@ -129,7 +129,7 @@ pub(super) fn measure(
             + texture[(u, v)]
             + config.noise_m as f32 * range * grain[(u, v)]
             + config.drift_m as f32 * drift[(u, v)];
-        let (lo, hi) = neighbour_range(depth, u, v);
+        let (lo, hi) = neighbor_range(depth, u, v);
         let roll = noise.unit();
         if hi - lo > 0.003 && roll < config.flying_share {
             imprint = reference[(u, v)] - (lo + (hi - lo) * noise.unit() as f32);
@@ -150,7 +150,7 @@ fn correlated(noise: &mut Noise, w: usize, h: usize) -> Grid<f32> {
     grain
 }
 
-/// The fixed pattern of a sensor's reference frame, metres.
+/// The fixed pattern of a sensor's reference frame, meters.
 fn texture(config: &BubbleConfig, finger: PadId) -> Grid<f32> {
     let (w, h) = (lab::BUBBLE.width, lab::BUBBLE.height);
     let mut noise = Noise::new(config.texture_seed, Stream::DepthTexture, finger.index());
@@ -175,7 +175,7 @@ fn texture(config: &BubbleConfig, finger: PadId) -> Grid<f32> {
 }
 
 /// Smallest and largest depth among the 3 x 3 pixels around `(u, v)`.
-fn neighbour_range(depth: &DepthMap, u: usize, v: usize) -> (f32, f32) {
+fn neighbor_range(depth: &DepthMap, u: usize, v: usize) -> (f32, f32) {
     let mut range = (f32::INFINITY, f32::NEG_INFINITY);
     for y in v.saturating_sub(1)..=(v + 1).min(depth.height() - 1) {
         for &z in &depth.row(y)[u.saturating_sub(1)..=(u + 1).min(depth.width() - 1)] {

@@ -19,8 +19,10 @@ pub enum Fault {
     BlankFinger,
     /// Nothing is broken, but a straight rod cannot tell where along itself it is held.
     StraightRod,
-    /// The CAD model is in millimetres.
-    StlInMillimetres,
+    /// The CAD model is in millimeters.
+    // Pairs are named after their fault, and labels after their pair: the name stays.
+    #[strum(serialize = "stl_in_millimetres")]
+    StlInMillimeters,
 }
 
 /// Seed of the noise; the faults differ by what is wrong, not by luck.
@@ -34,7 +36,7 @@ impl Fault {
             Self::BlobInMask => "a foreign body beside the tool is felt too",
             Self::BlankFinger => "the left bubble felt nothing",
             Self::StraightRod => "a straight rod: its place along itself cannot be felt",
-            Self::StlInMillimetres => "the CAD model is in millimetres",
+            Self::StlInMillimeters => "the CAD model is in millimeters",
         }
     }
 
@@ -45,7 +47,7 @@ impl Fault {
             Self::BlobInMask => 7,
             Self::BlankFinger => 4,
             Self::StraightRod => 5,
-            Self::StlInMillimetres => 0,
+            Self::StlInMillimeters => 0,
         };
         let mut tool = tools()[number].clone();
         if self == Self::StraightRod {
@@ -82,13 +84,13 @@ impl Fault {
         sample
     }
 
-    /// The CAD model as a careless person supplies it: metres, object frame, unless that is what is wrong.
+    /// The CAD model as a careless person supplies it: meters, object frame, unless that is what is wrong.
     pub fn mesh(self) -> TriMesh {
         let mut mesh = match self {
             Self::WrongCad => tools()[0].mesh(),
             _ => self.tool().mesh(),
         };
-        if self == Self::StlInMillimetres {
+        if self == Self::StlInMillimeters {
             mesh.vertices.iter_mut().for_each(|v: &mut DVec3| *v *= 1e3);
         }
         mesh
@@ -113,8 +115,8 @@ mod tests {
             assert_eq!(pushed(lab::LEFT) == 0, fault == Fault::BlankFinger, "{fault}");
             let mesh = fault.mesh();
             let reach = mesh.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
-            assert_eq!(reach > 1.0, fault == Fault::StlInMillimetres, "{fault}");
-            assert_eq!(mesh == fault.tool().mesh(), !matches!(fault, Fault::WrongCad | Fault::StlInMillimetres));
+            assert_eq!(reach > 1.0, fault == Fault::StlInMillimeters, "{fault}");
+            assert_eq!(mesh == fault.tool().mesh(), !matches!(fault, Fault::WrongCad | Fault::StlInMillimeters));
         }
         assert_eq!(Fault::WrongCad.to_string(), "wrong_cad");
     }

@@ -1,7 +1,7 @@
-//! The GelSlim: a gel pressed onto the tool, lit by three coloured LEDs, with black markers.
+//! The GelSlim: a gel pressed onto the tool, lit by three colored LEDs, with black markers.
 //!
 //! The gel's surface is a sheet on an elastic foundation: flat where the tool presses, then rising with a decay
-//! length of under a millimetre, hence the coloured streaks with a sharp inner and a fading outer side. Each LED
+//! length of under a millimeter, hence the colored streaks with a sharp inner and a fading outer side. Each LED
 //! brightens the slopes that face it and darkens the others. Markers move sideways with the stretched gel, so the
 //! difference image has a dark and a bright dot for each.
 
@@ -16,16 +16,16 @@ use crate::domain::grid::RgbGrid;
 use crate::domain::rig::{PadId, lab};
 use crate::domain::sample::{ColorImages, ColorTouch};
 
-/// Spacing of the grid that the gel is solved on, metres.
+/// Spacing of the grid that the gel is solved on, meters.
 const STEP_M: f64 = 0.000_15;
-/// How far the gel goes on beyond the picture, metres.
+/// How far the gel goes on beyond the picture, meters.
 const MARGIN_M: f64 = 0.002_4;
 /// Pixels of the picture per grid step.
 const PX_PER_STEP: f64 = STEP_M * lab::GELSLIM.px_per_m;
 /// Grid steps from the first node to the first pixel.
 const MARGIN_STEPS: f64 = MARGIN_M / STEP_M;
 
-/// How deep the tool pushes into the gel, in picture axes (x right, y down), metres.
+/// How deep the tool pushes into the gel, in picture axes (x right, y down), meters.
 struct Gel {
     pushed: Field,
 }
@@ -111,7 +111,7 @@ fn blur(field: &mut Field, sigma: f64) {
     }
 }
 
-/// The slope of a field at every node, metres per metre.
+/// The slope of a field at every node, meters per meter.
 fn slopes(field: &Field, step: f64) -> [Field; 2] {
     let (columns, rows) = (field.columns, field.rows);
     let mut out = [Field::filled(columns, rows, 0.0), Field::filled(columns, rows, 0.0)];
@@ -157,7 +157,7 @@ pub(super) fn touch(
     ColorTouch { images: Some(ColorImages { raw, reference }), difference }
 }
 
-/// A colour at every grid node, for effects that are smooth over a few pixels.
+/// A color at every grid node, for effects that are smooth over a few pixels.
 struct Wash {
     columns: usize,
     values: Vec<[f32; 3]>,
@@ -241,7 +241,7 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, noise: &mut Noi
                 - config.shadow * steep / (1.0 + steep);
             // more light saturates
             let light = light / (1.0 + (light / config.saturation).powi(2)).sqrt();
-            (light + config.colour_drift * f64::from(slow[c][(i, j)])) as f32
+            (light + config.color_drift * f64::from(slow[c][(i, j)])) as f32
         })
     })
     .picture();
@@ -252,12 +252,12 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, noise: &mut Noi
     }
 }
 
-/// Centre (pixels) and radius (pixels) of each marker without contact.
+/// Center (pixels) and radius (pixels) of each marker without contact.
 fn marker_grid(config: &GelSlimConfig, finger: PadId) -> Vec<(DVec2, f64)> {
     let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 16 + finger.index());
     let pitch = config.marker_pitch_m * lab::GELSLIM.px_per_m;
     let radius = config.marker_radius_m * lab::GELSLIM.px_per_m;
-    let centre = DVec2::new(0.5 * lab::GELSLIM.width as f64, 0.5 * lab::GELSLIM.height as f64);
+    let center = DVec2::new(0.5 * lab::GELSLIM.width as f64, 0.5 * lab::GELSLIM.height as f64);
     let turn = DVec2::from_angle(config.marker_angle_rad);
     let reach = (lab::GELSLIM.width as f64 / pitch) as i32;
     let mut markers = Vec::new();
@@ -267,7 +267,7 @@ fn marker_grid(config: &GelSlimConfig, finger: PadId) -> Vec<(DVec2, f64)> {
             let jitter = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * 0.03;
             let flat = turn.rotate(cell + jitter) * pitch;
             // the gel is curved: the grid looks wider towards the rim
-            let p = centre + flat * (1.0 + config.marker_fan * (flat / centre.x).length_squared());
+            let p = center + flat * (1.0 + config.marker_fan * (flat / center.x).length_squared());
             let size = radius * (1.0 + 0.12 * f64::from(noise.normal()));
             let inside = p.cmpge(DVec2::splat(-10.0)).all()
                 && p.cmple(DVec2::new(lab::GELSLIM.width as f64, lab::GELSLIM.height as f64) + 10.0).all();
@@ -286,7 +286,7 @@ fn moved(markers: &[(DVec2, f64)], config: &GelSlimConfig, gel: &Gel, noise: &mu
     let shear = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.shear_m;
     let twist = f64::from(noise.normal()) * config.twist_rad;
     let deepest = bulk.values.iter().fold(1e-9_f32, |a, &b| a.max(b));
-    let centre = DVec2::new(0.5 * lab::GELSLIM.width as f64, 0.5 * lab::GELSLIM.height as f64);
+    let center = DVec2::new(0.5 * lab::GELSLIM.width as f64, 0.5 * lab::GELSLIM.height as f64);
     markers
         .iter()
         .map(|&(p, size)| {
@@ -294,7 +294,7 @@ fn moved(markers: &[(DVec2, f64)], config: &GelSlimConfig, gel: &Gel, noise: &mu
             let away = -DVec2::new(slopes[0].at(node.x, node.y), slopes[1].at(node.x, node.y));
             // friction drags the gel along where it is pressed
             let held = bulk.at(node.x, node.y) / f64::from(deepest);
-            let drag = (shear * lab::GELSLIM.px_per_m + (p - centre).perp() * twist) * (0.35 + 0.65 * held);
+            let drag = (shear * lab::GELSLIM.px_per_m + (p - center).perp() * twist) * (0.35 + 0.65 * held);
             (p + away * config.marker_push_m * lab::GELSLIM.px_per_m + drag, size)
         })
         .collect()

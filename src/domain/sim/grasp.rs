@@ -5,7 +5,7 @@ use crate::domain::frames::PlanarPose;
 
 /// Half the range of the grasp angle, radians.
 pub const THETA_RANGE_RAD: f64 = 22.5 * std::f64::consts::PI / 180.0;
-/// Half the side of the square of grasp positions, metres.
+/// Half the side of the square of grasp positions, meters.
 pub const POSITION_RANGE_M: f64 = 0.005;
 /// Grasps on the grid; higher numbers start over.
 pub const GRID_GRASPS: u64 = 1344;
@@ -15,9 +15,9 @@ pub const GRID_GRASPS: u64 = 1344;
 pub struct Grasp {
     /// Angle of the grasp, radians.
     pub theta_rad: f64,
-    /// First offset of the grasp, metres.
+    /// First offset of the grasp, meters.
     pub x_m: f64,
-    /// Second offset of the grasp, metres.
+    /// Second offset of the grasp, meters.
     pub y_m: f64,
 }
 

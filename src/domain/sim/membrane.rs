@@ -19,9 +19,9 @@ pub struct Membrane<'a> {
     dome: Dome,
     tool: &'a ToolSpec,
     object_from_grasp: PlanarPose,
-    /// Dome minus membrane at the grid nodes, metres.
+    /// Dome minus membrane at the grid nodes, meters.
     pushed: Field,
-    /// Cells (and their neighbours) in which a bar begins or lies.
+    /// Cells (and their neighbors) in which a bar begins or lies.
     near_tool: Vec<bool>,
     origin: DVec2,
     #[cfg(test)]
@@ -31,14 +31,14 @@ pub struct Membrane<'a> {
 /// The undeformed membrane.
 #[derive(Clone, Copy, Debug)]
 pub struct Dome {
-    /// Height of the apex, metres.
+    /// Height of the apex, meters.
     pub apex: f64,
-    /// Height of the apex over the rim, metres.
+    /// Height of the apex over the rim, meters.
     pub rise: f64,
-    /// Semi-axes of the rim along y and z, metres.
+    /// Semi-axes of the rim along y and z, meters.
     pub semi: DVec2,
-    /// Centre of the rim, (y, z), metres.
-    pub centre: DVec2,
+    /// Center of the rim, (y, z), meters.
+    pub center: DVec2,
 }
 
 impl Dome {
@@ -48,13 +48,13 @@ impl Dome {
             apex: config.press_m - half_thickness_m,
             rise: config.dome_rise_m,
             semi: DVec2::from_array(config.rim_semi_axes_m),
-            centre: DVec2::new(0.0, config.rim_centre_z_m),
+            center: DVec2::new(0.0, config.rim_center_z_m),
         }
     }
 
     /// Height at `(y, z)`; beyond the rim it goes on falling.
     pub fn height(&self, yz: DVec2) -> f64 {
-        self.apex - self.rise * ((yz - self.centre) / self.semi).length_squared()
+        self.apex - self.rise * ((yz - self.center) / self.semi).length_squared()
     }
 }
 
@@ -65,7 +65,7 @@ impl<'a> Membrane<'a> {
         let step = MEMBRANE_STEP_M;
         let size = (2.0 * dome.semi / step).ceil();
         let (columns, rows) = (size.x as usize + 3, size.y as usize + 3);
-        let origin = dome.centre - dome.semi - step;
+        let origin = dome.center - dome.semi - step;
 
         let mut obstacle = Field::filled(columns, rows, f32::NEG_INFINITY);
         let mut free = vec![false; columns * rows];
@@ -74,7 +74,7 @@ impl<'a> Membrane<'a> {
             for i in 0..columns {
                 let k = j * columns + i;
                 let yz = origin + DVec2::new(i as f64, j as f64) * step;
-                free[k] = ((yz - dome.centre) / dome.semi).length_squared() < 1.0;
+                free[k] = ((yz - dome.center) / dome.semi).length_squared() < 1.0;
                 if !free[k] {
                     continue;
                 }
@@ -111,7 +111,7 @@ impl<'a> Membrane<'a> {
         Dome { apex: self.dome.apex - f64::from(deepest) - 2e-3, ..self.dome }
     }
 
-    /// Height of the membrane at `(y, z)`, metres.
+    /// Height of the membrane at `(y, z)`, meters.
     pub fn height(&self, yz: DVec2) -> f64 {
         let at = (yz - self.origin) / MEMBRANE_STEP_M;
         let free = self.dome.height(yz) - self.pushed.at(at.x, at.y);
@@ -138,7 +138,7 @@ impl<'a> Membrane<'a> {
         self.near_tool[k] || self.near_tool[k + 1] || self.near_tool[k + columns] || self.near_tool[k + columns + 1]
     }
 
-    /// Distance of the membrane's point `(n, y, z)` from the tool's surface, metres, negative inside; more than
+    /// Distance of the membrane's point `(n, y, z)` from the tool's surface, meters, negative inside; more than
     /// `limit` is only known to be more.
     pub fn distance_to_tool(&self, n: f64, yz: DVec2, limit: f64) -> f64 {
         let p = self.object_from_grasp.transform_yz(yz);
@@ -146,7 +146,7 @@ impl<'a> Membrane<'a> {
         if s > limit { s } else { self.tool.signed_distance(glam::DVec3::new(n, p.x, p.y)) }
     }
 
-    /// Largest and mean difference, metres, from the solution after many more sweeps.
+    /// Largest and mean difference, meters, from the solution after many more sweeps.
     #[cfg(test)]
     fn error_against_many_sweeps(&self, sweeps: usize) -> (f64, f64) {
         let (obstacle, free, load) = &self.rest;
@@ -158,7 +158,7 @@ impl<'a> Membrane<'a> {
         (errors.iter().copied().fold(0.0, f64::max), errors.iter().sum::<f64>() / errors.len() as f64)
     }
 
-    /// Largest depth of a grid node inside the tool, metres.
+    /// Largest depth of a grid node inside the tool, meters.
     pub fn worst_gap(&self) -> f64 {
         let mut worst = 0.0_f64;
         for j in 0..self.pushed.rows {

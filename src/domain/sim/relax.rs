@@ -55,11 +55,11 @@ pub(super) struct Problem<'a> {
     pub(super) obstacle: &'a Field,
     /// Nodes that can move; the others stay at 0. The border never moves.
     pub(super) free: &'a [bool],
-    /// Load divided by tension, 1/m (per square metre of the grid: the right hand side).
+    /// Load divided by tension, 1/m (per square meter of the grid: the right hand side).
     pub(super) load: f32,
     /// Foundation stiffness divided by tension, 1/m².
     pub(super) stiffness: f32,
-    /// Grid spacing, metres.
+    /// Grid spacing, meters.
     pub(super) step: f32,
 }
 
@@ -113,10 +113,10 @@ impl Problem<'_> {
         for sweep in 0..sweeps {
             // over-relaxation from the second sweep on; a last plain one smooths
             let omega = if sweep == 0 || sweep + 1 == sweeps { 1.0 } else { 1.75 };
-            for colour in 0..2 {
+            for color in 0..2 {
                 for y in 1..w.rows - 1 {
                     let row = y * columns;
-                    let first = 1 + (y + colour) % 2;
+                    let first = 1 + (y + color) % 2;
                     let (above, rest) = w.values[row - columns..].split_at_mut(columns);
                     let (here, below) = rest.split_at_mut(columns);
                     let below = &below[..columns];

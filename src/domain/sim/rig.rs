@@ -2,7 +2,7 @@
 //!
 //! Both depth cameras look at the tool obliquely, 35 degrees off the closing axis, from the side of the wrist,
 //! with the lab's rotations. Their position follows from what the two sensors must agree on: the surface point of
-//! the tool at the grasp's origin is the centre of the GelSlim window and the centre of its footprint in the
+//! the tool at the grasp's origin is the center of the GelSlim window and the center of its footprint in the
 //! bubble image ([`Rig::color_window`]), at [`RANGE_M`] from the camera, where the bubble's scale is the
 //! published 2.36 px/mm on average over the tilted footprint.
 
@@ -11,7 +11,7 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 use crate::domain::rig::{PadId, Rig, Window, lab};
 use crate::domain::sensor::Intrinsics;
 
-/// Distance of the touched surface from the camera along its axis, metres.
+/// Distance of the touched surface from the camera along its axis, meters.
 pub const RANGE_M: f64 = 0.083;
 /// Angle of the camera about +y, degrees. Source: the transforms in the lab's BubbleControl notebooks.
 const CAMERA_ANGLE_DEG: f64 = 55.04;
@@ -41,7 +41,7 @@ fn footprint(finger: PadId) -> Window {
     *Rig::lab().color_window(finger).expect("the lab's rig has a window for each finger")
 }
 
-/// The (y, z) in the grasp frame, metres, that GelSlim pixel `(column, row)` looks at.
+/// The (y, z) in the grasp frame, meters, that GelSlim pixel `(column, row)` looks at.
 pub fn gelslim_yz(finger: PadId, column: f64, row: f64) -> DVec2 {
     let right = (column - 0.5 * (lab::GELSLIM.width - 1) as f64) / lab::GELSLIM.px_per_m;
     let down = (row - 0.5 * (lab::GELSLIM.height - 1) as f64) / lab::GELSLIM.px_per_m;

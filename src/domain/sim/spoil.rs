@@ -101,11 +101,11 @@ pub fn spoil_mask(clean: &Mask, spoil: &Spoil, finger: PadId, seed: u64) -> Mask
         }
     }
     for _ in 0..count(&mut noise, spoil.blobs) {
-        let centre = [noise.uniform(0.0, width as f64), noise.uniform(0.0, height as f64)];
+        let center = [noise.uniform(0.0, width as f64), noise.uniform(0.0, height as f64)];
         let semi = [range(&mut noise, spoil.blob_px), range(&mut noise, spoil.blob_px)];
         for y in 0..height {
             for x in 0..width {
-                let (dx, dy) = ((x as f64 - centre[0]) / semi[0], (y as f64 - centre[1]) / semi[1]);
+                let (dx, dy) = ((x as f64 - center[0]) / semi[0], (y as f64 - center[1]) / semi[1]);
                 mask[(x, y)] |= dx * dx + dy * dy <= 1.0;
             }
         }
@@ -134,12 +134,12 @@ fn count(noise: &mut Noise, mean: f64) -> usize {
     (mean + noise.unit()).floor().max(0.0) as usize
 }
 
-/// Changes all values within `reach` pixels of `centre`.
-fn paint<T: Copy>(grid: &mut Grid<T>, centre: [f64; 2], reach: f64, change: impl Fn(T) -> T) {
+/// Changes all values within `reach` pixels of `center`.
+fn paint<T: Copy>(grid: &mut Grid<T>, center: [f64; 2], reach: f64, change: impl Fn(T) -> T) {
     let [width, height] = grid.size();
     for y in 0..height {
         for x in 0..width {
-            if (x as f64 - centre[0]).hypot(y as f64 - centre[1]) <= reach {
+            if (x as f64 - center[0]).hypot(y as f64 - center[1]) <= reach {
                 grid[(x, y)] = change(grid[(x, y)]);
             }
         }

@@ -17,7 +17,7 @@ struct Sheet {
     triangles: Vec<[u32; 3]>,
 }
 
-/// The surface of `tool`, from a grid of spacing `step` (metres).
+/// The surface of `tool`, from a grid of spacing `step` (meters).
 pub(super) fn mesh(tool: &ToolSpec, step: f64) -> TriMesh {
     let mut sheet = grid(tool, step);
     sheet.split(tool, -tool.bevel_width_m, step);
@@ -59,7 +59,7 @@ fn grid(tool: &ToolSpec, step: f64) -> Sheet {
 
 impl Sheet {
     /// Cuts every triangle along the line where the outline distance is `level`, so that afterwards each lies on
-    /// one side of it. A cut point belongs to an edge, so neighbours stay connected.
+    /// one side of it. A cut point belongs to an edge, so neighbors stay connected.
     fn split(&mut self, tool: &ToolSpec, level: f64, step: f64) {
         // a vertex that is nearly on the line becomes one of it: no slivers
         for value in &mut self.values {
@@ -116,8 +116,8 @@ impl Sheet {
         self.triangles.retain(|t| {
             let v = t.map(|i| values[i as usize]);
             if v.iter().all(|&v| v == 0.0) {
-                let centre = t.iter().map(|&i| points[i as usize]).sum::<DVec2>() / 3.0;
-                return tool.outline_distance(centre) < 0.0;
+                let center = t.iter().map(|&i| points[i as usize]).sum::<DVec2>() / 3.0;
+                return tool.outline_distance(center) < 0.0;
             }
             v.iter().all(|&v| v <= 0.0)
         });

@@ -12,20 +12,20 @@ use super::noise::{Noise, Stream};
 use super::tool_mesh;
 use crate::domain::mesh::TriMesh;
 
-/// Edge length of the grid that a tool's mesh is cut from, metres.
+/// Edge length of the grid that a tool's mesh is cut from, meters.
 const MESH_STEP_M: f64 = 0.0005;
 
 /// A bar: all points within `half_width_m` of its core.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bar {
-    /// A segment (2 points) or a convex polygon (more, counter-clockwise), as (y, z) in metres, object frame.
+    /// A segment (2 points) or a convex polygon (more, counter-clockwise), as (y, z) in meters, object frame.
     pub core: Vec<DVec2>,
-    /// Distance from the core to the outline, metres.
+    /// Distance from the core to the outline, meters.
     pub half_width_m: f64,
 }
 
 impl Bar {
-    /// Distance from `p` to the outline of this bar, metres, negative inside.
+    /// Distance from `p` to the outline of this bar, meters, negative inside.
     fn outline_distance(&self, p: DVec2) -> f64 {
         let n = self.core.len();
         let mut inside = n > 2;
@@ -52,21 +52,21 @@ pub struct ToolSpec {
     pub seen: bool,
     /// The parts; the outline is their union.
     pub bars: Vec<Bar>,
-    /// Half the extent along the closing axis x, metres.
+    /// Half the extent along the closing axis x, meters.
     pub half_thickness_m: f64,
-    /// Width of the bevel along the outline, metres.
+    /// Width of the bevel along the outline, meters.
     pub bevel_width_m: f64,
-    /// How much lower the bevel is at the outline, metres.
+    /// How much lower the bevel is at the outline, meters.
     pub bevel_depth_m: f64,
 }
 
 impl ToolSpec {
-    /// Distance of `(y, z)` (metres, object frame) to the outline, metres, negative inside.
+    /// Distance of `(y, z)` (meters, object frame) to the outline, meters, negative inside.
     pub fn outline_distance(&self, p: DVec2) -> f64 {
         self.bars.iter().map(|bar| bar.outline_distance(p)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Distance of the surface from the y-z plane at `(y, z)`, metres; `None` beside the tool.
+    /// Distance of the surface from the y-z plane at `(y, z)`, meters; `None` beside the tool.
     pub fn height(&self, p: DVec2) -> Option<f64> {
         let s = self.outline_distance(p);
         (s <= 0.0).then(|| self.height_at(s))
@@ -77,7 +77,7 @@ impl ToolSpec {
         self.half_thickness_m - self.bevel_depth_m * (1.0 + s / self.bevel_width_m).max(0.0)
     }
 
-    /// Signed distance of a point (metres, object frame) to the surface, negative inside.
+    /// Signed distance of a point (meters, object frame) to the surface, negative inside.
     ///
     /// Exact outside except near re-entrant corners, where it is never more than the true distance.
     pub fn signed_distance(&self, p: DVec3) -> f64 {
@@ -99,7 +99,7 @@ impl ToolSpec {
         if s <= 0.0 && h <= self.height_at(s) { -distance } else { distance }
     }
 
-    /// Smallest and largest (y, z) of the outline, metres.
+    /// Smallest and largest (y, z) of the outline, meters.
     pub fn outline_bounds(&self) -> [DVec2; 2] {
         let mut lo = DVec2::splat(f64::INFINITY);
         let mut hi = DVec2::splat(f64::NEG_INFINITY);
@@ -112,7 +112,7 @@ impl ToolSpec {
         [lo, hi]
     }
 
-    /// The surface as a watertight mesh, metres, object frame.
+    /// The surface as a watertight mesh, meters, object frame.
     pub fn mesh(&self) -> TriMesh {
         tool_mesh::mesh(self, MESH_STEP_M)
     }

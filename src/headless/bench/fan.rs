@@ -10,7 +10,7 @@ use crate::domain::units;
 
 const SEED: RGBColor = RGBColor(0xc2, 0x54, 0x00);
 const TRUTH: RGBColor = RGBColor(0x1c, 0x84, 0x47);
-const GREY: RGBColor = RGBColor(0x64, 0x64, 0x64);
+const GRAY: RGBColor = RGBColor(0x64, 0x64, 0x64);
 const LENGTH: f64 = 180.0;
 
 struct Picture<'a> {
@@ -31,14 +31,14 @@ impl Drawing for Picture<'_> {
             [pivot[0] + lean.sin() * LENGTH * share, pivot[1] - lean.cos() * LENGTH * share]
         };
         let letters = |units: f64, color, h, v| paper.letters(units, color).pos(Pos::new(h, v));
-        paper.text([8.0, 6.0], &letters(12.0, GREY, HPos::Left, VPos::Top), self.title)?;
+        paper.text([8.0, 6.0], &letters(12.0, GRAY, HPos::Left, VPos::Top), self.title)?;
         let at = |i: i32| dial.reach_rad * f64::from(i) / 12.0;
         let arc: Vec<[f64; 2]> = (-12..=12).map(|i| toward(at(i), 1.0)).collect();
-        paper.line(&arc, GREY, 1.0)?;
+        paper.line(&arc, GRAY, 1.0)?;
         for i in [-12, -6, 0, 6, 12] {
-            paper.line(&[toward(at(i), 0.97), toward(at(i), 1.03)], GREY, 1.0)?;
+            paper.line(&[toward(at(i), 0.97), toward(at(i), 1.03)], GRAY, 1.0)?;
             let text = format!("{:.1}", (dial.mean_rad + at(i)).to_degrees());
-            paper.text(toward(at(i), 1.04), &letters(10.0, GREY, HPos::Center, VPos::Bottom), &text)?;
+            paper.text(toward(at(i), 1.04), &letters(10.0, GRAY, HPos::Center, VPos::Bottom), &text)?;
         }
         for angle in &self.fan.angles_rad {
             paper.line(&[pivot, toward(dial.off(*angle), 0.95)], SEED, 1.0)?;

@@ -19,7 +19,7 @@ pub(super) struct Outcome {
     pub(super) straight: bool,
     /// Degrees; NaN without a pose.
     pub(super) error_deg: f64,
-    /// Millimetres; NaN without a pose.
+    /// Millimeters; NaN without a pose.
     pub(super) position_mm: f64,
     /// Median, shortest and first of the repetitions, milliseconds.
     pub(super) ms: f64,
@@ -42,7 +42,7 @@ pub(super) struct Figures {
     max_deg: Option<f64>,
     /// Percent of all cases with an error beyond 20 degrees or without a pose.
     pub(super) gross_20: f64,
-    /// Median distance from the true place, millimetres, of the cases whose tool is not a straight bar.
+    /// Median distance from the true place, millimeters, of the cases whose tool is not a straight bar.
     pub(super) position_median_mm: Option<f64>,
     /// Points to pose, one thread: median and 95th percentile over the cases of each case's median repetition.
     pub(super) median_ms: Option<f64>,
@@ -124,7 +124,7 @@ impl Figures {
     }
 }
 
-/// The `q`-quantile of the values that are numbers, linear between neighbours; `None` without any.
+/// The `q`-quantile of the values that are numbers, linear between neighbors; `None` without any.
 pub(super) fn quantile(values: impl Iterator<Item = f64>, q: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     values.sort_by(f64::total_cmp);
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_lie_between_neighbours() {
+    fn quantiles_lie_between_neighbors() {
         let values = [4.0, 1.0, f64::NAN, 3.0, 2.0];
         assert_eq!(quantile(values.into_iter(), 0.5), Some(2.5));
         assert_eq!(quantile(values.into_iter(), 1.0), Some(4.0));

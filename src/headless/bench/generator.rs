@@ -100,11 +100,11 @@ struct Row {
     spacing: Spacing,
     /// Steps asked for.
     steps: u32,
-    /// Both fingers of a grasp in one batch: image to metres, milliseconds of the clock.
+    /// Both fingers of a grasp in one batch: image to meters, milliseconds of the clock.
     median_ms: f64,
     /// Median over the grasps of this row's time by the reference's time on the same grasp, measured right after it.
     share_of_reference: Option<f64>,
-    /// Against the noise-free imprint, over all pixels of both fingers, millimetres.
+    /// Against the noise-free imprint, over all pixels of both fingers, millimeters.
     rmse_mm: f64,
     /// Mean over the imprints, peak 0.0225 m, decibels.
     psnr_db: f64,
@@ -351,7 +351,7 @@ fn write(file: &std::path::Path, report: &Report) -> anyhow::Result<()> {
         let title = format!("Generator: {what} against time, {} grasps, {engine}", report.grasps);
         let axis = Axis {
             title: &title,
-            time: "both fingers in one batch, image to metres: time, median over the grasps, ms",
+            time: "both fingers in one batch, image to meters: time, median over the grasps, ms",
             unit,
             legend: &[],
         };

@@ -74,7 +74,7 @@ pub(super) struct Prepared {
     pub(super) tool: usize,
     pub(super) straight: bool,
     pub(super) truth: PlanarPose,
-    /// Contact points, grasp frame, metres.
+    /// Contact points, grasp frame, meters.
     pub(super) points: Vec<DVec3>,
 }
 
@@ -93,7 +93,7 @@ pub(super) struct EngineRow {
     /// One value per case in the order of `cases`, `null` where there is no pose or the case was not run.
     pub(super) error_deg: Vec<Option<f64>>,
     pub(super) ms: Vec<Option<f64>>,
-    /// Estimated minus true place (y, z), millimetres, likewise.
+    /// Estimated minus true place (y, z), millimeters, likewise.
     pub(super) offset_mm: Vec<Option<[f64; 2]>>,
 }
 
@@ -355,12 +355,12 @@ fn outcome(case: &Prepared, timed: Timed<Result<AlignReport, AlignError>>) -> Ou
     }
 }
 
-/// From the true to the estimated place (y, z), millimetres.
+/// From the true to the estimated place (y, z), millimeters.
 pub(super) fn offset(estimated: PlanarPose, truth: PlanarPose) -> [f64; 2] {
     [(estimated.y_m - truth.y_m) * 1e3, (estimated.z_m - truth.z_m) * 1e3]
 }
 
-/// Distance between the two places, millimetres.
+/// Distance between the two places, millimeters.
 pub(super) fn position_error_mm(estimated: PlanarPose, truth: PlanarPose) -> f64 {
     let [y, z] = offset(estimated, truth);
     y.hypot(z)

@@ -23,7 +23,7 @@ use crate::domain::rig::Text;
 use crate::domain::sample::Sample;
 use crate::domain::units::angle_error;
 use crate::infer::engine::resolve;
-use crate::io::dataset::{Dataset, read_in_metres};
+use crate::io::dataset::{Dataset, read_in_meters};
 use crate::io::follow::Ready;
 use crate::work::imprint::imprint_of;
 use crate::work::job::{Cancel, JobCx};
@@ -298,7 +298,7 @@ impl<'a> Worker<'a> {
 fn load_tool(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<ToolModel> {
     let mesh = if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("stl")) {
         Some(
-            read_in_metres(Path::new(name), args.unit.tool_scale)
+            read_in_meters(Path::new(name), args.unit.tool_scale)
                 .map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))?,
         )
     } else {

@@ -10,7 +10,7 @@ pub(super) struct Latency {
     pub found: f64,
     /// Reading it.
     pub load: f64,
-    /// The generator, both fingers, up to metres.
+    /// The generator, both fingers, up to meters.
     pub generate: f64,
     /// The contact masks.
     pub mask: f64,

@@ -18,11 +18,11 @@ use crate::io::{atomic, files, images, names, npz, pt};
 /// A form of the prediction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Save {
-    /// `imprint_right`, `imprint_left` (metres, f32, height x width), `mask_right`, `mask_left` (0 or 1).
+    /// `imprint_right`, `imprint_left` (meters, f32, height x width), `mask_right`, `mask_left` (0 or 1).
     Npz,
     /// One picture per finger.
     Png,
-    /// `prediction` (metres, fingers x 1 x height x width), `mask`, `fingers`.
+    /// `prediction` (meters, fingers x 1 x height x width), `mask`, `fingers`.
     Pt,
 }
 
@@ -69,7 +69,7 @@ pub(super) fn predictions(stem: &Path, fingers: &[FingerResult], save: &[Save]) 
         for f in fingers {
             let picture = f.imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
             files.push(output(stem, &format!("{}.png", f.name)));
-            images::write_grey16(&files[files.len() - 1], &picture)?;
+            images::write_gray16(&files[files.len() - 1], &picture)?;
         }
     }
     if save.contains(&Save::Pt) {

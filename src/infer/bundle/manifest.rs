@@ -159,9 +159,9 @@ pub enum InputScale {
     /// As stored.
     #[serde(rename = "0..255")]
     Byte,
-    /// Metres, of a depth sensor.
+    /// Meters, of a depth sensor.
     #[serde(rename = "m")]
-    Metres,
+    Meters,
 }
 
 impl GeneratorInput {
@@ -243,7 +243,7 @@ pub struct OutputSpec {
     pub size: [usize; 2],
     /// Channels of the decoder's picture.
     pub channels: usize,
-    /// What -1 and 1 mean, metres: of a depth sensor.
+    /// What -1 and 1 mean, meters: of a depth sensor.
     #[serde(default)]
     pub range_m: Option<DepthRange>,
     /// What -1 and 1 mean, differences on the 0..255 scale: of a color sensor.
@@ -283,7 +283,7 @@ pub struct MaskInput {
     pub sensor: SensorSpec,
     /// `[width, height]`, pixels.
     pub size: [usize; 2],
-    /// The imprint's depth that becomes 0 and 1, metres.
+    /// The imprint's depth that becomes 0 and 1, meters.
     pub range_m: DepthRange,
     /// How depth becomes 0..1.
     #[serde(default)]
@@ -334,7 +334,7 @@ pub struct ClassifierInput {
     pub sensor: SensorSpec,
     /// `[width, height]`, pixels; resized bilinearly.
     pub size: [usize; 2],
-    /// The imprint's depth that becomes -1 and 1, metres; clamped.
+    /// The imprint's depth that becomes -1 and 1, meters; clamped.
     pub range_m: DepthRange,
     /// Rotation of the raw imprint before the graph: 0 or 180 degrees.
     #[serde(default)]
@@ -498,9 +498,9 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         check(input.mean.len() == n && input.mean.iter().all(|m| m.is_finite()), "input.mean: not numbers", each);
         let positive = input.std.len() == n && input.std.iter().all(|&s| s > 0.0 && s.is_finite());
         check(positive, "input.std: not positive", each);
-        let metres = (input.sensor.kind == SensorKind::Depth) == (input.scale == InputScale::Metres);
+        let meters = (input.sensor.kind == SensorKind::Depth) == (input.scale == InputScale::Meters);
         check(
-            metres,
+            meters,
             "input.scale: not the sensor's",
             "\"m\" of a depth sensor, \"0..1\" or \"0..255\" of a color sensor",
         );
@@ -520,7 +520,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         match output.sensor.kind {
             SensorKind::Depth => {
                 let valid = output.range_m.is_some_and(|range| range.is_valid()) && output.range.is_none();
-                check(valid, "output.range_m: empty", "give [smallest, largest] depth in metres");
+                check(valid, "output.range_m: empty", "give [smallest, largest] depth in meters");
             }
             SensorKind::Color => {
                 let valid = output.range.is_some_and(|[lo, hi]| lo < hi && lo.is_finite() && hi.is_finite());
@@ -588,7 +588,7 @@ fn mask(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<Bundle
             problems.add("input.size: out of range", SIDES);
         }
         if !input.range_m.is_valid() {
-            problems.add("input.range_m: empty", "give [smallest, largest] depth in metres");
+            problems.add("input.range_m: empty", "give [smallest, largest] depth in meters");
         }
         if !turn(input.rotation_deg) {
             problems.add("input.rotation_deg: not supported", TURNS);
@@ -616,7 +616,7 @@ fn classifier(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<
             problems.add("input.size: out of range", SIDES);
         }
         if !input.range_m.is_valid() {
-            problems.add("input.range_m: empty", "give [smallest, largest] depth in metres");
+            problems.add("input.range_m: empty", "give [smallest, largest] depth in meters");
         }
         if !turn(input.rotation_deg) {
             problems.add("input.rotation_deg: not supported", TURNS);

@@ -51,7 +51,7 @@ pub fn stratum(position: usize, count: usize) -> Stratum {
 
 /// Case number `position` of a suite of `count` with the given seed. About 60 ms of one core in release.
 pub fn simulated(position: usize, count: usize, seed: u64, tools: &[ToolSpec]) -> Case {
-    // One seed per case, so that a case does not depend on how its neighbours came about.
+    // One seed per case, so that a case does not depend on how its neighbors came about.
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(position as u64));
     let stratum = stratum(position, count);
     let straight = tools.len() - 2;

@@ -410,7 +410,7 @@ impl Scanner {
                 self.problems.push(problem(
                     root.join("tools_stls").join(format!("{tool}.stl")),
                     format!("the CAD model of {tool} is missing: its pose cannot be estimated"),
-                    "add the STL in metres, named like the tool",
+                    "add the STL in meters, named like the tool",
                 ));
             }
         }

@@ -10,9 +10,9 @@
 //! * **Imprint**: 0 and 255 stand for [`ASSUMED_IMPRINT_RANGE_M`]. The picture is rotated by 180 degrees (the
 //!   lab's convention for display beside a GelSlim image) and is turned back; it is resampled to 175 x 140 px.
 //! * **GelSlim**: the picture shows a standardised difference image, so "no difference" is its most frequent
-//!   grey, and one grey level is worth [`CLEAN_GAIN`]. Pictures whose most frequent value is the darkest or
+//!   gray, and one gray level is worth [`CLEAN_GAIN`]. Pictures whose most frequent value is the darkest or
 //!   brightest one lost half of their range; they get the gain that brings their spread to [`DIFFERENCE_STD`].
-//! * **Turns**: both pictures of a pair may have been turned or mirrored for training. The colours tell
+//! * **Turns**: both pictures of a pair may have been turned or mirrored for training. The colors tell
 //!   ([`crate::domain::upright`]), and both are laid upright again.
 
 use std::collections::BTreeMap;
@@ -29,13 +29,13 @@ use crate::io::images;
 
 use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};
 
-/// What the darkest and brightest value of a bubble picture are taken for, metres.
+/// What the darkest and brightest value of a bubble picture are taken for, meters.
 pub const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
 
 /// What to say beside every length of a picture folder.
 pub const ASSUMED_SCALE_NOTE: &str = "assumed scale: the pictures were stretched to 0..255, taken as -6.3 to 18.0 mm";
 
-/// Difference (0..255 scale) per grey level of an unclipped picture: red, green, blue.
+/// Difference (0..255 scale) per gray level of an unclipped picture: red, green, blue.
 ///
 /// Each channel was divided by its standard deviation (0.0989, 0.0746, 0.0731 of 0..1) before all three were
 /// stretched together, so the gains have this ratio; their common factor 0.039 makes the spread of pictures of
@@ -177,10 +177,10 @@ impl Pictures {
         files.into_iter().flat_map(|files| kinds.iter().filter_map(|&kind| files[kind].clone())).collect()
     }
 
-    /// A grey picture that lay this way in its file, upright.
+    /// A gray picture that lay this way in its file, upright.
     pub(super) fn tile(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         let Some(path) = self.file(id, kind)? else { return Ok(None) };
-        let tile = images::read_grey(path)?;
+        let tile = images::read_gray(path)?;
         // Pairs are turned as squares; in another shape a quarter turn would not fit back.
         Ok(Some(if tile.width() == tile.height() || laid.quarters.is_multiple_of(2) { laid.undo(&tile) } else { tile }))
     }
@@ -216,13 +216,13 @@ impl Pictures {
             let sizes = [raw.size(), untouched.size()];
             let color = ColorTouch::from_images(raw, untouched);
             touch.set(color_id, color.ok_or_else(|| LoadError::Sizes { file: touched.to_owned(), sizes })?);
-            // The model's metres are its own; only a bubble picture has none.
+            // The model's meters are its own; only a bubble picture has none.
             scale = Scale::Measured;
         } else if let Some((difference, turn)) = self.difference(id)? {
             laid = turn;
             let path = self.file(id, GELSLIM)?.unwrap_or(Path::new(""));
             if difference.as_slice().iter().all(|p| *p == [0.0; 3]) {
-                notes.push(problem(path, "the picture is a single colour", "check that the right picture was saved"));
+                notes.push(problem(path, "the picture is a single color", "check that the right picture was saved"));
             }
             touch.set(color_id, ColorTouch { images: None, difference });
         }
@@ -237,7 +237,7 @@ impl Pictures {
                 ));
             }
             if tile.as_slice().windows(2).all(|v| v[0] == v[1]) {
-                notes.push(problem(path, "the picture is a single grey", "check that the right picture was saved"));
+                notes.push(problem(path, "the picture is a single gray", "check that the right picture was saved"));
             }
             let imprint = imprint_from_tile(&tile, &self.rig);
             touch.set(depth_id, DepthTouch { imprint, camera: None, truth: None });
@@ -249,18 +249,18 @@ impl Pictures {
     }
 }
 
-/// A bubble picture (0..255) on its own pixels, in the assumed metres.
-pub fn assumed_metres(tile: &Grid<f32>) -> DepthMap {
+/// A bubble picture (0..255) on its own pixels, in the assumed meters.
+pub fn assumed_meters(tile: &Grid<f32>) -> DepthMap {
     let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
     tile.map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32)
 }
 
-/// Assumed metres, turned back to how the depth sensor's picture lies, at its size.
+/// Assumed meters, turned back to how the depth sensor's picture lies, at its size.
 pub(super) fn imprint_from_tile(tile: &Grid<f32>, rig: &Rig) -> DepthMap {
     let sensor = rig.depth().unwrap_or(&lab::BUBBLE);
     let turned = if sensor.rotation_deg == 180 { tile.rotated_180() } else { tile.clone() };
     // The lab made these pictures with torchvision's resize, so they are undone with the same one.
-    resample::bilinear(&assumed_metres(&turned), sensor.width, sensor.height)
+    resample::bilinear(&assumed_meters(&turned), sensor.width, sensor.height)
 }
 
 /// The most frequent level of a channel.
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn grey_is_no_difference() {
+    fn gray_is_no_difference() {
         let mut tile = Grid::filled(20, 20, [120.0; 3]);
         tile[(3, 4)] = [220.0, 120.0, 20.0];
         let difference = difference_from_tile(&tile);

@@ -18,10 +18,10 @@ const DEPTH_RANGE_M: [f64; 2] = [0.02, 0.5];
 const FOCAL_RANGE_PX: [f64; 2] = [20.0, 1000.0];
 /// Where a camera's principal point lies, as a share of the image's sides: near the middle. Numbers of an image scaled
 /// by a half or by two are out of it.
-const CENTRE_RANGE: [f64; 2] = [0.3, 0.7];
+const CENTER_RANGE: [f64; 2] = [0.3, 0.7];
 /// Pixels are square, but for the calibration's errors.
 const MAX_ASPECT: f64 = 1.25;
-/// Frames that are known less well than this are worth a note: the registration is good to tenths of a millimetre.
+/// Frames that are known less well than this are worth a note: the registration is good to tenths of a millimeter.
 const MAX_ROUNDING_M: f64 = 2e-5;
 /// The tool lies in the grasp frame's origin: what the middle of the image sees cannot be further away.
 const NEAR_GRASP_M: f64 = 0.1;
@@ -115,7 +115,7 @@ fn sample(sample: &Sample, file: &Path, problems: &mut Vec<Problem>) {
         }
         let offset = pose.y_m.abs().max(pose.z_m.abs());
         if offset > MAX_OFFSET_M {
-            add(format!("the grasp is {offset} m away from the tool: millimetres?"), "store x and y in metres");
+            add(format!("the grasp is {offset} m away from the tool: millimeters?"), "store x and y in meters");
         }
     }
 }
@@ -132,7 +132,7 @@ fn imprint(imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
         let at = sizes.len() * 9 / 10;
         let (_, typical, _) = sizes.select_nth_unstable_by(at, f64::total_cmp);
         let (what, hint) = if *typical > MAX_IMPRINT_M {
-            ("not metres; millimetres?", "store imprints in metres")
+            ("not meters; millimeters?", "store imprints in meters")
         } else {
             ("single pixels are far off", "they are flying pixels of the depth camera; a median filter removes them")
         };
@@ -145,10 +145,10 @@ fn imprint(imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
 fn camera(camera: &DepthCamera, imprint: &DepthMap, name: &str, add: &mut impl FnMut(String, &str)) {
     let k = camera.intrinsics;
     let focal_ok = |f: f64| (FOCAL_RANGE_PX[0]..=FOCAL_RANGE_PX[1]).contains(&f);
-    let inside = |c: f64, size: usize| (CENTRE_RANGE[0]..=CENTRE_RANGE[1]).contains(&(c / size as f64));
-    let centre_ok = inside(k.cx, camera.crop.full[0]) && inside(k.cy, camera.crop.full[1]);
+    let inside = |c: f64, size: usize| (CENTER_RANGE[0]..=CENTER_RANGE[1]).contains(&(c / size as f64));
+    let center_ok = inside(k.cx, camera.crop.full[0]) && inside(k.cy, camera.crop.full[1]);
     let square = (k.fx / k.fy).max(k.fy / k.fx) <= MAX_ASPECT;
-    if !(focal_ok(k.fx) && focal_ok(k.fy) && centre_ok && square) {
+    if !(focal_ok(k.fx) && focal_ok(k.fy) && center_ok && square) {
         add(
             format!("the {name} camera's K is implausible: fx {} fy {} cx {} cy {}", k.fx, k.fy, k.cx, k.cy),
             "K belongs to the full 224 x 171 image, in pixels, row by row",
@@ -162,10 +162,10 @@ fn camera(camera: &DepthCamera, imprint: &DepthMap, name: &str, add: &mut impl F
     let middle = depths.len() / 2;
     let (_, &mut typical, _) = depths.select_nth_unstable_by(middle, f64::total_cmp);
     if !(DEPTH_RANGE_M[0]..=DEPTH_RANGE_M[1]).contains(&typical) {
-        let unit = if typical > 10.0 { ": millimetres?" } else { "" };
+        let unit = if typical > 10.0 { ": millimeters?" } else { "" };
         return add(
             format!("the {name} reference depth is typically {typical:.4} m, out of the bubble's range{unit}"),
-            "store depths in metres",
+            "store depths in meters",
         );
     }
     // What the middle of the crop sees is the membrane, and that is near the tool.
@@ -177,7 +177,7 @@ fn camera(camera: &DepthCamera, imprint: &DepthMap, name: &str, add: &mut impl F
         let what = if w_first { "the quaternions may be stored as w x y z" } else { "check frames and units" };
         add(
             format!("the {name} camera looks past the grasp by {distance:.3} m: {what}"),
-            "bubbles_tr_quat and grasp_frame_quat are x y z qx qy qz qw in the arm's base frame, metres",
+            "bubbles_tr_quat and grasp_frame_quat are x y z qx qy qz qw in the arm's base frame, meters",
         );
     }
     round_trip(camera, imprint, name, add);

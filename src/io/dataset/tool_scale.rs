@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::problem;
 use crate::domain::dataset::Problem;
 use crate::domain::mesh::TriMesh;
-use crate::domain::units::{is_tool_length, scale_to_metres};
+use crate::domain::units::{is_tool_length, scale_to_meters};
 use crate::io::files;
 use crate::io::stl::{self, MeshError};
 
@@ -18,22 +18,22 @@ const MAX_UNIT_BYTES: u64 = 4096;
 /// What the numbers of a CAD file mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ToolScale {
-    /// Metres; a model that is too large or too small for that is an error.
+    /// Meters; a model that is too large or too small for that is an error.
     #[default]
-    Metres,
+    Meters,
     /// The unit that makes the model as large as a hand-held tool.
     Auto,
-    /// To be multiplied by this to get metres.
+    /// To be multiplied by this to get meters.
     Factor(f64),
 }
 
 impl FromStr for ToolScale {
     type Err = String;
 
-    /// `m`, `cm`, `mm`, `um`, `in`, `auto`, or the factor to metres.
+    /// `m`, `cm`, `mm`, `um`, `in`, `auto`, or the factor to meters.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         Ok(match text.trim() {
-            "m" => Self::Metres,
+            "m" => Self::Meters,
             "auto" => Self::Auto,
             "cm" => Self::Factor(1e-2),
             "mm" => Self::Factor(1e-3),
@@ -43,7 +43,7 @@ impl FromStr for ToolScale {
                 Ok(factor) if factor.is_finite() && factor > 0.0 => Self::Factor(factor),
                 _ => {
                     return Err(format!(
-                        "{:?} is no unit: use m, cm, mm, um, in, auto or a factor to metres",
+                        "{:?} is no unit: use m, cm, mm, um, in, auto or a factor to meters",
                         files::clip(other)
                     ));
                 }
@@ -67,17 +67,17 @@ impl ToolScale {
 /// A CAD model that can be worked with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToolFile {
-    /// The model in metres.
+    /// The model in meters.
     pub mesh: TriMesh,
     /// What is odd about its file.
     pub notes: Vec<Problem>,
 }
 
-/// Reads a CAD model and brings it to metres: by `scale`, else as [`UNIT_FILE`] beside it says, else as it is. The one
+/// Reads a CAD model and brings it to meters: by `scale`, else as [`UNIT_FILE`] beside it says, else as it is. The one
 /// verdict on CAD files, for the doctor and for whoever uses them.
 ///
 /// # Errors
-/// [`MeshError`]; [`MeshError::Unit`], with the factor that would fit, if the model cannot be in metres, and
+/// [`MeshError`]; [`MeshError::Unit`], with the factor that would fit, if the model cannot be in meters, and
 /// [`MeshError::NotATool`] if no unit makes it a tool, or not the one that was named.
 pub fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, MeshError> {
     let (scale, said_by) = match scale {
@@ -86,18 +86,18 @@ pub fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, Mesh
     };
     let stl::StlFile { mut mesh, degenerate, .. } = stl::read(path)?;
     let size = mesh.bounds().map_or(0.0, |[lo, hi]| (hi - lo).max_element());
-    let fitting = scale_to_metres(size);
+    let fitting = scale_to_meters(size);
     let not_a_tool = |unit: String| MeshError::NotATool { file: path.to_owned(), size, unit };
     let factor = match (scale, fitting) {
         (ToolScale::Factor(factor), _) if is_tool_length(size * factor) => factor,
         (ToolScale::Factor(factor), fitting) => {
             let instead = fitting.map_or(String::new(), |fitting| format!("; {fitting} would fit"));
-            return Err(not_a_tool(format!("with the factor {factor} to metres that {said_by} gives{instead}")));
+            return Err(not_a_tool(format!("with the factor {factor} to meters that {said_by} gives{instead}")));
         }
         (ToolScale::Auto, Some(factor)) => factor,
-        (ToolScale::Metres, Some(1.0)) => 1.0,
-        (ToolScale::Metres, Some(offered)) => return Err(MeshError::Unit { file: path.to_owned(), size, offered }),
-        (ToolScale::Metres | ToolScale::Auto, None) => return Err(not_a_tool("in metres or any other unit".into())),
+        (ToolScale::Meters, Some(1.0)) => 1.0,
+        (ToolScale::Meters, Some(offered)) => return Err(MeshError::Unit { file: path.to_owned(), size, offered }),
+        (ToolScale::Meters | ToolScale::Auto, None) => return Err(not_a_tool("in meters or any other unit".into())),
     };
     if factor != 1.0 {
         for vertex in &mut mesh.vertices {
@@ -118,7 +118,7 @@ pub fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, Mesh
 ///
 /// # Errors
 /// As [`read_tool`].
-pub fn read_in_metres(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, MeshError> {
+pub fn read_in_meters(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, MeshError> {
     read_tool(path, scale).map(|file| file.mesh)
 }
 
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use glam::DVec3;
 
-    /// A 40 x 20 x 10 box, in units of `unit` metres.
+    /// A 40 x 20 x 10 box, in units of `unit` meters.
     fn write(path: &Path, unit: f64) {
         let size = DVec3::new(0.01, 0.02, 0.04) / unit;
         let vertices = (0..8).map(|i| DVec3::new((i & 1).into(), (i >> 1 & 1).into(), (i >> 2 & 1).into()) * size);
@@ -147,21 +147,21 @@ mod tests {
         for (unit, name) in [(1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "um"), (0.0254, "in")] {
             write(&path, unit);
             let scale: ToolScale = name.parse().unwrap();
-            assert!((length(&read_in_metres(&path, Some(scale)).unwrap()) - 0.04).abs() < 1e-8, "{name}");
+            assert!((length(&read_in_meters(&path, Some(scale)).unwrap()) - 0.04).abs() < 1e-8, "{name}");
         }
         for unit in [1e-3, 1e-6] {
             write(&path, unit);
-            let error = read_in_metres(&path, None).unwrap_err();
+            let error = read_in_meters(&path, None).unwrap_err();
             assert!(matches!(error, MeshError::Unit { offered, .. } if (offered - unit).abs() < 1e-12), "{error}");
             assert!(error.to_string().contains("t.stl") && error.hint().contains("--tool-scale auto"));
-            assert!((length(&read_in_metres(&path, Some(ToolScale::Auto)).unwrap()) - 0.04).abs() < 1e-8);
+            assert!((length(&read_in_meters(&path, Some(ToolScale::Auto)).unwrap()) - 0.04).abs() < 1e-8);
         }
         // Beside the models it holds for the studio as well; the caller's word counts more.
         std::fs::write(dir.path().join(UNIT_FILE), "auto\n").unwrap();
-        assert!((length(&read_in_metres(&path, None).unwrap()) - 0.04).abs() < 1e-8);
-        assert!(read_in_metres(&path, Some(ToolScale::Metres)).is_err());
+        assert!((length(&read_in_meters(&path, None).unwrap()) - 0.04).abs() < 1e-8);
+        assert!(read_in_meters(&path, Some(ToolScale::Meters)).is_err());
         std::fs::write(dir.path().join(UNIT_FILE), "furlong").unwrap();
-        let error = read_in_metres(&path, None).unwrap_err();
+        let error = read_in_meters(&path, None).unwrap_err();
         assert!(error.to_string().contains("furlong") && error.file().ends_with(UNIT_FILE), "{error}");
     }
 
@@ -172,13 +172,13 @@ mod tests {
         // Too large or too small in every unit.
         for unit in [1e-30, 1e20] {
             write(&path, unit);
-            for scale in [None, Some(ToolScale::Auto), Some(ToolScale::Metres), Some(ToolScale::Factor(1.0))] {
+            for scale in [None, Some(ToolScale::Auto), Some(ToolScale::Meters), Some(ToolScale::Factor(1.0))] {
                 let error = read_tool(&path, scale).unwrap_err();
                 assert!(matches!(error, MeshError::NotATool { .. }) && error.to_string().contains("t.stl"), "{error}");
                 assert!(error.to_string().len() < 200 + path.as_os_str().len(), "{error}");
             }
         }
-        // A model in millimetres: the right unit in the file is right, a wrong one is not taken.
+        // A model in millimeters: the right unit in the file is right, a wrong one is not taken.
         write(&path, 1e-3);
         let unit_file = dir.path().join(UNIT_FILE);
         for right in ["mm", "auto", "0.001"] {

@@ -17,7 +17,7 @@ pub struct CheckReport {
 }
 
 /// Reads a training folder with the loader's rules: in every part, each file in `imgs` has exactly one file of the
-/// same stem in `masks` and the other way round, no other entries, 8-bit grey, same size, masks of 0 and 255.
+/// same stem in `masks` and the other way round, no other entries, 8-bit gray, same size, masks of 0 and 255.
 pub fn check_folder(folder: &Path) -> CheckReport {
     let mut report = CheckReport::default();
     for (part, name) in PARTS.iter().enumerate() {
@@ -80,11 +80,11 @@ fn pair(image_path: &Path, mask_path: &Path, problems: &mut Vec<Problem>) {
     let mut add = |file: &Path, what: String| {
         problems.push(Problem { file: file.to_owned(), what, hint: "export the masks again".into() });
     };
-    let image = match images::read_grey8(image_path) {
+    let image = match images::read_gray8(image_path) {
         Ok(image) => image,
         Err(err) => return add(image_path, err.to_string()),
     };
-    let mask = match images::read_grey8(mask_path) {
+    let mask = match images::read_gray8(mask_path) {
         Ok(mask) => mask,
         Err(err) => return add(mask_path, err.to_string()),
     };

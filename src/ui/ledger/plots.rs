@@ -39,7 +39,7 @@ pub(super) fn histogram(painter: &Painter, area: Rect, of: &Histogram, scale: f6
     }
 }
 
-/// Counts as colours, prediction upwards; where there is no pixel, the background.
+/// Counts as colors, prediction upwards; where there is no pixel, the background.
 pub(super) fn joint_image(counts: &Grid<u32>, background: Color32) -> ColorImage {
     let most = counts.as_slice().iter().copied().max().unwrap_or(0).max(1) as f32;
     let pixel = |count: &u32| {
@@ -54,7 +54,7 @@ pub(super) fn joint_image(counts: &Grid<u32>, background: Color32) -> ColorImage
     ColorImage::new(upwards.size(), upwards.as_slice().iter().map(pixel).collect())
 }
 
-/// The joint histogram with the diagonal, the line, and axes in millimetres.
+/// The joint histogram with the diagonal, the line, and axes in millimeters.
 pub(super) fn joint(ui: &Ui, area: Rect, picture: TextureId, of: &Joint, p: &Palette) {
     let painter = ui.painter_at(area);
     let side = (area.height() - 26.0).min(area.width() - 40.0);
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_picture_has_predictions_upwards_and_no_colour_where_nothing_is() {
+    fn the_picture_has_predictions_upwards_and_no_color_where_nothing_is() {
         let counts = Grid::from_vec(2, 2, vec![5, 0, 0, 0]).unwrap();
         let image = joint_image(&counts, Color32::BLACK);
         assert_ne!(image.pixels[2], Color32::BLACK, "small truth, small prediction: bottom left");

@@ -69,7 +69,7 @@ fn clouds(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
         for (finger, parts) in cloud.fingers.entries() {
             // The membrane recedes, the contact stands out.
             let rest = theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
-            let looks = [(PointSize::Px(1.2), rest, "membrane"), (PointSize::Metres(0.000_3), CONTACT, "contact")];
+            let looks = [(PointSize::Px(1.2), rest, "membrane"), (PointSize::Meters(0.000_3), CONTACT, "contact")];
             for (part, (size, color, name)) in parts.iter().zip(looks) {
                 let mut item = CloudItem {
                     name: format!("{name} {}", cx.state.finger_name(finger)),
@@ -90,7 +90,7 @@ fn clouds(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
     }
 }
 
-/// The contact points of the other side, in its colour, where both are shown in one view.
+/// The contact points of the other side, in its color, where both are shown in one view.
 fn other_cloud(cx: &Cx<'_>, other: ImprintSource, scene: &mut SceneData) {
     let Some(cloud) = &cx.local.scene_clouds[other as usize] else { return };
     // What is of another pair is no comparison.
@@ -105,7 +105,7 @@ fn other_cloud(cx: &Cx<'_>, other: ImprintSource, scene: &mut SceneData) {
             colors: PointColors::One,
             style: CloudStyle {
                 color: rgb(side_color(cx.p, other)),
-                size: PointSize::Metres(0.000_3),
+                size: PointSize::Meters(0.000_3),
                 ..CloudStyle::default()
             },
         });
@@ -178,7 +178,7 @@ fn meshes(cx: &Cx<'_>, source: ImprintSource, seconds: f64, scene: &mut SceneDat
             }
             (None, Some(registered)) => {
                 let pose = layers::swayed(cx, source, registered, seconds);
-                // Coloured points are what is looked at: the model lets them through.
+                // Colored points are what is looked at: the model lets them through.
                 let colored = cx.local.layer_colors[source as usize].is_some();
                 show("CAD", pose.to_affine(), cx.p.cad, if colored { Look::XRay } else { Look::Solid });
             }
@@ -218,7 +218,7 @@ fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
     });
 }
 
-/// Length of the drawn axes, metres.
+/// Length of the drawn axes, meters.
 pub(super) const AXIS: f64 = 0.01;
 
 /// A corner of the floor grid: in the middle the axes would hide the contact.
@@ -226,7 +226,7 @@ pub(super) fn axes_origin() -> DVec3 {
     DVec3::new(-0.05, -0.05, FLOOR)
 }
 
-/// Height of the floor grid, metres along +z (down).
+/// Height of the floor grid, meters along +z (down).
 const FLOOR: f64 = 0.045;
 
 fn grid(p: &Palette) -> Vec<Segment> {

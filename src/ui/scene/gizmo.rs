@@ -87,7 +87,7 @@ fn radius(axis: HandAxis) -> f64 {
 
 /// Handles on the screen.
 struct Placed {
-    centre: Pos2,
+    center: Pos2,
     arm: Option<Pos2>,
     rings: Vec<(HandAxis, Vec<Pos2>)>,
 }
@@ -96,8 +96,8 @@ fn origin(pose: HandPose) -> DVec3 {
     DVec3::new(pose.x_m, pose.planar.y_m, pose.planar.z_m)
 }
 
-/// Metres that are as long as `points` on the screen at the handles.
-fn metres(camera: &Camera, output: &SceneOutput, ppp: f32, at: DVec3, points: f64) -> f64 {
+/// Meters that are as long as `points` on the screen at the handles.
+fn meters(camera: &Camera, output: &SceneOutput, ppp: f32, at: DVec3, points: f64) -> f64 {
     let depth = (camera.eye() - at).dot(camera.axes()[2]);
     let scale = if camera.orthographic { 1.0 } else { depth / camera.distance };
     points * f64::from(ppp) * scale.max(1e-3) / camera.px_per_m(output.size)
@@ -105,12 +105,12 @@ fn metres(camera: &Camera, output: &SceneOutput, ppp: f32, at: DVec3, points: f6
 
 fn place(camera: &Camera, output: &SceneOutput, ppp: f32, pose: HandPose, six_dof: bool) -> Option<Placed> {
     let at = origin(pose);
-    let centre = output.on_screen(camera, at)?;
-    let metre = |points: f64| metres(camera, output, ppp, at, points);
+    let center = output.on_screen(camera, at)?;
+    let meter = |points: f64| meters(camera, output, ppp, at, points);
     let axes: &[HandAxis] =
         if six_dof { &[HandAxis::Theta, HandAxis::Pitch, HandAxis::Yaw] } else { &[HandAxis::Theta] };
     let rings = axes.iter().map(|&axis| {
-        let (n, r) = (normal(axis), metre(radius(axis)));
+        let (n, r) = (normal(axis), meter(radius(axis)));
         let (u, v) = n.any_orthonormal_pair();
         let rim = (0..=64).filter_map(|i| {
             let (s, c) = (f64::from(i) / 64.0 * std::f64::consts::TAU).sin_cos();
@@ -118,12 +118,12 @@ fn place(camera: &Camera, output: &SceneOutput, ppp: f32, pose: HandPose, six_do
         });
         (axis, rim.collect())
     });
-    let arm = six_dof.then(|| output.on_screen(camera, at + DVec3::X * metre(ARM))).flatten();
-    Some(Placed { centre, arm, rings: rings.collect() })
+    let arm = six_dof.then(|| output.on_screen(camera, at + DVec3::X * meter(ARM))).flatten();
+    Some(Placed { center, arm, rings: rings.collect() })
 }
 
 fn under(placed: &Placed, pointer: Pos2) -> Option<Handle> {
-    if pointer.distance(placed.centre) <= DISC + 3.0 {
+    if pointer.distance(placed.center) <= DISC + 3.0 {
         return Some(Handle::Disc);
     }
     if placed.arm.is_some_and(|arm| pointer.distance(arm) <= NEAR) {
@@ -151,7 +151,7 @@ fn dragged(camera: &Camera, size: [u32; 2], from: HandPose, handle: Handle, bega
         let ray = camera.ray(px, size);
         (ray.direction.dot(n).abs() > EDGE_ON).then(|| ray.meets_plane(at, n)).flatten()
     };
-    // The motion in the plane of the screen through the tool, metres.
+    // The motion in the plane of the screen through the tool, meters.
     let on_screen = {
         let [right, up, back] = camera.axes();
         let depth = (camera.eye() - at).dot(back);
@@ -260,14 +260,14 @@ fn paint(cx: &Cx<'_>, ui: &Ui, output: &SceneOutput, placed: &Placed, active: Op
         painter.add(Shape::line(rim.clone(), stroke(Handle::Ring(*axis), which)));
     }
     if let Some(arm) = placed.arm {
-        painter.line_segment([placed.centre, arm], stroke(Handle::Arm, 0));
+        painter.line_segment([placed.center, arm], stroke(Handle::Arm, 0));
         painter.circle(arm, 6.0, color(0), stroke(Handle::Arm, 0));
     }
     let on = active == Some(Handle::Disc);
     let fill = if on { cx.p.strong } else { cx.p.accent };
-    painter.circle(placed.centre, DISC, fill.gamma_multiply(0.85), Stroke::new(1.5, cx.p.canvas));
+    painter.circle(placed.center, DISC, fill.gamma_multiply(0.85), Stroke::new(1.5, cx.p.canvas));
     for arm in [vec2(1.0, 0.0), vec2(0.0, 1.0)] {
-        painter.line_segment([placed.centre - arm * 5.0, placed.centre + arm * 5.0], Stroke::new(1.5, cx.p.canvas));
+        painter.line_segment([placed.center - arm * 5.0, placed.center + arm * 5.0], Stroke::new(1.5, cx.p.canvas));
     }
 }
 

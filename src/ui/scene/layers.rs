@@ -1,4 +1,4 @@
-//! Layers in a 3D view: what colours the contact points, the ellipse of the weak motion, and the tool swaying along it.
+//! Layers in a 3D view: what colors the contact points, the ellipse of the weak motion, and the tool swaying along it.
 
 use std::sync::Arc;
 
@@ -18,14 +18,14 @@ use crate::gpu::points::{CloudItem, PointColors, PointSize};
 use crate::ui::cx::Cx;
 use crate::ui::layers::{RESIDUAL_MAP, reason_rgb};
 
-/// Change of the contact distances (root mean square) that the drawn ellipse stands for, metres.
+/// Change of the contact distances (root mean square) that the drawn ellipse stands for, meters.
 pub(in crate::ui) const ELLIPSE_TOLERANCE_M: f64 = 5e-4;
-/// Longest half axis drawn, metres.
+/// Longest half axis drawn, meters.
 const ELLIPSE_LIMIT_M: f64 = 0.012;
 /// Time of one sway to and fro, seconds.
 const SWAY_S: f64 = 2.0;
 
-/// Colours of the contact points of one registration, made once.
+/// Colors of the contact points of one registration, made once.
 pub(in crate::ui) struct LayerColors {
     key: (PoseKey, Layer),
     revision: u64,
@@ -33,7 +33,7 @@ pub(in crate::ui) struct LayerColors {
     fingers: PerPad<PointColors>,
 }
 
-/// Makes the colours of a side's contact points, where a layer is on and its figures are there.
+/// Makes the colors of a side's contact points, where a layer is on and its figures are there.
 pub(super) fn update(cx: &mut Cx<'_>, source: ImprintSource) {
     let layer = cx.state.workbench.layer;
     let held = &mut cx.local.layer_colors[source as usize];
@@ -60,7 +60,7 @@ pub(super) fn update(cx: &mut Cx<'_>, source: ImprintSource) {
     });
 }
 
-/// Colours the contact points of one finger, if the layer is of this very cloud.
+/// Colors the contact points of one finger, if the layer is of this very cloud.
 pub(super) fn paint(cx: &Cx<'_>, source: ImprintSource, finger: PadId, item: &mut CloudItem) {
     let Some(colors) = &cx.local.layer_colors[source as usize] else { return };
     let same = cx.local.scene_clouds[source as usize].as_ref().is_some_and(|cloud| cloud.key == colors.key.0.cloud);
@@ -72,8 +72,8 @@ pub(super) fn paint(cx: &Cx<'_>, source: ImprintSource, finger: PadId, item: &mu
     item.revision = colors.revision;
     item.style.map = RESIDUAL_MAP;
     item.style.range = colors.range;
-    // Larger than uncoloured ones: a colour has to be told from the next.
-    item.style.size = PointSize::Metres(0.000_6);
+    // Larger than uncolored ones: a color has to be told from the next.
+    item.style.size = PointSize::Meters(0.000_6);
 }
 
 /// How well the registered pose of a side is determined.
@@ -97,13 +97,13 @@ pub(super) fn ellipse(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesItem> {
     let o = observability(cx, source).filter(|_| shown)?;
     let ellipse = o.ellipse(ELLIPSE_TOLERANCE_M, ELLIPSE_LIMIT_M);
     let color = if o.degenerate { cx.p.caution } else { cx.p.accent };
-    let bits = [o.centre.x, o.centre.y, o.eigenvalues[0], o.eigenvalues[2], o.weakest[0], o.weakest[1], o.weakest[2]];
+    let bits = [o.center.x, o.center.y, o.eigenvalues[0], o.eigenvalues[2], o.weakest[0], o.weakest[1], o.weakest[2]];
     let revision = bits.iter().fold(u64::from(color.r()), |hash, v| hash.rotate_left(9) ^ v.to_bits());
     let at = |yz: DVec2| DVec3::new(0.0, yz.x, yz.y);
     let mut segments = Vec::new();
     let rgba = |c: Color32, alpha: u8| [c.r(), c.g(), c.b(), alpha];
     let mut line = |a: DVec2, b: DVec2, alpha: u8| {
-        segments.push(Segment { ends: [at(o.centre + a), at(o.centre + b)], rgba: rgba(color, alpha) });
+        segments.push(Segment { ends: [at(o.center + a), at(o.center + b)], rgba: rgba(color, alpha) });
     };
     const SIDES: i32 = 48;
     let rim = |i: i32| {
@@ -115,7 +115,7 @@ pub(super) fn ellipse(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesItem> {
     }
     let [turn, y, z] = o.weakest;
     if turn.abs() > y.hypot(z) {
-        // It turns: an arc around the centre, as far as it may turn.
+        // It turns: an arc around the center, as far as it may turn.
         let reach = ellipse.turn_rad.min(1.2);
         for i in -12..12 {
             let on = |i: i32| DVec2::from_angle(reach * f64::from(i) / 12.0) * 0.015;

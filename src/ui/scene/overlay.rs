@@ -158,7 +158,7 @@ pub(in crate::ui) fn angle_text(p: &Palette, pose: &PoseResult) -> (String, Colo
     }
 }
 
-/// The colour of an angle error.
+/// The color of an angle error.
 pub(in crate::ui) fn error_color(p: &Palette, error_rad: f64) -> Color32 {
     match error_rad.to_degrees() {
         e if e <= 5.0 => p.good,
@@ -210,7 +210,7 @@ fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output:
     painter.text(pos2(right - width * 0.5, y - 4.0), Align2::CENTER_BOTTOM, text, FontId::proportional(11.0), p.text);
 }
 
-/// The colours of residuals with their range, beside the scale bar.
+/// The colors of residuals with their range, beside the scale bar.
 fn residual_bar(cx: &Cx<'_>, painter: &egui::Painter, source: ImprintSource, rect: Rect) {
     let Some(layers) = cx.state.layers(source).ready() else { return };
     let bar = Rect::from_min_size(pos2(rect.right() - 132.0, rect.bottom() - 62.0), vec2(120.0, 9.0));
@@ -234,7 +234,7 @@ fn residual_bar(cx: &Cx<'_>, painter: &egui::Painter, source: ImprintSource, rec
     }
 }
 
-/// What the colours mean, and buttons for the sides.
+/// What the colors mean, and buttons for the sides.
 fn legend(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
     let p = cx.p;
     let painter = ui.painter_at(rect);

@@ -21,7 +21,7 @@ use crate::ui::widget::colorbar::gradient;
 
 /// Correspondences drawn at most: more hide each other.
 const MOST_LINES: usize = 300;
-/// The residual of the last colour, millimetres; larger ones have it too.
+/// The residual of the last color, millimeters; larger ones have it too.
 const RESIDUAL_MM: f32 = 4.0;
 /// Opacity of a correspondence that weighs nothing, and what full weight adds to it.
 const OPACITY: [f64; 2] = [0.2, 0.8];
@@ -36,7 +36,7 @@ pub(in crate::ui) struct StepLines {
     segments: Arc<[Segment]>,
     /// Correspondences shown, and contact points there are.
     shown: [usize; 2],
-    /// Median and largest residual of those shown, metres.
+    /// Median and largest residual of those shown, meters.
     residual_m: Option<[f64; 2]>,
 }
 
@@ -115,12 +115,12 @@ fn pins(cx: &Cx<'_>, source: ImprintSource) -> impl Iterator<Item = (usize, Plan
     pins.filter_map(move |(i, pin)| pin.filter(|p| p.source == source).map(|p| (i, p.grasp_from_object)))
 }
 
-/// Colours and names of the pins of a side, for the legend.
+/// Colors and names of the pins of a side, for the legend.
 pub(super) fn legend_entries(cx: &Cx<'_>, source: ImprintSource) -> Vec<(Color32, &'static str)> {
     pins(cx, source).map(|(i, _)| (cx.p.pins[i], ["CAD, pin A", "CAD, pin B"][i])).collect()
 }
 
-/// The colour of a residual. The end of the map that would vanish before the background is left out.
+/// The color of a residual. The end of the map that would vanish before the background is left out.
 fn residual_color(p: &Palette, residual_m: f64) -> Color32 {
     color_at(p, units::mm(residual_m) as f32 / RESIDUAL_MM)
 }
@@ -131,7 +131,7 @@ fn color_at(p: &Palette, share: f32) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 
-/// What the colours of the lines mean, and how many there are.
+/// What the colors of the lines mean, and how many there are.
 pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, rect: Rect) {
     let Some(lines) = lines(cx, source) else { return };
     let painter = ui.painter_at(rect);

@@ -23,7 +23,7 @@ struct Plot<'a> {
     share: Rect,
     /// Steps of the longest run, at least 2.
     steps: usize,
-    /// The top of the cost's axis, millimetres.
+    /// The top of the cost's axis, millimeters.
     top_mm: f64,
 }
 

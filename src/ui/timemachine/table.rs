@@ -24,7 +24,7 @@ fn column(pose: PlanarPose, cost_m2: Option<f64>) -> Column {
     [Some(lab), Some(units::mm(pose.y_m)), Some(units::mm(pose.z_m)), cost_m2.map(root_mm)]
 }
 
-/// The root of a cost per point, millimetres.
+/// The root of a cost per point, millimeters.
 pub(super) fn root_mm(cost_m2: f64) -> f64 {
     units::mm(cost_m2.max(0.0).sqrt())
 }

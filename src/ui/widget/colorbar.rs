@@ -1,4 +1,4 @@
-//! The bar that says which colour is which value: numbers, unit, histogram, and a range that can be changed.
+//! The bar that says which color is which value: numbers, unit, histogram, and a range that can be changed.
 
 use eframe::egui::{
     self, Align2, Color32, FontId, Mesh, Painter, PointerButton, Rect, Role, Sense, Shape, Stroke, Ui, WidgetInfo,
@@ -16,17 +16,17 @@ const END: f32 = 42.0;
 /// From this width on the buttons stand beside the bar instead of in a menu, points.
 const WIDE: f32 = 340.0;
 
-/// A bar to be shown. Values are in millimetres.
+/// A bar to be shown. Values are in millimeters.
 pub struct Colorbar<'a> {
     /// The name for screen readers and tests, e.g. `Depth range`.
     pub label: &'a str,
-    /// The colours.
+    /// The colors.
     pub map: ColorMap,
     /// The range to fall back to on a double-click.
     pub default: Range,
     /// Both ends move together around zero.
     pub symmetric: bool,
-    /// Of the picture above, in metres.
+    /// Of the picture above, in meters.
     pub histogram: Option<&'a Histogram>,
     /// Whether the range stays when another sample is shown; `None` shows no lock.
     pub locked: Option<bool>,
@@ -37,7 +37,7 @@ pub struct Colorbar<'a> {
 /// What a person asked of the bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Asked {
-    /// This range, millimetres.
+    /// This range, millimeters.
     Range(Range),
     /// The range of what is shown, once.
     Auto,
@@ -59,7 +59,7 @@ fn ticks(range: Range, most: usize) -> Vec<f32> {
 }
 
 impl Colorbar<'_> {
-    /// Shows the bar over the width of `ui`; `range` is in millimetres.
+    /// Shows the bar over the width of `ui`; `range` is in millimeters.
     pub fn show(self, ui: &mut Ui, range: Range) -> Option<Asked> {
         let p = Palette::of(ui);
         let mut asked = None;
@@ -69,7 +69,7 @@ impl Colorbar<'_> {
                 let wide = ui.available_width() >= WIDE;
                 let mut edited = range;
                 let lo = end(ui, &mut edited.lo, &format!("{}, lower end", self.label));
-                // In a narrow pane the note stands on the picture alone: the colours need the room.
+                // In a narrow pane the note stands on the picture alone: the colors need the room.
                 let noted = wide && !self.note.is_empty();
                 let note = if noted { 80.0 } else { 0.0 };
                 let buttons = match (wide, self.locked.is_some()) {
@@ -85,7 +85,7 @@ impl Colorbar<'_> {
                 ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
                 if noted {
                     ui.add(egui::Label::new(egui::RichText::new(self.note).size(SMALL).color(p.caution)))
-                        .on_hover_text("The source lost its scale: the range in millimetres is an assumption");
+                        .on_hover_text("The source lost its scale: the range in millimeters is an assumption");
                 }
                 if wide {
                     asked = self.buttons(ui).or(asked);
@@ -126,7 +126,7 @@ impl Colorbar<'_> {
             let text = egui::RichText::new("Lock").size(SMALL);
             let lock = ui.add(egui::Button::selectable(locked, text).min_size(vec2(32.0, 18.0)));
             let lock = lock.accessible_name(format!("{}: lock", self.label));
-            let tip = "Locked: colours mean the same in every sample. Unlocked: set from each sample shown (O)";
+            let tip = "Locked: colors mean the same in every sample. Unlocked: set from each sample shown (O)";
             if lock.on_hover_text(tip).clicked() {
                 asked = Some(Asked::Lock(!locked));
             }
@@ -134,7 +134,7 @@ impl Colorbar<'_> {
         asked
     }
 
-    /// The colours with histogram and ticks; dragging a half moves its end, a double-click resets.
+    /// The colors with histogram and ticks; dragging a half moves its end, a double-click resets.
     fn gradient(&self, ui: &mut Ui, width: f32, range: Range, p: &Palette) -> Option<Range> {
         let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT - 4.0), Sense::click_and_drag());
         let info = format!("{} {:.2} to {:.2} mm", self.label, range.lo, range.hi);
@@ -196,7 +196,7 @@ fn paint_histogram(painter: &egui::Painter, histogram: &Histogram, range: Range,
     let bins = histogram.counts.len() as f32;
     let span = histogram.span.hi - histogram.span.lo;
     for (i, n) in histogram.counts.iter().enumerate() {
-        // Histograms are of metres, the bar is in millimetres.
+        // Histograms are of meters, the bar is in millimeters.
         let at = |k: f32| (histogram.span.lo + span * k / bins) * 1e3;
         let (a, b) = (at(i as f32), at(i as f32 + 1.0));
         if *n == 0 || b < range.lo || a > range.hi {
@@ -227,7 +227,7 @@ fn end_inner(ui: &mut Ui, value: &mut f32, label: &str) -> bool {
     response.on_hover_text(format!("{label}, mm: drag, or click and type")).changed()
 }
 
-/// Fills `bar` from left to right with the colours of 0 to 1, exact at `steps` + 1 places.
+/// Fills `bar` from left to right with the colors of 0 to 1, exact at `steps` + 1 places.
 pub(in crate::ui) fn gradient(painter: &Painter, bar: Rect, steps: u32, color: impl Fn(f32) -> Color32) {
     let mut mesh = Mesh::default();
     for i in 0..=steps {

@@ -9,14 +9,14 @@ use eframe::egui::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewTransform {
     /// The point of the image in the middle of the pane, as a share of its width and height.
-    pub centre: [f32; 2],
+    pub center: [f32; 2],
     /// Magnification; 1 fits the image to the pane.
     pub zoom: f32,
 }
 
 impl Default for ViewTransform {
     fn default() -> Self {
-        Self { centre: [0.5, 0.5], zoom: 1.0 }
+        Self { center: [0.5, 0.5], zoom: 1.0 }
     }
 }
 
@@ -24,13 +24,13 @@ impl ViewTransform {
     /// Keeps the image where it can be found again.
     fn clamp(&mut self) {
         self.zoom = if self.zoom.is_finite() { self.zoom.clamp(0.25, 64.0) } else { 1.0 };
-        for c in &mut self.centre {
+        for c in &mut self.center {
             *c = if c.is_finite() { c.clamp(-0.2, 1.2) } else { 0.5 };
         }
     }
 }
 
-/// Between image pixels and the screen. (0, 0) is the centre of the top-left pixel.
+/// Between image pixels and the screen. (0, 0) is the center of the top-left pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CanvasMap {
     /// Where the whole image lies on the screen.
@@ -49,7 +49,7 @@ impl CanvasMap {
         let image = vec2(size[0].max(1) as f32, size[1].max(1) as f32);
         let fit = (rect.width() / image.x).min(rect.height() / image.y).max(1e-3);
         let scale = fit * view.zoom;
-        let offset = vec2(view.centre[0] - 0.5, view.centre[1] - 0.5) * image * scale;
+        let offset = vec2(view.center[0] - 0.5, view.center[1] - 0.5) * image * scale;
         let image_rect = Rect::from_center_size(rect.center() - offset, image * scale);
         Self { image_rect, scale, rotated, size }
     }
@@ -129,7 +129,7 @@ impl ImageCanvas<'_> {
         if pan {
             let map = CanvasMap::new(rect, self.size, *view, self.rotated);
             let moved = response.drag_delta() / map.image_rect.size().max(Vec2::splat(1.0));
-            view.centre = [view.centre[0] - moved.x, view.centre[1] - moved.y];
+            view.center = [view.center[0] - moved.x, view.center[1] - moved.y];
         }
         if response.contains_pointer() {
             // Wheel, pinch and Ctrl + wheel all zoom at the pointer; Shift + wheel is the brush's.
@@ -145,7 +145,7 @@ impl ImageCanvas<'_> {
                 let after = CanvasMap::new(rect, self.size, *view, false);
                 let drift = after.image_rect.min + at * after.image_rect.size() - pos;
                 let drift = drift / after.image_rect.size().max(Vec2::splat(1.0));
-                view.centre = [view.centre[0] + drift.x, view.centre[1] + drift.y];
+                view.center = [view.center[0] + drift.x, view.center[1] + drift.y];
             }
             // Where the primary button paints, two quick dabs are no double-click.
             if self.primary == Primary::Pan && response.double_clicked() {
@@ -199,7 +199,7 @@ impl CanvasOutput {
         }
     }
 
-    /// Paints a dashed rectangle given by its centre and size in image pixels.
+    /// Paints a dashed rectangle given by its center and size in image pixels.
     pub fn dashed_rect(&self, [cx, cy, w, h]: [f64; 4], color: Color32) {
         let corner = |sx: f64, sy: f64| self.map.to_screen([(cx + sx * w * 0.5) as f32, (cy + sy * h * 0.5) as f32]);
         let path = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0)];
@@ -237,7 +237,7 @@ mod tests {
     fn pixels_survive_the_way_to_the_screen_and_back() {
         let rect = Rect::from_min_size(pos2(30.0, 20.0), vec2(300.0, 200.0));
         for rotated in [false, true] {
-            let view = ViewTransform { centre: [0.3, 0.8], zoom: 3.0 };
+            let view = ViewTransform { center: [0.3, 0.8], zoom: 3.0 };
             let map = CanvasMap::new(rect, [175, 140], view, rotated);
             for px in [[0.0, 0.0], [12.0, 99.5], [174.0, 139.0]] {
                 let back = map.to_image(map.to_screen(px));

@@ -141,7 +141,7 @@ fn hash(value: impl Hash) -> u64 {
     hasher.finish()
 }
 
-/// A depth map through a colour map.
+/// A depth map through a color map.
 pub fn depth_image(depth: &DepthMap, map: ColorMap, range: Range) -> ColorImage {
     let table = map.table();
     let nan = map.rgb8(f32::NAN);
@@ -153,14 +153,14 @@ pub fn depth_image(depth: &DepthMap, map: ColorMap, range: Range) -> ColorImage 
     ColorImage::new(depth.size(), depth.as_slice().iter().map(pixel).collect())
 }
 
-/// A colour image on the 0..255 scale. `centre` is added: 128 shows a signed difference around mid grey.
-pub fn rgb_image(image: &RgbGrid, gain: f32, centre: f32) -> ColorImage {
-    let byte = |v: f32| (v * gain + centre).round().clamp(0.0, 255.0) as u8;
+/// A color image on the 0..255 scale. `center` is added: 128 shows a signed difference around mid gray.
+pub fn rgb_image(image: &RgbGrid, gain: f32, center: f32) -> ColorImage {
+    let byte = |v: f32| (v * gain + center).round().clamp(0.0, 255.0) as u8;
     let pixel = |p: &[f32; 3]| Color32::from_rgb(byte(p[0]), byte(p[1]), byte(p[2]));
     ColorImage::new(image.size(), image.as_slice().iter().map(pixel).collect())
 }
 
-/// The gain that spreads a difference over the grey levels: 1 at the usual contrast, more for faint touches, and for
+/// The gain that spreads a difference over the gray levels: 1 at the usual contrast, more for faint touches, and for
 /// values on a 0..1 scale. 1 for an empty or constant image.
 pub fn difference_gain(image: &Grid<[f32; 3]>) -> f32 {
     let mut sizes: Vec<f32> =
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn nan_has_its_own_colour() {
+    fn nan_has_its_own_color() {
         let depth = DepthMap::from_vec(2, 1, vec![f32::NAN, 0.0]).unwrap();
         let image = depth_image(&depth, ColorMap::Viridis, Range { lo: 0.0, hi: 1.0 });
         assert_ne!(image.pixels[0], image.pixels[1]);

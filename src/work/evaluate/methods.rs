@@ -46,7 +46,7 @@ pub(super) struct GeneratorMethod {
 
 /// What a method makes of one touch.
 pub(super) struct Made {
-    /// Imprints in metres, raw orientation, by finger.
+    /// Imprints in meters, raw orientation, by finger.
     pub(super) imprints: PerPad<DepthMap>,
     /// Differences of a color sensor, 0..255 scale, by finger.
     pub(super) colors: PerPad<RgbGrid>,

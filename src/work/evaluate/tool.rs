@@ -218,7 +218,7 @@ impl Tool {
     }
 }
 
-/// The compared images of a grasp: in metres, or stretched to 0..1 where the scale was lost.
+/// The compared images of a grasp: in meters, or stretched to 0..1 where the scale was lost.
 fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
     let image = |finger: PadId| {
         if let Some(color) = made.colors.get(finger) {

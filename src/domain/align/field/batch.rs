@@ -29,7 +29,7 @@ pub(in crate::domain::align) struct Cloud {
 }
 
 impl Cloud {
-    /// From points about their centroid, metres.
+    /// From points about their centroid, meters.
     pub(in crate::domain::align) fn new(about_centroid: impl ExactSizeIterator<Item = DVec2>) -> Self {
         let len = about_centroid.len();
         let padded = len.next_multiple_of(LANES);
@@ -63,7 +63,7 @@ impl Cloud {
         self.len
     }
 
-    /// Greatest distance of a point from the centroid, metres.
+    /// Greatest distance of a point from the centroid, meters.
     pub(in crate::domain::align) fn radius(&self) -> f64 {
         let squared = self.y.iter().zip(&self.z).map(|(y, z)| y * y + z * z).fold(0f32, f32::max);
         f64::from(squared.sqrt()) * CELL_M
@@ -78,7 +78,7 @@ impl Cloud {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::domain::align) struct State {
     pub(in crate::domain::align) phi: f64,
-    /// Where the centroid lies in the object frame, metres.
+    /// Where the centroid lies in the object frame, meters.
     pub(in crate::domain::align) place: DVec2,
 }
 
@@ -110,15 +110,15 @@ pub(in crate::domain::align) struct Sums {
     /// Upper triangle of the weighted Gauss-Newton matrix for (angle times [`ANGLE_SCALE_M`], y, z):
     /// 00 01 02 11 12 22.
     pub(in crate::domain::align) h: [f64; 6],
-    /// Weighted slope of half the squared residuals, metres.
+    /// Weighted slope of half the squared residuals, meters.
     pub(in crate::domain::align) g: [f64; 3],
-    /// Geman-McClure cost, square metres.
+    /// Geman-McClure cost, square meters.
     pub(in crate::domain::align) cost: f64,
     /// Sum of the weights.
     pub(in crate::domain::align) weight: f64,
     /// Points within the kernel's width of the silhouette, or on it.
     pub(in crate::domain::align) inliers: usize,
-    /// Squared residuals of those, square metres.
+    /// Squared residuals of those, square meters.
     pub(in crate::domain::align) inlier_squares: f64,
 }
 
@@ -142,13 +142,13 @@ impl Motion {
 pub(in crate::domain::align) struct Moments {
     /// Points that tell.
     pub(in crate::domain::align) count: usize,
-    /// Sum of their arms about the centroid, metres.
+    /// Sum of their arms about the centroid, meters.
     pub(in crate::domain::align) arms: DVec2,
-    /// Sums of the products of (slope by the angle, metres; slope by y; slope by z): 00 01 02 11 12 22.
+    /// Sums of the products of (slope by the angle, meters; slope by y; slope by z): 00 01 02 11 12 22.
     pub(in crate::domain::align) products: [f64; 6],
 }
 
-/// What was read for the points of a step: arms about the centroid (cells), distance (metres), slope (metres per cell).
+/// What was read for the points of a step: arms about the centroid (cells), distance (meters), slope (meters per cell).
 struct Read {
     ay: [f32; LANES],
     az: [f32; LANES],
@@ -163,9 +163,9 @@ struct Read {
 /// The size of a box of states.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::domain::align) struct Extent {
-    /// Half widths: angle (radians), y, z (metres).
+    /// Half widths: angle (radians), y, z (meters).
     pub(in crate::domain::align) half: [f64; 3],
-    /// Farthest way of a point in it: metres, and metres for each metre from the centroid.
+    /// Farthest way of a point in it: meters, and meters for each meter from the centroid.
     pub(in crate::domain::align) shift: f64,
     pub(in crate::domain::align) turn: f64,
 }
@@ -175,17 +175,17 @@ impl Extent {
         Self { half, shift: half[1].hypot(half[2]), turn: 2.0 * (0.5 * half[0]).sin() }
     }
 
-    /// The farthest way of a point at most `radius` from the centroid, metres.
+    /// The farthest way of a point at most `radius` from the centroid, meters.
     pub(in crate::domain::align) fn way(&self, radius: f64) -> f64 {
         self.shift + self.turn * radius
     }
 }
 
 /// For each cell, between which values the slope of the field lies in a window around it: middle and half range by y
-/// and z, metres per cell.
+/// and z, meters per cell.
 pub(in crate::domain::align) struct Slopes {
     cells: Vec<[f32; 4]>,
-    /// How far the window reaches from anywhere in the cell, metres.
+    /// How far the window reaches from anywhere in the cell, meters.
     pub(in crate::domain::align) reach: f64,
 }
 
@@ -210,7 +210,7 @@ impl DistanceField {
         let mut g = [[0f32; LANES]; 3];
         let [mut cost, mut weight, mut inliers, mut squares] = [[0f32; LANES]; 4];
         let mut left = cloud.len;
-        // Neighbours in an image are neighbours here: often all of a step are on the silhouette.
+        // Neighbors in an image are neighbors here: often all of a step are on the silhouette.
         let mut whole_steps = 0;
         for (y, z) in cloud.chunks() {
             let Read { ay, az, mut r, gy, gz, .. } = self.read(&motion, y, z);
@@ -252,7 +252,7 @@ impl DistanceField {
             }
         }
         let total = |lanes: [f32; LANES]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
-        // Slopes were taken per cell: metres per cell to metres per metre, arms in cells to metres.
+        // Slopes were taken per cell: meters per cell to meters per meter, arms in cells to meters.
         let slope = [1.0 / ANGLE_SCALE_M, 1.0 / CELL_M, 1.0 / CELL_M];
         let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
         let fitting = cloud.resting + whole_steps * LANES;
@@ -268,7 +268,7 @@ impl DistanceField {
     }
 
     /// The part of the cloud that may come to lie outside the silhouette while no point moves farther than `margin`
-    /// (metres) from where `state` puts it. The other points rest.
+    /// (meters) from where `state` puts it. The other points rest.
     pub(in crate::domain::align) fn restless(&self, cloud: &Cloud, state: State, margin: f64) -> Cloud {
         let motion = Motion::new(self, state);
         let margin = -margin as f32;
@@ -297,7 +297,7 @@ impl DistanceField {
         kept
     }
 
-    /// Moments of the slopes of all points up to `reach` (metres) outside the silhouette.
+    /// Moments of the slopes of all points up to `reach` (meters) outside the silhouette.
     pub(in crate::domain::align) fn moments(&self, cloud: &Cloud, state: State, reach: f64) -> Moments {
         let motion = Motion::new(self, state);
         let reach = reach as f32;
@@ -341,7 +341,7 @@ impl DistanceField {
     }
 
     /// What the cloud costs at least anywhere in a box of states about `state`, and what it costs at `state` itself
-    /// (square metres).
+    /// (square meters).
     ///
     /// Without `slopes`: in the box a point moves by at most its way, its distance to the silhouette shrinks by no more
     /// than that (see [`widened`]), and the kernel grows with the distance. The sums stop at `enough`.
@@ -564,7 +564,7 @@ impl DistanceField {
     }
 }
 
-/// By how much (metres) the interpolated field can differ between two places `way` cells apart.
+/// By how much (meters) the interpolated field can differ between two places `way` cells apart.
 ///
 /// Interpolating is taking the mean over the four cells with weights that are a product of two two-valued
 /// distributions. Coupled monotonically, the weights of two places differ by `way` in the mean, with a variance of at

@@ -36,18 +36,18 @@ pub enum Kernel {
     None,
     /// Its square up to the width, then in proportion: far points still pull.
     Huber {
-        /// Metres.
+        /// Meters.
         width_m: f64,
     },
     /// At most the square of the width: far points let go.
     GemanMcClure {
-        /// Metres.
+        /// Meters.
         width_m: f64,
     },
 }
 
 impl Kernel {
-    /// Width, metres; infinite without one.
+    /// Width, meters; infinite without one.
     pub fn width_m(self) -> f64 {
         match self {
             Self::None => f64::INFINITY,
@@ -55,7 +55,7 @@ impl Kernel {
         }
     }
 
-    /// Cost, square metres.
+    /// Cost, square meters.
     pub(super) fn cost(self, r: f64) -> f64 {
         match self {
             Self::None => r * r,
@@ -89,7 +89,7 @@ pub enum Rejector {
     None,
     /// Those farther apart than this. They pay as if they were that far, so that running away does not pay.
     MaxDistance {
-        /// Metres.
+        /// Meters.
         distance_m: f64,
     },
     /// The worst, so that this share stays. Source: Chetverikov et al., The Trimmed ICP algorithm, 2002.

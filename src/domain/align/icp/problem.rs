@@ -21,8 +21,8 @@ use crate::domain::tool::ToolModel;
 /// streets; contacts tell most by where they end, which is along their surface, so that must keep a voice.
 const ACROSS: f64 = 0.1;
 /// Contacts whose spread gives a contact's normal.
-const NEIGHBOURS: NonZero<usize> = NonZero::new(20).expect("twenty is not zero");
-/// Distance below which a pair counts as an inlier in reports, metres.
+const NEIGHBORS: NonZero<usize> = NonZero::new(20).expect("twenty is not zero");
+/// Distance below which a pair counts as an inlier in reports, meters.
 pub(super) const INLIER_M: f64 = 1e-3;
 
 /// `object_from_grasp` about the contacts' centroid: `q = rotation (p - centroid) + place`.
@@ -71,7 +71,7 @@ impl State {
     }
 }
 
-/// How far a step moves points, metres.
+/// How far a step moves points, meters.
 fn size(step: &[f64; 6]) -> f64 {
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     norm(&step[..3]).max(norm(&step[3..]))
@@ -95,7 +95,7 @@ struct Pair {
 /// Sums over the pairs at one state.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
-    /// Per contact that counts, square metres.
+    /// Per contact that counts, square meters.
     pub(super) cost: f64,
     pub(super) weight: f64,
     pub(super) inliers: usize,
@@ -252,7 +252,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The state that the pairs of the last [`Self::look`] ask for, and how far away it is, metres. `None` if the
+    /// The state that the pairs of the last [`Self::look`] ask for, and how far away it is, meters. `None` if the
     /// pairs determine none with this much damping.
     pub(super) fn step(&self, state: State, damping: f64, anchor: State) -> Option<(State, f64)> {
         match self.config.solver {
@@ -342,7 +342,7 @@ impl<'a> Problem<'a> {
         Some(State { rotation: (turn * state.rotation).normalize(), place: model - turn * arm })
     }
 
-    /// Residual (metres), weight and fate of every contact at the last look.
+    /// Residual (meters), weight and fate of every contact at the last look.
     pub(super) fn outcome(&self, kernel: Kernel) -> impl Iterator<Item = (f64, f64, Fate)> + '_ {
         /// Kernel widths from which on a pull is negligible.
         const GATE: f64 = 3.0;
@@ -366,12 +366,12 @@ fn outer(n: DVec3) -> DMat3 {
 }
 
 /// Inverse of the sum of two surfaces' spreads, each 1 along the surface and [`ACROSS`] along its normal. Scaled so
-/// that the residual across two surfaces with the same normal is their distance: kernels stay in metres.
+/// that the residual across two surfaces with the same normal is their distance: kernels stay in meters.
 fn precision(a: DVec3, b: DVec3) -> DMat3 {
     2.0 * ACROSS * (2.0 * DMat3::IDENTITY - (1.0 - ACROSS) * (outer(a) + outer(b))).inverse()
 }
 
-/// The direction in which each point's neighbours in the cloud spread least.
+/// The direction in which each point's neighbors in the cloud spread least.
 fn normals(points: &[DVec3], cloud: &[DVec3]) -> Vec<DVec3> {
     let places: Vec<[f64; 3]> = cloud.iter().map(DVec3::to_array).collect();
     let Ok(tree) = ImmutableKdTree::<f64, 3>::new_from_slice(&places) else {
@@ -380,7 +380,7 @@ fn normals(points: &[DVec3], cloud: &[DVec3]) -> Vec<DVec3> {
     points
         .iter()
         .map(|p| {
-            let near = tree.query(&p.to_array()).nearest_n::<SquaredEuclidean<f64>>(NEIGHBOURS).execute();
+            let near = tree.query(&p.to_array()).nearest_n::<SquaredEuclidean<f64>>(NEIGHBORS).execute();
             let mean = near.iter().map(|n| cloud[n.item as usize]).sum::<DVec3>() / near.len().max(1) as f64;
             let spread: DMat3 = near.iter().map(|n| outer(cloud[n.item as usize] - mean)).sum();
             let found = eigen_symmetric(Matrix3::from(spread.to_cols_array_2d()));

@@ -13,7 +13,7 @@ enum Index {
     Space(Tree<3>),
 }
 
-/// Points with unit normals (zero where there is none), metres, object frame, under a k-d tree.
+/// Points with unit normals (zero where there is none), meters, object frame, under a k-d tree.
 #[derive(Clone, Debug)]
 pub struct Samples {
     points: Arc<[DVec3]>,
@@ -49,7 +49,7 @@ impl Samples {
         self.points.is_empty()
     }
 
-    /// A point, metres, object frame.
+    /// A point, meters, object frame.
     pub fn point(&self, item: u32) -> DVec3 {
         self.points[item as usize]
     }
@@ -59,12 +59,12 @@ impl Samples {
         self.normals[item as usize]
     }
 
-    /// The points, metres, object frame.
+    /// The points, meters, object frame.
     pub fn points(&self) -> &[DVec3] {
         &self.points
     }
 
-    /// The nearest point and how much farther the second nearest is, metres. `p` must be finite; the list not empty.
+    /// The nearest point and how much farther the second nearest is, meters. `p` must be finite; the list not empty.
     pub(in crate::domain::align) fn nearest(&self, p: DVec3) -> (u32, f64) {
         let Two { items, squared } = match &*self.index {
             Index::Plane(tree) => tree.two_nearest(&[p.y, p.z]),

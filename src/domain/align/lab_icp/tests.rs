@@ -16,17 +16,17 @@ struct TwinCase {
     name: String,
     wrong_frame: bool,
     rmse_choice: bool,
-    /// Nanometres.
+    /// Nanometers.
     model: Vec<[i64; 3]>,
     scene: Vec<[i64; 3]>,
     starts: Vec<[f64; 3]>,
     iterations: Vec<usize>,
-    /// By start, then by iteration: angle (radians), y, z (metres).
+    /// By start, then by iteration: angle (radians), y, z (meters).
     poses: Vec<Vec<[f64; 3]>>,
     winner: usize,
 }
 
-fn metres(points: &[[i64; 3]]) -> Vec<DVec3> {
+fn meters(points: &[[i64; 3]]) -> Vec<DVec3> {
     // Divided, as the twin's decimals are read: multiplying by 1e-9 would differ in the last digit.
     points.iter().map(|p| DVec3::from_array(p.map(|v| v as f64 / 1e9))).collect()
 }
@@ -48,9 +48,9 @@ fn equals_the_numpy_twin_in_every_iteration_with_and_without_traps() {
         let mut traps = vec![PaperTrap::FixedIterations];
         traps.extend(case.wrong_frame.then_some(PaperTrap::WrongFrame));
         traps.extend(case.rmse_choice.then_some(PaperTrap::RmseChoice));
-        let model = LabModel::new(&metres(&case.model));
+        let model = LabModel::new(&meters(&case.model));
         let config = LabIcpConfig { starts: starts.clone(), traps, record: true, ..LabIcpConfig::default() };
-        let report = lab_icp(&metres(&case.scene), &model, &config).unwrap();
+        let report = lab_icp(&meters(&case.scene), &model, &config).unwrap();
         for (run, poses) in case.poses.iter().enumerate() {
             assert_eq!(report.runs[run].requested, starts[run]);
             assert_near(&case.name, report.runs[run].start, poses[0]);
@@ -67,7 +67,7 @@ fn equals_the_numpy_twin_in_every_iteration_with_and_without_traps() {
             traps: config.traps.into_iter().filter(|t| *t != PaperTrap::FixedIterations).collect(),
             ..config
         };
-        let stopped = lab_icp(&metres(&case.scene), &model, &config).unwrap();
+        let stopped = lab_icp(&meters(&case.scene), &model, &config).unwrap();
         assert_eq!(stopped.grasp_from_object, report.grasp_from_object, "{}", case.name);
         assert!(stopped.converged && stopped.iterations < report.iterations);
     }

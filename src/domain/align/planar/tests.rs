@@ -58,7 +58,7 @@ proptest! {
         let config = AlignConfig { starts, ..AlignConfig::default() };
         let report = align(&moved, field(), &config).unwrap();
         let (angle, _) = errors(report.grasp_from_object, compose(motion, still.grasp_from_object));
-        // The look-ups are in f32: rounding may end a descent one step of some micrometres earlier.
+        // The look-ups are in f32: rounding may end a descent one step of some micrometers earlier.
         prop_assert!(angle < 0.02, "{angle} deg off after {motion:?}");
         // Where the tool's points end up, rather than the translation: that one is about a far origin.
         let corner = DVec2::new(0.01, 0.02);
@@ -134,7 +134,7 @@ fn a_disc_may_turn_and_says_so() {
         .collect();
     let report = align(&points, &field, &AlignConfig::default()).unwrap();
     assert!(report.is_degenerate());
-    assert_eq!(report.observability.unwrap().weakest_text(), "turns about its centre");
+    assert_eq!(report.observability.unwrap().weakest_text(), "turns about its center");
     let place = DVec2::new(report.grasp_from_object.y_m, report.grasp_from_object.z_m);
     assert!((place - DVec2::new(0.002, 0.001)).length() < 5e-4, "{place}");
 }
@@ -151,9 +151,9 @@ fn degenerate_sets_and_wrong_units_are_errors() {
     assert_eq!(align(&spot, field(), &config), Err(AlignError::Coincident { extent_m: 0.0 }));
     let away: Vec<DVec2> = points.iter().map(|p| *p + DVec2::new(0.2, 0.0)).collect();
     assert!(matches!(align(&away, field(), &config), Err(AlignError::NoOverlap { .. })));
-    // Millimetres taken for metres: the 60 mm tool would be a building.
-    let millimetres: Vec<DVec2> = points.iter().map(|p| *p * 1000.0).collect();
-    assert!(matches!(align(&millimetres, field(), &config), Err(AlignError::NoOverlap { .. })));
+    // Millimeters taken for meters: the 60 mm tool would be a building.
+    let millimeters: Vec<DVec2> = points.iter().map(|p| *p * 1000.0).collect();
+    assert!(matches!(align(&millimeters, field(), &config), Err(AlignError::NoOverlap { .. })));
     // The other way round everything shrinks to one spot.
     let shrunk: Vec<DVec2> = points.iter().map(|p| *p * 1e-3).collect();
     assert!(matches!(align(&shrunk, field(), &config), Err(AlignError::Coincident { .. })));

@@ -80,7 +80,7 @@ impl Judge {
         Ok(AngleSummary::from_errors(&errors))
     }
 
-    /// Predicted imprints by [`PadId`], metres.
+    /// Predicted imprints by [`PadId`], meters.
     pub(super) fn score(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Score> {
         let (mut mse, mut psnr_db) = (0.0, [None, None]);
         for finger in lab::PADS {

@@ -62,7 +62,7 @@ fn ms_since(begin: Instant) -> f64 {
     begin.elapsed().as_secs_f64() * 1e3
 }
 
-/// Both fingers from image to metres, with nothing remembered from runs before.
+/// Both fingers from image to meters, with nothing remembered from runs before.
 pub(super) fn timed_run(
     generator: &mut Generator,
     case: &Case,
@@ -137,7 +137,7 @@ pub(super) fn overhead(
             .iter()
             .map(|image| Ok(Tensor::stack(&[prepare(image, &spec.input)?]).expect("one tensor can be stacked")))
             .collect::<anyhow::Result<Vec<_>>>()?;
-        // In turn first and second: a machine that gets slower meanwhile favours neither.
+        // In turn first and second: a machine that gets slower meanwhile favors neither.
         let (with, without);
         if at % 2 == 0 {
             with = timed_run(generator, case, &config)?.0;

@@ -188,7 +188,7 @@ fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Op
         return Ok([None, None]);
     };
     if (length - 1.0).abs() > UNIT_TOLERANCE {
-        notes.push(not_unit(dict, "grasp_frame_quat", length, "normalised"));
+        notes.push(not_unit(dict, "grasp_frame_quat", length, "normalized"));
     }
     notes.extend(plausible::rounded_place(dict.file(), "grasp_frame_quat", &grasp));
     notes.extend(plausible::rounded_place(dict.file(), "bubbles_tr_quat", &bubbles));
@@ -215,7 +215,7 @@ fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Op
             let how = if mirrored.is_some() {
                 "it comes from a mirrored camera frame, which was recovered by letting the camera look at the grasp"
             } else {
-                "normalised"
+                "normalized"
             };
             base_from_camera = mirrored.unwrap_or(base_from_camera);
             repaired = Some((length, how));
@@ -226,7 +226,7 @@ fn cameras(dict: &PtDict, without: &str, notes: &mut Vec<Problem>) -> Result<[Op
     Ok(out)
 }
 
-/// The transform of `x y z qx qy qz qw` with the quaternion normalised, and the quaternion's length.
+/// The transform of `x y z qx qy qz qw` with the quaternion normalized, and the quaternion's length.
 fn rigid(values: &[f64]) -> Option<(DAffine3, f64)> {
     let numbers: [f64; 7] = values.try_into().ok()?;
     let length = numbers[3..].iter().map(|q| q * q).sum::<f64>().sqrt();

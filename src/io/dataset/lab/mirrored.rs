@@ -1,7 +1,7 @@
 //! Camera frames that are no rotation: a mirrored image, squeezed into a quaternion.
 //!
 //! Some files hold quaternions that are far from unit length. They come from a 3 x 3 matrix with determinant -1 (the
-//! camera's image is mirrored), which the usual conversion turns into four numbers without complaint. Normalising
+//! camera's image is mirrored), which the usual conversion turns into four numbers without complaint. Normalizing
 //! them gives a camera that looks elsewhere. The conversion loses one number; it can be undone if the direction of
 //! the optical axis is known, and that is: a bubble's camera looks at the tool.
 
@@ -26,7 +26,7 @@ pub(super) fn recover(position: DVec3, quaternion: [f64; 4], target: DVec3) -> O
     let error = |angle: f64| mismatch(&matrix(angle), quaternion);
     let step = std::f64::consts::TAU / STEPS as f64;
     let coarse = (0..STEPS).map(|i| i as f64 * step).min_by(|a, b| error(*a).total_cmp(&error(*b)))?;
-    // The error has one minimum between the neighbours: thirds of the interval are cut off.
+    // The error has one minimum between the neighbors: thirds of the interval are cut off.
     let (mut lo, mut hi) = (coarse - step, coarse + step);
     for _ in 0..80 {
         let (a, b) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
