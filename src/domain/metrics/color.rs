@@ -17,7 +17,7 @@ pub fn planes(picture: &RgbGrid, scale: f64) -> Grid<f32> {
 /// PSNR over all channels and the mean of their SSIM, with peak and range [`LEVELS`]; of difference images of one size.
 ///
 /// # Errors
-/// As [`psnr`] and [`ssim`].
+/// As [`psnr()`] and [`ssim()`].
 pub fn color(prediction: &RgbGrid, truth: &RgbGrid) -> Result<(Psnr, f64), MetricError> {
     let found = psnr(&planes(prediction, 1.0), &planes(truth, 1.0), LEVELS)?;
     let mut similar = 0.0;
