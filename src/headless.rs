@@ -142,7 +142,8 @@ pub fn main() -> ExitCode {
 /// # Errors
 /// What the program would say.
 pub fn check_command<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) -> Result<(), String> {
-    match Cli::try_parse_from(arguments) {
+    let arguments = arguments.into_iter().map(Into::into).collect();
+    match Cli::try_parse_from(args::JsonArgs::with_equals(arguments)) {
         // Help and version are answers.
         Err(err) if err.use_stderr() => Err(err.to_string()),
         _ => Ok(()),
@@ -159,7 +160,7 @@ fn parse(arguments: impl IntoIterator<Item = OsString>) -> anyhow::Result<Option
     {
         check_studio_path(Path::new(first))?;
     }
-    match Cli::try_parse_from(arguments) {
+    match Cli::try_parse_from(args::JsonArgs::with_equals(arguments)) {
         Ok(cli) => Ok(Some(cli)),
         Err(err) if err.use_stderr() => {
             let text = err.to_string();

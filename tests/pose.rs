@@ -3,20 +3,30 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use glam::{DVec2, DVec3};
 use strum::IntoEnumIterator as _;
-use touch2touch::domain::align::{AlignConfig, AlignReport, DistanceField, align};
+use touch2touch::domain::align::{AlignConfig, AlignReport, Ask, DistanceField, align};
+use touch2touch::domain::cloud::lift;
 use touch2touch::domain::contact::{
     LAB_CAD_DISTANCE_M, MaskBasis, cad_signed_distance, rest_and_top, settled_model, threshold,
 };
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
-use touch2touch::domain::pose::{Engine, FingerInput, Fingers, ToolModel, contact_cloud, estimate, fingers_of};
-use touch2touch::domain::rig::{PerPad, Rig, lab};
+use touch2touch::domain::pose::{Engine, ToolModel, register};
+use touch2touch::domain::rig::{PerPad, lab};
 use touch2touch::domain::units::angle_error;
-use touch2touch::io::cases::CaseSet;
+use touch2touch::io::cases::{Case, CaseSet};
 use touch2touch::io::dataset::Dataset;
+use touch2touch::work;
+use touch2touch::work::cloud::contact_points;
+use touch2touch::work::imprint::measured;
 
 use crate::support::shared;
+
+/// The contact points of both fingers, grasp frame, meters.
+fn points_of(case: &Case) -> Vec<DVec3> {
+    [0, 1].map(|f| lift(&case.imprints[f], &case.cameras[f], Some(&case.masks[f])).unwrap().points).concat()
+}
 
 fn percent(values: &[f64], below: f64) -> f64 {
     values.iter().filter(|v| **v <= below).count() as f64 / values.len() as f64 * 100.0
@@ -58,34 +68,25 @@ fn forty_known_grasps_with_spoilt_masks() {
         let every = if matches!(engine, Engine::DistanceField | Engine::LabIcp) { 1 } else { 4 };
         for (name, case) in set.cases.iter().step_by(every) {
             let tool = &tools[&case.tool];
-            let fingers = Fingers::new(&Rig::lab(), |pad| {
-                let f = pad.index();
-                Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&case.masks[f]) })
-            });
             let begin = Instant::now();
-            let pose = estimate(&fingers, tool, engine, false).unwrap();
+            let pose = register(&points_of(case), tool, engine, false).unwrap();
             ms.push(begin.elapsed().as_secs_f64() * 1e3);
-            lookups.push(pose.report.lookups as f64);
+            lookups.push(pose.lookups as f64);
             let found = pose.grasp_from_object;
             let error = angle_error(found.theta_rad, case.grasp_from_object.theta_rad).to_degrees();
-            let weakest = pose.report.observability.unwrap().eigenvalues[0];
+            let weakest = pose.observability.unwrap().eigenvalues[0];
             let shift = (found.y_m - case.grasp_from_object.y_m).hypot(found.z_m - case.grasp_from_object.z_m) * 1e3;
             let straight = matches!(case.tool, 0 | 11);
             if std::env::var_os("TOUCH2TOUCH_VERBOSE").is_some() {
                 eprintln!(
                     "{name} tool {:2} stratum {} error {error:5.2} deg {shift:5.2} mm weakest {weakest:.4} inliers {:.2} of {} {} it {}",
-                    case.tool,
-                    case.stratum,
-                    pose.report.inlier_share,
-                    pose.report.offered,
-                    pose.report.stop,
-                    pose.report.iterations
+                    case.tool, case.stratum, pose.inlier_share, pose.offered, pose.stop, pose.iterations
                 );
             }
             if !straight {
                 shifts.push(shift);
             }
-            flags.push(pose.report.is_degenerate() == straight);
+            flags.push(pose.is_degenerate() == straight);
             errors.push(error);
         }
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
@@ -124,11 +125,7 @@ fn the_fast_answer_costs_what_the_proved_one_does() {
         set.tools.iter().map(|(number, mesh)| (*number, DistanceField::from_mesh(mesh).unwrap())).collect();
     let mut lookups = Vec::new();
     for (name, case) in &set.cases {
-        let fingers = Fingers::new(&Rig::lab(), |pad| {
-            let f = pad.index();
-            Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&case.masks[f]) })
-        });
-        let points = contact_cloud(&fingers).unwrap().yz();
+        let points: Vec<DVec2> = points_of(case).iter().map(|p| DVec2::new(p.y, p.z)).collect();
         let ask = |config: &AlignConfig| align(&points, &fields[&case.tool], config).unwrap();
         let (fast, proved) = (ask(&AlignConfig::default()), ask(&AlignConfig::certified()));
         let cost = |report: &AlignReport| report.runs[report.winner].cost_m2;
@@ -158,14 +155,15 @@ fn the_labs_files_with_the_mask_from_the_cad_give_the_stored_angle() {
             Some(mask.unwrap())
         });
         let masks: PerPad<Mask> = masks.collect();
-        let fingers = fingers_of(&sample, &masks.as_ref());
-        let pose = estimate(&fingers, &tool, Engine::DistanceField, false).unwrap();
-        let error = angle_error(pose.object_from_grasp.theta_rad, truth.inverse().theta_rad).to_degrees();
+        let points = contact_points(&sample, &measured(&sample).as_ref(), &masks.as_ref()).unwrap();
+        let registration = Engine::DistanceField.registration();
+        let pose = work::pose::pose(&points, &tool, &*registration, Ask::default(), Some(truth)).unwrap();
+        let error = pose.error_rad.unwrap().to_degrees();
         eprintln!(
             "{}: {:.2} deg, error {error:.2} deg, {} points",
             entry.name,
-            pose.object_from_grasp.theta_rad.to_degrees(),
-            pose.cloud.points.len()
+            pose.angle_rad.to_degrees(),
+            pose.num_points
         );
         assert!(error < 2.0, "{}: {error} deg", entry.name);
         seen += 1;
@@ -189,11 +187,10 @@ fn error_by_depth(dataset: &Dataset, id: PairId, share: Option<f32>) -> (f64, us
         Some(found.mask)
     };
     let masks: PerPad<Mask> = sample.rig.pads().map(mask).collect();
-    let pose = estimate(&fingers_of(&sample, &masks.as_ref()), &tool, Engine::DistanceField, false);
-    let truth = sample.grasp_from_object.unwrap().inverse().theta_rad;
-    pose.map_or((f64::NAN, 0), |pose| {
-        (angle_error(pose.object_from_grasp.theta_rad, truth).to_degrees(), pose.cloud.points.len())
-    })
+    let points = contact_points(&sample, &measured(&sample).as_ref(), &masks.as_ref()).unwrap();
+    let (registration, truth) = (Engine::DistanceField.registration(), sample.grasp_from_object);
+    let pose = work::pose::pose(&points, &tool, &*registration, Ask::default(), truth);
+    pose.map_or((f64::NAN, 0), |pose| (pose.error_rad.unwrap().to_degrees(), pose.num_points))
 }
 
 #[test]

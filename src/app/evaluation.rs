@@ -71,6 +71,7 @@ impl State {
             bundles,
             mask_bundle: origin(BundleKind::Mask),
             classifier: origin(BundleKind::Classifier),
+            mask: self.settings.mask.choice,
             engine: self.settings.pose_engine,
             shift: self.settings.shift,
             runtime: self.settings.runtime,

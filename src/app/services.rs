@@ -25,8 +25,9 @@ use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::BundleInfo;
 use crate::work::error::TaskError;
+use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::job::JobCx;
-use crate::work::models::Wanted;
+use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
@@ -163,6 +164,14 @@ pub trait Services: Send + Sync {
         runtime: EngineChoice,
         imprint: &DepthMap,
     ) -> Result<ContactMask, TaskError>;
+
+    /// The results table of a data set.
+    ///
+    /// # Errors
+    /// As [`evaluate::evaluate`].
+    fn evaluate(&self, dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
+        evaluate::evaluate(dataset, setup, &Models::new(None), cx)
+    }
 
     /// The stored settings (defaults where there are none), and what was wrong if they were set aside.
     fn load_settings(&self) -> (Settings, Option<TaskError>);

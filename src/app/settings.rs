@@ -11,6 +11,7 @@ use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
 use crate::domain::postprocess::RefitShift;
 use crate::infer::engine::EngineChoice;
 use crate::work::bundles::BundleInfo;
+pub use crate::work::mask::{MaskChoice, MaskSource};
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
 pub const SETTINGS_VERSION: u32 = 1;
@@ -321,14 +322,9 @@ pub struct MaskSettings {
     pub last_tool: MaskTool,
     /// Radius of brush and eraser, image pixels.
     pub radius_px: f32,
-    /// The automatic source in use where no mask was drawn by hand.
-    pub source: MaskSource,
-    /// Depth of the threshold source, meters.
-    pub threshold_m: f32,
-    /// Share of the deepest pixels of the top-percent source, percent.
-    pub top_percent: f32,
-    /// Distance to the CAD surface of the CAD source, meters.
-    pub cad_distance_m: f32,
+    /// What is in force where no mask was drawn by hand.
+    #[serde(flatten)]
+    pub choice: MaskChoice,
     /// The mask bundle's name; `None` takes the first found.
     pub bundle: Option<String>,
 }
@@ -339,12 +335,7 @@ impl Default for MaskSettings {
             tool: MaskTool::Brush,
             last_tool: MaskTool::Eraser,
             radius_px: 4.0,
-            source: MaskSource::Unet,
-            // The middle of the thresholds that the lab used for its tools (0.0048 to 0.0053 m).
-            threshold_m: 0.005,
-            top_percent: 15.0,
-            // The lab's labels: signed distance at most 1 mm.
-            cad_distance_m: 0.001,
+            choice: MaskChoice::default(),
             bundle: None,
         }
     }
@@ -356,9 +347,10 @@ impl MaskSettings {
     pub fn validated(mut self) -> Self {
         let default = Self::default();
         self.radius_px = clamp_or(self.radius_px, *BRUSH_RADIUS_PX.start(), *BRUSH_RADIUS_PX.end(), default.radius_px);
-        self.threshold_m = clamp_or(self.threshold_m, -0.1, 0.1, default.threshold_m);
-        self.top_percent = clamp_or(self.top_percent, 0.0, 100.0, default.top_percent);
-        self.cad_distance_m = clamp_or(self.cad_distance_m, 0.0, 0.05, default.cad_distance_m);
+        let (choice, default) = (&mut self.choice, default.choice);
+        choice.threshold_m = clamp_or(choice.threshold_m, -0.1, 0.1, default.threshold_m);
+        choice.top_percent = clamp_or(choice.top_percent, 0.0, 100.0, default.top_percent);
+        choice.cad_distance_m = clamp_or(choice.cad_distance_m, 0.0, 0.05, default.cad_distance_m);
         self
     }
 }
@@ -383,47 +375,6 @@ impl MaskTool {
             Self::Brush => "Brush",
             Self::Eraser => "Eraser",
             Self::Pan => "Pan",
-        }
-    }
-}
-
-/// Where a mask comes from when nobody drew one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum MaskSource {
-    /// Imprint above a depth.
-    Threshold,
-    /// The deepest share of the pixels.
-    TopPercent,
-    /// Near the CAD model at the true pose: the lab's labels.
-    Cad,
-    /// The mask model.
-    #[default]
-    Unet,
-    /// The simulator's truth.
-    Truth,
-}
-
-impl MaskSource {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Threshold => "Threshold",
-            Self::TopPercent => "Top percent",
-            Self::Cad => "CAD distance",
-            Self::Unet => "UNet",
-            Self::Truth => "Simulator truth",
-        }
-    }
-
-    /// What it does, for the tooltip.
-    pub fn tooltip(self) -> &'static str {
-        match self {
-            Self::Threshold => "Pixels pushed in further than a depth",
-            Self::TopPercent => "The deepest share of the pixels",
-            Self::Cad => "Pixels whose membrane point lies near the CAD model at the true pose (the lab's labels)",
-            Self::Unet => "What the mask model predicts from the imprint",
-            Self::Truth => "What the simulator knows",
         }
     }
 }

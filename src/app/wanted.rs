@@ -10,7 +10,6 @@ use super::keys::{
     CloudKey, ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, PairKey, PoseKey, PredictionKey, Request,
     TouchKey,
 };
-use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use super::workbench::PoseOf;
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
@@ -186,11 +185,10 @@ impl State {
     /// # Errors
     /// Why this source cannot give one for this finger.
     pub fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
-        let mask = &self.settings.mask;
-        match mask.source {
-            MaskSource::Threshold => Ok(MaskRecipe::Threshold(mask.threshold_m.into())),
-            MaskSource::TopPercent => Ok(MaskRecipe::TopPercent(mask.top_percent.into())),
-            MaskSource::Cad => {
+        let model = self.bundle(BundleKind::Mask).map(|bundle| &bundle.id);
+        let recipe = self.settings.mask.choice.recipe(model.ok()).ok_or(Absent::NoMaskModel)?;
+        match recipe {
+            MaskRecipe::Cad(_) => {
                 self.tool_name()?;
                 let sample = self.sample().ready();
                 if sample.is_some_and(|s| s.grasp_from_object.is_none()) {
@@ -199,19 +197,15 @@ impl State {
                 if self.touch(finger).ready().is_some_and(|t| t.camera().is_none()) {
                     return Err(Absent::NoCamera);
                 }
-                Ok(MaskRecipe::Cad(mask.cad_distance_m.into()))
             }
-            // Without a model the threshold serves: the recipe, and with it the name on screen, says so.
-            MaskSource::Unet => Ok(self
-                .bundle(BundleKind::Mask)
-                .map_or(MaskRecipe::Threshold(mask.threshold_m.into()), |bundle| MaskRecipe::Unet(bundle.id.clone()))),
-            MaskSource::Truth => {
+            MaskRecipe::Truth => {
                 if self.touch(finger).ready().is_some_and(|t| t.depth().is_none_or(|b| b.truth.is_none())) {
                     return Err(Absent::NotSimulated);
                 }
-                Ok(MaskRecipe::Truth)
             }
+            MaskRecipe::Threshold(_) | MaskRecipe::TopPercent(_) | MaskRecipe::Unet(_) => {}
         }
+        Ok(recipe)
     }
 
     /// The automatic mask of one finger's imprint.
@@ -233,9 +227,7 @@ impl State {
 
     /// The corrected mask of one finger, if it is there and as large as the imprint.
     fn hand_mask_for(&self, source: ImprintSource, finger: PadId) -> Option<&super::document::HandMask> {
-        let hand = self.document.hand_mask(self.pair_name(), finger)?;
-        let imprint = self.imprint(source, finger).ready()?;
-        (hand.mask.size() == imprint.size()).then_some(hand)
+        self.document.pair(self.pair_name())?.drawn(finger, self.imprint(source, finger).ready()?)
     }
 
     /// The mask in force on one finger's imprint: the corrected one, else the automatic one.

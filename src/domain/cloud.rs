@@ -1,22 +1,15 @@
-//! Point clouds lifted from imprints: one finger in its camera's view, both fingers in the grasp frame.
+//! Points lifted from an imprint to the grasp frame.
 //!
 //! The imprint is an argument of its own, so that a *predicted* imprint goes through the measured camera.
 
 use glam::{DVec2, DVec3};
 
 use super::grid::{DepthMap, Mask};
-use super::rig::{PadId, PerPad, Rig, Text};
-use super::sample::{DepthCamera, DepthTouch, Sample};
+use super::sample::DepthCamera;
 
 /// Why an imprint cannot be lifted.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CloudError {
-    /// The source has no camera (an image folder), so there is no third dimension.
-    #[error("the {finger} finger has no camera data (intrinsics, reference depth): its pixels have no place in space")]
-    NoCamera {
-        /// The finger asked for.
-        finger: Text,
-    },
     /// Two images that must cover the same pixels do not.
     #[error("the {what} is {} x {} pixels, the imprint {} x {}: they must be equal", .size[0], .size[1], .imprint[0], .imprint[1])]
     Size {
@@ -52,46 +45,6 @@ pub struct Lifted {
     pub invalid: usize,
     /// Pixels that the mask leaves out.
     pub outside_mask: usize,
-}
-
-/// [`Lifted`] with the finger it belongs to.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FingerCloud {
-    /// The finger that felt it.
-    pub finger: PadId,
-    /// Its points.
-    pub lifted: Lifted,
-}
-
-/// Where a point of a [`ContactCloud`] came from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PointSource {
-    /// The finger.
-    pub finger: PadId,
-    /// Column and row in that finger's imprint.
-    pub pixel: [u16; 2],
-}
-
-/// What went into a finger's part of a cloud, in pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FingerCounts {
-    /// Pixels that became points.
-    pub points: usize,
-    /// Pixels of the mask without a usable depth.
-    pub invalid: usize,
-    /// Pixels that the mask leaves out.
-    pub outside_mask: usize,
-}
-
-/// The points of both fingers in the grasp frame, right finger first: what registration works on.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ContactCloud {
-    /// Meters, grasp frame.
-    pub points: Vec<DVec3>,
-    /// Finger and pixel, one per point.
-    pub sources: Vec<PointSource>,
-    /// None for a finger that is missing.
-    pub counts: PerPad<FingerCounts>,
 }
 
 /// Lifts the pixels of `imprint` that `mask` contains (all without one) to the grasp frame.
@@ -151,60 +104,6 @@ pub fn project(camera: &DepthCamera, in_grasp: DVec3) -> Option<DVec2> {
     (u.is_finite() && v.is_finite()).then(|| DVec2::new(u, v))
 }
 
-/// [`lift`] for the measured imprint of one finger.
-///
-/// # Errors
-/// [`CloudError::NoCamera`] for a touch of an image folder; otherwise as [`lift`].
-pub fn lift_finger(
-    touch: &DepthTouch,
-    rig: &Rig,
-    finger: PadId,
-    mask: Option<&Mask>,
-) -> Result<FingerCloud, CloudError> {
-    let camera = touch.camera.as_ref().ok_or_else(|| CloudError::NoCamera { finger: rig.pad_key(finger) })?;
-    Ok(FingerCloud { finger, lifted: lift(&touch.imprint, camera, mask)? })
-}
-
-impl ContactCloud {
-    /// Joins the measured imprints of a sample; a finger without a mask is taken whole.
-    ///
-    /// A finger without a bubble image is left out and has no counts.
-    ///
-    /// # Errors
-    /// As [`lift_finger`], for the first finger that fails.
-    pub fn from_sample(sample: &Sample, masks: &PerPad<&Mask>) -> Result<Self, CloudError> {
-        let mut cloud = Self::default();
-        for (finger, touch) in sample.pads.entries() {
-            if let Some(bubble) = touch.depth() {
-                cloud.push(lift_finger(bubble, &sample.rig, finger, masks[finger])?);
-            }
-        }
-        Ok(cloud)
-    }
-
-    /// Adds a finger's points.
-    pub fn push(&mut self, part: FingerCloud) {
-        let FingerCloud { finger, lifted } = part;
-        self.counts[finger] = Some(FingerCounts {
-            points: lifted.points.len(),
-            invalid: lifted.invalid,
-            outside_mask: lifted.outside_mask,
-        });
-        self.points.extend(lifted.points);
-        self.sources.extend(lifted.pixels.into_iter().map(|pixel| PointSource { finger, pixel }));
-    }
-
-    /// The points in the plane of the tool: `(y, z)`, meters.
-    pub fn yz(&self) -> Vec<DVec2> {
-        self.points.iter().map(|p| DVec2::new(p.y, p.z)).collect()
-    }
-
-    /// Pixels that were asked for but have no usable depth, both fingers.
-    pub fn invalid(&self) -> usize {
-        self.counts.iter().flatten().map(|c| c.invalid).sum()
-    }
-}
-
 /// Whether the camera can lift `imprint` at all.
 pub(super) fn check(imprint: &DepthMap, camera: &DepthCamera) -> Result<(), CloudError> {
     same_size("reference depth", camera.depth_reference.size(), imprint)?;
@@ -252,7 +151,6 @@ pub(super) mod testing {
 mod tests {
     use super::*;
     use crate::domain::rig::lab;
-    use crate::domain::sample::PadTouch;
 
     const WIDTH: usize = lab::BUBBLE.width;
     const HEIGHT: usize = lab::BUBBLE.height;
@@ -289,26 +187,6 @@ mod tests {
         let lifted = lift(&imprint, &camera, Some(&mask)).unwrap();
         assert_eq!((lifted.invalid, lifted.outside_mask), (5, 1));
         assert_eq!(lifted.pixels, [[1, 1], [2, 1]]);
-    }
-
-    #[test]
-    fn fingers_are_joined_and_a_missing_one_is_fine() {
-        let bubble = DepthTouch { imprint: imprint(), camera: Some(testing::camera(WIDTH, HEIGHT)), truth: None };
-        let touch = |bubble| Some(PadTouch::default().with(lab::BUBBLE_ID, Some(bubble)));
-        let mut sample = Sample { pads: [None, touch(bubble.clone())].into(), ..Sample::default() };
-        let mask = Mask::from_fn(WIDTH, HEIGHT, |x, _| x < 10);
-        let cloud = ContactCloud::from_sample(&sample, &[None, Some(&mask)].into()).unwrap();
-        assert_eq!(cloud.points.len(), 10 * HEIGHT);
-        assert_eq!(cloud.sources[0], PointSource { finger: lab::LEFT, pixel: [0, 0] });
-        assert_eq!(cloud.counts[lab::RIGHT], None);
-        sample.pads[lab::RIGHT] = touch(bubble.clone());
-        let both = ContactCloud::from_sample(&sample, &[Some(&mask), Some(&mask)].into()).unwrap();
-        assert_eq!((both.points.len(), both.yz().len(), both.invalid()), (20 * HEIGHT, 20 * HEIGHT, 0));
-        sample.pads[lab::RIGHT] = touch(DepthTouch { camera: None, ..bubble });
-        assert_eq!(
-            ContactCloud::from_sample(&sample, &PerPad::default()),
-            Err(CloudError::NoCamera { finger: "right".into() })
-        );
     }
 
     #[test]

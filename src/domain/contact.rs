@@ -108,6 +108,8 @@ pub enum MaskBasis {
     Flat,
     /// Depth of at least so many meters, because the source found no contact in an imprint that clearly has some.
     Depth(f32),
+    /// A person: it was drawn.
+    Hand,
 }
 
 /// A contact mask and what it is made of.
@@ -126,6 +128,7 @@ impl MaskBasis {
             Self::Source => source,
             Self::Flat => "flat",
             Self::Depth(_) => "depth",
+            Self::Hand => "hand",
         }
     }
 
@@ -133,6 +136,7 @@ impl MaskBasis {
     pub fn label(self, source: &str) -> String {
         match self {
             Self::Source => source.to_owned(),
+            Self::Hand => "By hand".to_owned(),
             Self::Flat => "No contact: the imprint is flat".to_owned(),
             Self::Depth(min_m) => format!("Depth {}: {source} found no contact", text_mm(f64::from(min_m))),
         }
@@ -141,7 +145,7 @@ impl MaskBasis {
     /// In words, if it is not the source that was asked.
     pub fn note(self) -> Option<String> {
         match self {
-            Self::Source => None,
+            Self::Source | Self::Hand => None,
             Self::Flat => Some("the imprint is flat, so there is no contact".into()),
             Self::Depth(min_m) => Some(format!(
                 "the mask model found no contact; all that is pushed in by at least {} was taken instead",

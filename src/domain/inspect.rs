@@ -1,38 +1,19 @@
-//! Looking into a registration: a recorded run from a given start, and the map of where starts lead.
+//! Looking into a registration: the map of where starts lead, and what a step compares.
 //!
 //! The studio's time machine and basin map and the command line's `basin` call these.
 
 use glam::{DVec2, DVec3};
 
+use super::align::TraceStep;
 use super::align::basin::{Basin, BasinConfig, basin};
 use super::align::correspond::{Matches, ModelPoints, Surface, correspondences};
-use super::align::{AlignError, AlignReport, TraceStep};
-use super::frames::PlanarPose;
 use super::mesh::sampling::spread;
-use super::pose::{Engine, ToolModel, register, register_from};
+use super::pose::{Engine, ToolModel, register_from};
 
 /// Contact points per run of a basin map with the distance field: more move its ends by less than a line is wide.
 const MAP_POINTS: usize = 512;
 /// The same with registrations that ask a tree for every point and iteration: 651 runs must take about a second.
 const MAP_POINTS_COSTLY: usize = 96;
-
-/// A registration with everything it can tell about itself; `start` (`grasp_from_object`) replaces its own starts.
-///
-/// Points are contact points in the grasp frame, meters.
-///
-/// # Errors
-/// [`AlignError`] as of the registration itself.
-pub fn recorded(
-    points: &[DVec3],
-    tool: &ToolModel,
-    engine: Engine,
-    start: Option<PlanarPose>,
-) -> Result<AlignReport, AlignError> {
-    match start {
-        None => register(points, tool, engine, true),
-        Some(start) => register_from(points, tool, engine, start, true),
-    }
-}
 
 /// Where every start of a grid leads; `None` if `cancelled` said so meanwhile.
 ///
@@ -87,6 +68,8 @@ mod tests {
     use super::*;
     use crate::domain::align::basin::{Plane, is_same_place};
     use crate::domain::align::testing::{cross, cross_contacts};
+    use crate::domain::frames::PlanarPose;
+    use crate::domain::pose::register;
     use strum::IntoEnumIterator as _;
 
     const POSE: PlanarPose = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 };
@@ -102,11 +85,11 @@ mod tests {
         let points = contacts(600);
         let start = PlanarPose { theta_rad: 0.12, y_m: 0.0, z_m: 0.001 };
         for engine in Engine::iter() {
-            let own = recorded(&points, &tool, engine, None).unwrap();
+            let own = register(&points, &tool, engine, true).unwrap();
             let plain = register(&points, &tool, engine, false).unwrap();
             assert_eq!(own.grasp_from_object, plain.grasp_from_object, "{engine}: looking changes nothing");
             assert!(!own.trace.is_empty() && plain.trace.is_empty(), "{engine}");
-            let told = recorded(&points, &tool, engine, Some(start)).unwrap();
+            let told = register_from(&points, &tool, engine, start, true).unwrap();
             let first = told.trace[0].grasp_from_object;
             assert_eq!(told.runs.len(), 1, "{engine}");
             assert!(is_same_place(first, start) && told.trace[0].iteration == 0, "{engine}: {first:?}");

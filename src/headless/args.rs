@@ -1,10 +1,16 @@
 //! Options that several verbs share, read in one way.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use serde::Serialize;
+use strum::IntoEnumIterator;
 
+use super::Common;
+use crate::io::atomic;
 use crate::io::dataset::{Dataset, ToolScale};
 
 /// The dataset that a verb reads.
@@ -39,6 +45,58 @@ impl DatasetArgs {
     }
 }
 
+/// Where the result goes as one JSON object.
+#[derive(Debug, Clone, Args)]
+pub(super) struct JsonArgs {
+    /// Print one JSON object on standard output, as every verb does; with `=FILE`, write it to a file and print the text
+    /// for people.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
+    json: Option<Option<PathBuf>>,
+}
+
+impl JsonArgs {
+    /// What standard output is for.
+    pub(super) fn common(&self) -> Common {
+        Common { json: matches!(self.json, Some(None)) }
+    }
+
+    /// The file to write.
+    pub(super) fn file(&self) -> Option<&Path> {
+        self.json.as_ref()?.as_deref()
+    }
+
+    /// Writes the file, where one is named.
+    pub(super) fn write(&self, report: &impl Serialize) -> anyhow::Result<()> {
+        let Some(file) = self.file() else { return Ok(()) };
+        atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
+            .map_err(|err| anyhow::anyhow!("cannot write {}: {err}", file.display()))
+    }
+
+    /// Old command lines put a space before the file's name: `--json FILE.json`.
+    pub(super) fn with_equals(arguments: Vec<OsString>) -> Vec<OsString> {
+        let mut out: Vec<OsString> = Vec::with_capacity(arguments.len());
+        for argument in arguments {
+            match out.last_mut() {
+                Some(last) if last == "--json" && Path::new(&argument).extension().is_some_and(|e| e == "json") => {
+                    last.push("=");
+                    last.push(argument);
+                }
+                _ => out.push(argument),
+            }
+        }
+        out
+    }
+}
+
+/// Reads the key of one of a few things, such as a registration.
+pub(super) fn keyed<T>() -> impl TypedValueParser<Value = T>
+where
+    T: IntoEnumIterator + FromStr + Into<&'static str> + Default + Clone + Send + Sync + 'static,
+{
+    // The parser has compared the key with the list.
+    PossibleValuesParser::new(T::iter().map(Into::into)).map(|key| key.parse().unwrap_or_default())
+}
+
 /// How much of a dataset is taken.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(super) struct LimitArgs {
@@ -66,6 +124,15 @@ pub(super) fn at_least_one<T: FromStr + PartialOrd + From<u8>>(text: &str) -> Re
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_json_file_may_follow_a_space_and_a_path_is_no_json_file() {
+        let with =
+            |words: &str| JsonArgs::with_equals(words.split(' ').map(OsString::from).collect()).join(" ".as_ref());
+        assert_eq!(with("basin --json a/b.json demo"), "basin --json=a/b.json demo");
+        assert_eq!(with("basin --json demo --pair x.json"), "basin --json demo --pair x.json");
+        assert_eq!(with("pose demo --json"), "pose demo --json");
+    }
 
     #[test]
     fn nothing_to_do_is_no_number_of_things() {

@@ -1,26 +1,25 @@
 //! `touch2touch basin`: where starts lead, of one pair; the numbers behind the studio's basin map.
 
-use std::path::PathBuf;
 use std::time::Instant;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
-use strum::IntoEnumIterator as _;
 
-use super::args::DatasetArgs;
-use super::contact_mask::{FingerMasks, MaskArgs};
+use super::args::{DatasetArgs, JsonArgs, keyed};
+use super::contact_mask::{MaskArgs, labels_of};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
-use super::{Common, Output, VerbResult, pose};
-use crate::domain::align::Run;
-use crate::domain::align::basin::{Basin, BasinConfig, Plane};
+use super::{Output, VerbResult, pose};
+use crate::domain::align::basin::{Basin, Plane};
+use crate::domain::align::{Ask, Run};
 use crate::domain::findings::Finding;
 use crate::domain::frames::PlanarPose;
-use crate::domain::inspect::basin_map;
-use crate::domain::pose::{Engine, FingerInput, Fingers, contact_cloud, register};
+use crate::domain::pose::Engine;
 use crate::domain::units::{angle_error, fixed, mm, wrap_angle};
+use crate::work;
 use crate::work::job::JobCx;
+use crate::work::labels::{ImprintSource, Labels};
+use crate::work::mask::MaskInputs;
 
 /// Arguments of `basin`.
 #[derive(Debug, Args)]
@@ -31,27 +30,20 @@ pub(super) struct BasinArgs {
     #[arg(long)]
     pair: String,
     /// Which imprint to align.
-    #[arg(long, value_enum, default_value_t = Imprint::Measured)]
-    imprint: Imprint,
+    #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
+    imprint: ImprintSource,
     /// What of the start is varied: columns and rows of the grid.
     #[arg(long, value_enum, default_value_t = PlaneArg::AngleY)]
     plane: PlaneArg,
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration.
-    #[arg(long, default_value = Engine::default().key(), value_parser = parse_engine())]
+    #[arg(long, default_value = Engine::default().key(), value_parser = keyed::<Engine>())]
     engine: Engine,
-    /// Write grid, costs and ends to this file as one JSON object.
-    #[arg(long, value_name = "OUT")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
     #[command(flatten)]
     model: ModelArgs,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Imprint {
-    Measured,
-    Predicted,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -72,10 +64,6 @@ impl From<PlaneArg> for Plane {
             PlaneArg::YZ => Self::YZ,
         }
     }
-}
-
-fn parse_engine() -> impl clap::builder::TypedValueParser<Value = Engine> {
-    PossibleValuesParser::new(Engine::iter().map(Engine::key)).map(|key| key.parse().unwrap_or_default())
 }
 
 #[derive(Debug, Serialize)]
@@ -102,45 +90,37 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let id = super::find_pair(&dataset, &args.pair)?;
     let entry = &dataset.index.pairs[id.0 as usize];
-    let output = Output::new(Common { json: false }, "trying starts", 1);
+    let output = Output::new(args.json.common(), "trying starts", 1);
     let sample = dataset.load(id)?;
     let name = entry.tool.as_deref();
     let name = name.ok_or_else(|| anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name))?;
     let tool = pose::tool_model(&dataset, name)?;
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let predicted = args.imprint == Imprint::Predicted;
-    let imprints = if predicted { predictor.imprints(&sample, &JobCx::unwatched())? } else { pose::measured(&sample) };
+    let imprints = predictor.imprints(&sample, args.imprint, &JobCx::unwatched())?;
     let mut notes = Notes::default();
     notes.take(&output, &sample.notes);
-    let FingerMasks { masks, made_of, notes: mask_notes } =
-        pose::masks(&args.mask, &sample, &tool, &imprints, predicted, &mut predictor)?;
-    let fingers = Fingers::new(&sample.rig, |f| {
-        let camera = sample.pad(f)?.camera()?;
-        Some(FingerInput { imprint: imprints[f].as_ref()?, camera, mask: masks[f].as_ref() })
-    });
-    let cloud = contact_cloud(&fingers)?;
+    let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
+    let inputs = MaskInputs { sample: &sample, tool: Some(&tool), labels: args.mask.drawn(&labels) };
+    let contact = predictor.contact(&args.mask, imprints, inputs)?;
+    let points = contact.points(&sample)?;
     // What keeps every start from an answer keeps the registration itself from one, and is said once.
-    let own = register(&cloud.points, &tool, args.engine, false)?;
+    let registration = args.engine.registration();
+    let own = work::pose::pose(&points, &tool, &*registration, Ask::default(), sample.grasp_from_object)?;
     let started = Instant::now();
-    let config = BasinConfig::new(args.plane.into());
-    let basin = basin_map(&cloud.points, &tool, args.engine, &config, || false)
-        .ok_or_else(|| anyhow::anyhow!("the map was not finished"))?;
+    let basin = work::pose::basin(&points, &tool, args.engine, args.plane.into(), &output.job())?;
     let report = Report {
         pair: entry.name.clone(),
         engine: args.engine.key(),
-        imprint: if predicted { "predicted" } else { "measured" },
-        mask: made_of,
-        mask_notes,
+        imprint: args.imprint.key(),
+        mask: contact.made_of(),
+        mask_notes: contact.notes(&sample.rig),
         notes: notes.into_list(&output),
         truth: sample.grasp_from_object,
-        own_starts: own.runs,
+        own_starts: own.report.runs,
         ms: started.elapsed().as_secs_f64() * 1e3,
         basin,
     };
-    if let Some(file) = &args.json {
-        let bytes = serde_json::to_vec(&report)?;
-        crate::io::atomic::write_bytes(file, &bytes).map_err(|err| anyhow::anyhow!("{}: {err}", file.display()))?;
-    }
+    args.json.write(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(true)
 }

@@ -11,9 +11,13 @@ mod peers;
 mod registration;
 
 use clap::Subcommand;
+use glam::DVec3;
 use serde::Serialize;
 
 use super::VerbResult;
+use crate::domain::cloud::{CloudError, lift};
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::sample::DepthCamera;
 
 /// What is measured.
 #[derive(Debug, Subcommand)]
@@ -35,6 +39,19 @@ pub(super) fn run(verb: &BenchVerb) -> VerbResult {
         BenchVerb::Cases(args) => cases::run(args),
         BenchVerb::Dataset(args) => dataset::run(args),
     }
+}
+
+/// The contact points of both fingers, one after the other, grasp frame, meters.
+fn contact_points(
+    imprints: &[DepthMap; 2],
+    cameras: &[DepthCamera; 2],
+    masks: &[Mask; 2],
+) -> Result<Vec<DVec3>, CloudError> {
+    let mut points = Vec::new();
+    for ((imprint, camera), mask) in imprints.iter().zip(cameras).zip(masks) {
+        points.extend(lift(imprint, camera, Some(mask))?.points);
+    }
+    Ok(points)
 }
 
 /// Where and under what load the figures were taken: without it no time means anything.

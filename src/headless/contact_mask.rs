@@ -1,100 +1,66 @@
-//! The options that say where contact masks come from, and the mask they name.
+//! The options that say where contact masks come from, and the labels that lie by the data.
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use strum::IntoEnumIterator as _;
 
-use super::predict::Predictor;
-use crate::domain::contact::{ContactMask, LAB_CAD_DISTANCE_M};
-use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::pose::ToolModel;
-use crate::domain::rig::{PadId, PerPad, Rig};
-use crate::domain::sample::PadTouch;
-use crate::work::mask::{self, MaskRecipe};
+use super::Output;
+use crate::work::labels::{Labels, PairLabels};
+use crate::work::mask::{MaskChoice, MaskSource};
 
 /// Where masks come from.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct MaskArgs {
-    /// Where the contact masks come from. A flat imprint has no contact whatever the source; where the mask UNet finds none
-    /// in an imprint that is clearly not flat, depth decides (`mask` in the JSON says so). `auto`: the CAD model at the true pose for measured imprints whose truth is
-    /// known (the lab's labels, an upper bound), else the mask UNet.
-    #[arg(long, value_enum, default_value_t = MaskFrom::Auto)]
-    pub mask: MaskFrom,
+    /// Where the contact masks come from that nobody drew. A mask drawn by hand wins over all of them; `mask` in the JSON
+    /// says what was taken. A flat imprint has no contact whatever the source; where the mask UNet finds none in an
+    /// imprint that is clearly not flat, depth decides.
+    #[arg(long, default_value = MaskSource::default().key(), value_parser = parse_source())]
+    mask: MaskSource,
     /// Imprint depth from which a pixel counts as contact, for `--mask threshold`.
-    #[arg(long, default_value_t = 7.0)]
-    pub threshold_mm: f32,
+    #[arg(long, value_name = "MM", default_value_t = MaskChoice::default().threshold_m * 1e3, value_parser = finite, allow_hyphen_values = true)]
+    threshold_mm: f32,
+    /// Share of the deepest pixels, for `--mask top_percent`.
+    #[arg(long, value_name = "PERCENT", default_value_t = MaskChoice::default().top_percent, value_parser = finite)]
+    top_percent: f32,
+    /// Largest distance to the CAD model at the true pose, for `--mask cad`.
+    #[arg(long, value_name = "MM", default_value_t = MaskChoice::default().cad_distance_m * 1e3, value_parser = finite)]
+    cad_mm: f32,
+    /// Leave out the masks that were drawn by hand.
+    #[arg(long)]
+    pub no_hand: bool,
 }
 
-/// A source of masks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum MaskFrom {
-    /// The best that is there.
-    Auto,
-    /// Points within 1 mm of the CAD model at the true pose.
-    Cad,
-    /// The mask model.
-    Unet,
-    /// Imprint depth above a threshold.
-    Threshold,
-    /// The simulator's truth.
-    Truth,
+fn parse_source() -> impl TypedValueParser<Value = MaskSource> {
+    let name = |source: MaskSource| PossibleValue::new(source.key()).help(source.tooltip());
+    // The parser has compared the key with the list.
+    PossibleValuesParser::new(MaskSource::iter().map(name)).map(|key| key.parse().unwrap_or_default())
 }
 
-impl MaskFrom {
-    /// The key in the JSON.
-    pub(super) fn key(self) -> &'static str {
-        match self {
-            MaskFrom::Auto => "auto",
-            MaskFrom::Cad => "cad",
-            MaskFrom::Unet => "unet",
-            MaskFrom::Threshold => "threshold",
-            MaskFrom::Truth => "truth",
+fn finite(text: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|number: &f32| number.is_finite()).ok_or_else(|| "a number is needed".to_owned())
+}
+
+impl MaskArgs {
+    /// The choice in meters.
+    pub(super) fn choice(&self) -> MaskChoice {
+        MaskChoice {
+            source: self.mask,
+            threshold_m: self.threshold_mm / 1e3,
+            top_percent: self.top_percent,
+            cad_distance_m: self.cad_mm / 1e3,
         }
     }
-}
 
-/// The mask of one imprint, by the studio's own functions, and what it is made of. `truth` is `grasp_from_object`; `auto`
-/// means the mask model here.
-///
-/// # Errors
-/// In words, if what the source needs is not there.
-pub(super) fn contact_mask(
-    source: MaskFrom,
-    args: &MaskArgs,
-    imprint: &DepthMap,
-    touch: &PadTouch,
-    tool: Option<&ToolModel>,
-    truth: Option<PlanarPose>,
-    predictor: &mut Predictor,
-) -> anyhow::Result<ContactMask> {
-    let recipe = match source {
-        MaskFrom::Unet | MaskFrom::Auto => return predictor.mask(imprint),
-        MaskFrom::Threshold => MaskRecipe::Threshold((args.threshold_mm / 1e3).into()),
-        MaskFrom::Truth => MaskRecipe::Truth,
-        MaskFrom::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
-    };
-    Ok(mask::mask(&recipe, imprint, Some(touch), tool, truth)?)
-}
-
-/// The masks of both fingers, with what is to be said about them.
-pub(super) struct FingerMasks {
-    /// Per finger.
-    pub masks: PerPad<Mask>,
-    /// What they are made of: the key of the source, `depth` where the model found nothing, `flat` where there is no
-    /// contact; of both fingers (right, left) where they differ.
-    pub made_of: String,
-    /// The same in words, where it is not the source that was asked.
-    pub notes: Vec<String>,
-}
-
-impl FingerMasks {
-    /// From the masks that `source` gave.
-    pub(super) fn new(source: MaskFrom, rig: &Rig, found: PerPad<ContactMask>) -> Self {
-        let mut keys: Vec<&'static str> = found.iter().flatten().map(|m| m.basis.key(source.key())).collect();
-        keys.dedup();
-        let made_of = if keys.is_empty() { source.key().to_owned() } else { keys.join(", ") };
-        let note =
-            |(f, found): (PadId, &ContactMask)| Some(format!("{} finger: {}", rig.pad_key(f), found.basis.note()?));
-        let notes = found.entries().filter_map(note).collect();
-        Self { masks: found.map(|m| m.map(|m| m.mask)), made_of, notes }
+    /// Of the labels of a pair those that a mask is made from.
+    pub(super) fn drawn<'a>(&self, labels: &'a PairLabels) -> Option<&'a PairLabels> {
+        (!self.no_hand).then_some(labels)
     }
+}
+
+/// The labels of a pair, made in the studio or by `label`; damaged ones are said and do not hold up the rest.
+pub(super) fn labels_of(labels: &Labels, name: &str, output: &Output) -> PairLabels {
+    labels.load(name).unwrap_or_else(|err| {
+        output.note(&format!("note: {err}; its labels are left out"));
+        PairLabels::default()
+    })
 }

@@ -7,8 +7,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
 
-use super::args::{DatasetArgs, at_least_one};
-use super::contact_mask::MaskFrom;
+use super::args::{DatasetArgs, at_least_one, keyed};
+use super::contact_mask::MaskArgs;
 use super::predict::{RuntimeArg, ShiftArg, sampler};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::diffusion::Sampler;
@@ -16,7 +16,8 @@ use crate::domain::evaluation::{self, Row, paper_rows};
 use crate::domain::pose::Engine;
 use crate::infer::bundle::{Bundle, Found, Origin, find_all};
 use crate::io::atomic;
-use crate::work::evaluate::{Evaluation, MaskBy, Report, Setup, evaluate, rows};
+use crate::work::evaluate::{Evaluation, Report, Setup, evaluate, rows};
+use crate::work::models::Models;
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -32,18 +33,17 @@ pub(super) struct EvaluateArgs {
     /// The tool classifier's bundle (default: the first one found).
     #[arg(long)]
     classifier: Option<PathBuf>,
-    /// Where contact masks come from, for measured and predicted imprints alike. `auto`: the mask model.
-    #[arg(long, value_enum, default_value_t = MaskFrom::Auto)]
-    mask: MaskFrom,
-    /// Imprint depth from which a pixel counts as contact, for `--mask threshold`.
-    #[arg(long, default_value_t = 7.0)]
-    threshold_mm: f32,
+    #[command(flatten)]
+    mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long, default_value_t = Engine::default(), value_parser = engine())]
+    #[arg(long, default_value = Engine::default().key(), value_parser = keyed::<Engine>())]
     engine: Engine,
     /// Whose images are compared. Angles always come from the contact of both fingers.
     #[arg(long, value_enum, default_value_t = Fingers::Both)]
     fingers: Fingers,
+    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
+    #[arg(long)]
+    no_cache: bool,
     /// Take only this many grasps of each tool, spread evenly.
     #[arg(long, value_name = "N", value_parser = at_least_one::<usize>)]
     grasps: Option<usize>,
@@ -96,16 +96,12 @@ fn batch(text: &str) -> Result<usize, String> {
     text.parse().ok().filter(|n| (1..=256).contains(n)).ok_or_else(|| "choose 1 to 256 images".to_owned())
 }
 
-/// Reads the key of a registration.
-fn engine() -> impl TypedValueParser<Value = Engine> {
-    PossibleValuesParser::new(Engine::iter().map(Engine::key)).map(|key| key.parse().unwrap_or_default())
-}
-
 pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let setup = setup(args, &dataset)?;
     let output = Output::new(args.common, "evaluating", 0);
-    let evaluation = evaluate(&dataset, &setup, &output.job())?;
+    let models = Models::new(if args.no_cache { None } else { super::cache::store() });
+    let evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
     for odd in &evaluation.findings {
         let (file, times) = (odd.file.display(), odd.count);
         output.note(&format!("note: {file}: {} ({}); {times} like this", odd.what, odd.hint));
@@ -173,12 +169,8 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
         bundles: generators,
         mask_bundle: first(&args.mask_bundle, |b| b.mask_unet().is_some()),
         classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
-        mask: match args.mask {
-            MaskFrom::Auto | MaskFrom::Unet => MaskBy::Unet,
-            MaskFrom::Cad => MaskBy::Cad,
-            MaskFrom::Truth => MaskBy::Truth,
-            MaskFrom::Threshold => MaskBy::Threshold(args.threshold_mm / 1e3),
-        },
+        mask: args.mask.choice(),
+        hand: !args.mask.no_hand,
         engine: args.engine,
         shift: args.shift.mode(),
         steps: args.steps,

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::args::{DatasetArgs, LimitArgs};
-use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
+use super::contact_mask::MaskArgs;
 use super::output::says;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
@@ -19,6 +19,7 @@ use crate::io::export_unet::{ExportConfig, PARTS};
 use crate::work::error::TaskError;
 use crate::work::export::{Automatic, ExportSetup, HandMasks, export_masks};
 use crate::work::labels::Labels;
+use crate::work::mask::MaskInputs;
 
 /// What can be done with masks.
 #[derive(Debug, Subcommand)]
@@ -101,15 +102,11 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
             let model = tools.entry(name.to_owned()).or_insert_with(|| super::pose::tool_model(&dataset, name).ok());
             model.as_ref()
         });
-        let source = match args.mask.mask {
-            MaskFrom::Auto if sample.grasp_from_object.is_some() && tool.is_some() => MaskFrom::Cad,
-            other => other,
-        };
         let touch = sample.pad(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;
         let bubble = touch.depth().ok_or_else(|| TaskError::new(WHAT, "it has no such imprint"))?;
-        let truth = sample.grasp_from_object;
-        let found = contact_mask(source, &args.mask, &bubble.imprint, touch, tool, truth, &mut predictor)
-            .map_err(|err| TaskError::new(WHAT, says(&err)))?;
+        let inputs = MaskInputs { sample, tool, labels: None };
+        let found = predictor.contact_mask(&args.mask, &bubble.imprint, finger, inputs);
+        let found = found.map_err(|err| TaskError::new(WHAT, says(&err)))?;
         if let Some(note) = found.basis.note() {
             output.note(&format!("note: {} finger: {note}", sample.rig.pad_key(finger)));
         }

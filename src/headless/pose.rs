@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::time::Instant;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
@@ -10,7 +9,7 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::args::{DatasetArgs, LimitArgs};
-use super::contact_mask::{FingerMasks, MaskArgs, MaskFrom, contact_mask};
+use super::contact_mask::{MaskArgs, labels_of};
 use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
@@ -23,16 +22,16 @@ use crate::domain::ambiguity::{Ambiguity, ambiguity};
 use crate::domain::dataset::{PairId, Problem};
 use crate::domain::findings::Finding;
 use crate::domain::frames::PlanarPose;
-use crate::domain::grid::DepthMap;
 use crate::domain::hand::{AcceptedPose, HandPose};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::{self, Engine, FingerInput, Fingers, ToolModel};
+use crate::domain::pose::{Engine, ToolModel};
 use crate::domain::rig::PerPad;
-use crate::domain::sample::Sample;
 use crate::domain::units::angle_error;
 use crate::io::dataset::Dataset;
-use crate::io::masks::MaskStore;
 use crate::work::job::JobCx;
+use crate::work::labels::{ImprintSource, Labels};
+use crate::work::mask::MaskInputs;
+use crate::work::pose::{PoseResult, pose};
 
 /// Arguments of `pose`.
 #[derive(Debug, Args)]
@@ -139,8 +138,8 @@ struct Case {
     name: String,
     engine: &'static str,
     imprint: &'static str,
-    /// What the masks are made of: the source's key, `depth` where the mask model found nothing, `flat` where the imprint
-    /// is flat; of both fingers (right, left) where they differ.
+    /// What the masks are made of: the source's key, `hand` where one was drawn, `depth` where the mask model found nothing,
+    /// `flat` where the imprint is flat; of both fingers (right, left) where they differ.
     mask: String,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     mask_notes: Vec<String>,
@@ -149,6 +148,7 @@ struct Case {
     error_deg: Option<f64>,
     y_m: Option<f64>,
     z_m: Option<f64>,
+    /// Time of the registration, milliseconds; 0 without a pose.
     ms: f64,
     stop: String,
     /// What a person accepted for this imprint in the studio, where there are labels.
@@ -218,11 +218,10 @@ struct Report {
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let ids = args.limit.spread(dataset.index.pairs.len());
-    let engines: &[Engine] = &args.engine.0;
-    let imprints: &[&'static str] = match args.imprint {
-        Imprints::Measured => &["measured"],
-        Imprints::Predicted => &["predicted"],
-        Imprints::Both => &["measured", "predicted"],
+    let imprints: &[ImprintSource] = match args.imprint {
+        Imprints::Measured => &[ImprintSource::Measured],
+        Imprints::Predicted => &[ImprintSource::Predicted],
+        Imprints::Both => &[ImprintSource::Measured, ImprintSource::Predicted],
     };
     let stems = match &args.fans.fan_out {
         Some(folder) => output_stems(folder, &dataset, &ids)?.into_iter().map(Some).collect(),
@@ -233,7 +232,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
     let mut notes = Notes::default();
     let mut cases = Vec::new();
-    let store = MaskStore::for_dataset(&dataset).ok();
+    let all_labels = Labels::of(&dataset);
     let mut complete = true;
     for (id, stem) in ids.into_iter().zip(stems) {
         let entry = &dataset.index.pairs[id];
@@ -266,29 +265,26 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             complete = false;
             continue;
         };
-        // Labels beside the data, made in the studio; a damaged file is said and does not hold up the poses.
-        let reviewed = store.as_ref().and_then(|store| {
-            store.load_review(&entry.name).unwrap_or_else(|err| {
-                output.note(&format!("{}: {err}", entry.name));
-                None
-            })
-        });
+        let labels = labels_of(&all_labels, &entry.name, &output);
         for &imprint in imprints {
-            let accepted = reviewed.as_ref().and_then(|r| r.accepted[usize::from(imprint == "predicted")]);
-            let work = || {
-                let pair = (entry.name.as_str(), stem.as_deref());
-                pose_cases(args, pair, &sample, tool, (imprint, accepted), engines, &mut predictor)
+            let asked = Asked {
+                name: &entry.name,
+                stem: stem.as_deref(),
+                inputs: MaskInputs { sample: &sample, tool: Some(tool), labels: args.mask.drawn(&labels) },
+                tool,
+                accepted: labels.accepted(imprint),
             };
+            let work = || pose_cases(args, &asked, imprint, &mut predictor);
             match guarded(dataset.pair_files(PairId(id as u32)), work) {
                 Ok(found) => {
                     for note in found.first().iter().flat_map(|case| &case.mask_notes) {
-                        output.note(&format!("note: {} ({imprint} imprint), {note}", entry.name));
+                        output.note(&format!("note: {} ({} imprint), {note}", entry.name, imprint.key()));
                     }
                     complete &= found.iter().all(|c| c.angle_deg.is_some());
                     cases.extend(found);
                 }
                 Err(err) => {
-                    output.note(&format!("{} ({imprint} imprint): {}", entry.name, says(&err)));
+                    output.note(&format!("{} ({} imprint): {}", entry.name, imprint.key(), says(&err)));
                     if err.is::<Bug>() {
                         predictor.recover();
                     }
@@ -299,7 +295,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     }
     complete &= !cases.is_empty();
     let notes = notes.into_list(&output);
-    let report = Report { summary: summary(&cases, imprints[0], engines[0]), cases, notes };
+    let report = Report { summary: summary(&cases, imprints[0].key(), args.engine.0[0]), cases, notes };
     output.finish(&report, || text(&report))?;
     Ok(complete)
 }
@@ -317,98 +313,68 @@ fn tool_with_notes(dataset: &Dataset, name: &str) -> anyhow::Result<(ToolModel, 
     Ok((ToolModel::new(file.mesh)?, file.notes))
 }
 
+/// A pair as `pose` asks for it.
+struct Asked<'a> {
+    name: &'a str,
+    /// Where pictures of it go.
+    stem: Option<&'a Path>,
+    inputs: MaskInputs<'a>,
+    tool: &'a ToolModel,
+    accepted: Option<AcceptedPose>,
+}
+
 /// One case per engine for one pair and one kind of imprint.
 fn pose_cases(
     args: &PoseArgs,
-    (name, stem): (&str, Option<&Path>),
-    sample: &Sample,
-    tool: &ToolModel,
-    (imprint, accepted): (&'static str, Option<AcceptedPose>),
-    engines: &[Engine],
+    asked: &Asked<'_>,
+    imprint: ImprintSource,
     predictor: &mut Predictor,
 ) -> anyhow::Result<Vec<Case>> {
-    let predicted = imprint == "predicted";
-    let imprints: PerPad<DepthMap> =
-        if predicted { predictor.imprints(sample, &JobCx::unwatched())? } else { measured(sample) };
-    let FingerMasks { masks, made_of, notes } = masks(&args.mask, sample, tool, &imprints, predicted, predictor)?;
-    let fingers = Fingers::new(&sample.rig, |f| {
-        let camera = sample.pad(f)?.camera()?;
-        Some(FingerInput { imprint: imprints[f].as_ref()?, camera, mask: masks[f].as_ref() })
-    });
-    let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
+    let Asked { name, stem, inputs, tool, accepted } = *asked;
+    let sample = inputs.sample;
+    let imprints = predictor.imprints(sample, imprint, &JobCx::unwatched())?;
+    let contact = predictor.contact(&args.mask, imprints, inputs)?;
+    let points = contact.points(sample);
+    let truth = sample.grasp_from_object;
+    let predicted = imprint == ImprintSource::Predicted;
     // What was measured is as it is; what was predicted may have had nothing to go by.
     let left_open = predicted.then(|| {
         let left_open = |f| ambiguity(&sample.pad(f)?.color()?.difference);
         sample.rig.pads().map(left_open).collect()
     });
     let several = predicted && args.ensemble.seeds > 1;
-    engines
-        .iter()
-        .map(|&engine| {
-            let fan = several
-                .then(|| seeds::fan(predictor, sample, tool, engine, &args.mask, args.ensemble.seeds))
-                .transpose()?;
-            if let (Some(fan), Some(stem)) = (&fan, stem) {
-                fan.write(stem, name, engine)?;
-            }
-            let start = Instant::now();
-            let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
-            let ask = Ask { starts, record: args.trace };
-            let result = pose::estimate_with(&fingers, tool, engine, &*registration(args, engine), ask);
-            let ms = start.elapsed().as_secs_f64() * 1e3;
-            let found = result.as_ref().ok().map(|r| r.object_from_grasp);
-            Ok(Case {
-                name: name.to_owned(),
-                engine: engine.key(),
-                imprint,
-                mask: made_of.clone(),
-                mask_notes: notes.clone(),
-                angle_deg: found.map(|p| p.theta_rad.to_degrees()),
-                truth_deg: truth.map(f64::to_degrees),
-                error_deg: found.zip(truth).map(|(p, t)| angle_error(p.theta_rad, t).to_degrees()),
-                y_m: found.map(|p| p.y_m),
-                z_m: found.map(|p| p.z_m),
-                ms,
-                stop: match &result {
-                    Ok(r) => r.report.stop.to_string(),
-                    Err(err) => err.to_string(),
-                },
-                accepted: accepted.map(|a| Accepted::new(a, truth)),
-                report: result.ok().map(|r| r.report).filter(|_| args.trace),
-                ambiguity: left_open.clone(),
-                fan,
-            })
+    let one = |&engine: &Engine| {
+        let fan = several
+            .then(|| seeds::fan(predictor, inputs, tool, engine, &args.mask, args.ensemble.seeds))
+            .transpose()?;
+        if let (Some(fan), Some(stem)) = (&fan, stem) {
+            fan.write(stem, name, engine)?;
+        }
+        let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
+        let ask = Ask { starts, record: args.trace };
+        let found = points.clone().and_then(|points| pose(&points, tool, &*registration(args, engine), ask, truth));
+        let answer = found.as_ref().ok();
+        let place = answer.map(PoseResult::object_from_grasp);
+        Ok(Case {
+            name: name.to_owned(),
+            engine: engine.key(),
+            imprint: imprint.key(),
+            mask: contact.made_of(),
+            mask_notes: contact.notes(&sample.rig),
+            angle_deg: answer.map(|found| found.angle_rad.to_degrees()),
+            truth_deg: truth.map(|truth| truth.inverse().theta_rad.to_degrees()),
+            error_deg: answer.and_then(|found| Some(found.error_rad?.to_degrees())),
+            y_m: place.map(|p| p.y_m),
+            z_m: place.map(|p| p.z_m),
+            ms: answer.map_or(0.0, |found| found.ms),
+            stop: found.as_ref().map_or_else(|err| err.why.clone(), |found| found.stop.clone()),
+            accepted: accepted.map(|a| Accepted::new(a, truth.map(|truth| truth.inverse().theta_rad))),
+            report: found.ok().map(|found| found.report).filter(|_| args.trace),
+            ambiguity: left_open.clone(),
+            fan,
         })
-        .collect()
-}
-
-/// The measured imprints.
-pub(super) fn measured(sample: &Sample) -> PerPad<DepthMap> {
-    sample.rig.pads().map(|f| Some(sample.pad(f)?.depth()?.imprint.clone())).collect()
-}
-
-/// The contact masks and what they are made of.
-pub(super) fn masks(
-    args: &MaskArgs,
-    sample: &Sample,
-    tool: &ToolModel,
-    imprints: &PerPad<DepthMap>,
-    predicted: bool,
-    predictor: &mut Predictor,
-) -> anyhow::Result<FingerMasks> {
-    let source = match args.mask {
-        MaskFrom::Auto if !predicted && sample.grasp_from_object.is_some() => MaskFrom::Cad,
-        // The truth must not leak into the pose of a prediction unless it was asked for.
-        MaskFrom::Auto => MaskFrom::Unet,
-        other => other,
     };
-    let mut masks = PerPad::default();
-    for finger in sample.rig.pads() {
-        let (Some(imprint), Some(touch)) = (&imprints[finger], sample.pad(finger)) else { continue };
-        let truth = sample.grasp_from_object;
-        masks[finger] = Some(contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?);
-    }
-    Ok(FingerMasks::new(source, &sample.rig, masks))
+    args.engine.0.iter().map(one).collect()
 }
 
 fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> Figures {

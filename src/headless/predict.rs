@@ -8,6 +8,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
 
+use super::contact_mask::MaskArgs;
 use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
 use crate::domain::grid::{DepthMap, RgbGrid};
@@ -19,9 +20,11 @@ use crate::infer::engine::{EngineChoice, resolve};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
 use crate::work::error::TaskError;
-use crate::work::imprint::{chain_of, imprint, imprint_of};
+use crate::work::imprint::{self, chain_of, imprint_of};
 use crate::work::job::JobCx;
-use crate::work::models::{Models, Wanted};
+use crate::work::labels::ImprintSource;
+use crate::work::mask::{Contact, MaskChoice, MaskInputs, MaskSource};
+use crate::work::models::{Masking, Models, Wanted};
 use crate::work::prediction::Prediction;
 
 /// Which models, and how they are run.
@@ -290,11 +293,11 @@ impl Predictor {
     }
 
     /// Loads the models that a touch needs and runs them once; see [`Models::warm_up`].
-    pub(super) fn warm_up(&mut self, with_mask: bool) -> anyhow::Result<()> {
+    pub(super) fn warm_up(&mut self, choice: &MaskChoice) -> anyhow::Result<()> {
         let (config, bundle) = (self.config()?, self.bundle()?.clone());
         let made = self.models.warm_up(&bundle, self.engine(), &config)?;
-        if with_mask {
-            self.mask(&imprint(&made, self.shift(), [0, 0])?)?;
+        if let Some(model) = self.mask_model(choice)? {
+            self.models.mask(&model, self.engine(), &imprint::imprint(&made, self.shift(), [0, 0])?)?;
         }
         Ok(())
     }
@@ -325,9 +328,16 @@ impl Predictor {
         Ok(found)
     }
 
-    /// Predicted imprints (meters, raw orientation) of the fingers that the generator can start from, as large as the
-    /// measured ones.
-    pub(super) fn imprints(&mut self, sample: &Sample, cx: &JobCx) -> anyhow::Result<PerPad<DepthMap>> {
+    /// The imprints of a pair (meters, raw orientation): measured, or predicted from what the generator starts from.
+    pub(super) fn imprints(
+        &mut self,
+        sample: &Sample,
+        source: ImprintSource,
+        cx: &JobCx,
+    ) -> anyhow::Result<PerPad<DepthMap>> {
+        if source == ImprintSource::Measured {
+            return Ok(imprint::measured(sample));
+        }
         let conditions = self.conditions(sample)?;
         let pictures: Vec<&RgbGrid> = conditions.iter().map(|(_, picture)| &**picture).collect();
         let made = self.predict(&pictures, cx)?;
@@ -338,12 +348,41 @@ impl Predictor {
         Ok(out)
     }
 
-    /// The mask model's contact mask of an imprint, and what it is made of in the end.
-    pub(super) fn mask(&mut self, imprint: &DepthMap) -> anyhow::Result<ContactMask> {
-        if self.mask_model.is_none() {
-            self.mask_model = Some(self.take(BundleKind::Mask, self.args.mask_bundle.clone())?);
+    /// The mask model, looked for where the choice takes one; `None` where none is found and none was named.
+    pub(super) fn mask_model(&mut self, choice: &MaskChoice) -> anyhow::Result<Option<BundleInfo>> {
+        if self.mask_model.is_none() && matches!(choice.source, MaskSource::Auto | MaskSource::Unet) {
+            let named = self.args.mask_bundle.clone();
+            let may_lack = named.is_none() && choice.source == MaskSource::Auto;
+            self.mask_model = match self.take(BundleKind::Mask, named) {
+                Err(_) if may_lack => None,
+                found => Some(found?),
+            };
         }
-        let bundle = self.mask_model.clone().expect("it was just found");
-        Ok(self.models.mask(&bundle, self.engine(), imprint)?)
+        Ok(self.mask_model.clone())
+    }
+
+    /// Imprints with their contact masks.
+    pub(super) fn contact(
+        &mut self,
+        args: &MaskArgs,
+        imprints: PerPad<DepthMap>,
+        inputs: MaskInputs<'_>,
+    ) -> anyhow::Result<Contact> {
+        let (choice, engine) = (args.choice(), self.engine());
+        let model = self.mask_model(&choice)?;
+        Ok(self.models.contact(Masking { choice, model: model.as_ref(), engine }, imprints, inputs)?)
+    }
+
+    /// The contact mask of one pad's imprint.
+    pub(super) fn contact_mask(
+        &mut self,
+        args: &MaskArgs,
+        imprint: &DepthMap,
+        pad: PadId,
+        inputs: MaskInputs<'_>,
+    ) -> anyhow::Result<ContactMask> {
+        let (choice, engine) = (args.choice(), self.engine());
+        let model = self.mask_model(&choice)?;
+        Ok(self.models.contact_mask(Masking { choice, model: model.as_ref(), engine }, imprint, pad, inputs)?)
     }
 }

@@ -7,18 +7,21 @@ use std::sync::Arc;
 use clap::Args;
 use serde::Serialize;
 
-use super::contact_mask::{MaskArgs, MaskFrom, contact_mask};
+use super::contact_mask::MaskArgs;
 use super::predict::Predictor;
+use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
 use crate::domain::ensemble::{AngleFan, Spread, seeds};
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, estimate};
+use crate::domain::grid::DepthMap;
+use crate::domain::pose::{Engine, ToolModel};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::domain::units::angle_error;
 use crate::io::{images, names, npz};
 use crate::work::ensemble::{Ensemble, ensemble};
 use crate::work::imprint::imprint_of;
+use crate::work::mask::MaskInputs;
+use crate::work::pose;
 use crate::work::prediction::Prediction;
 
 /// How many seeds.
@@ -155,12 +158,13 @@ impl PoseFan {
 /// Predicts both fingers with every seed and registers each, and the mean imprint.
 pub(super) fn fan(
     predictor: &mut Predictor,
-    sample: &Sample,
+    inputs: MaskInputs<'_>,
     tool: &ToolModel,
     engine: Engine,
     args: &MaskArgs,
     count: u16,
 ) -> anyhow::Result<PoseFan> {
+    let sample = inputs.sample;
     let mut fingers: PerPad<FingerSeeds> = PerPad::default();
     for finger in sample.rig.pads() {
         let Some(touch) = sample.pad(finger) else { continue };
@@ -168,28 +172,17 @@ pub(super) fn fan(
             fingers[finger] = Some(predict(predictor, sample, finger, count)?);
         }
     }
-    let source = match args.mask {
-        MaskFrom::Auto => MaskFrom::Unet,
-        other => other,
-    };
     let mut made_otherwise = BTreeMap::new();
     let mut angle = |imprints: PerPad<&DepthMap>| -> anyhow::Result<Option<f64>> {
-        let mut masks: PerPad<Mask> = PerPad::default();
-        for finger in sample.rig.pads() {
-            let (Some(imprint), Some(touch)) = (imprints[finger], sample.pad(finger)) else { continue };
-            let truth = sample.grasp_from_object;
-            let found = contact_mask(source, args, imprint, touch, Some(tool), truth, predictor)?;
-            if found.basis != MaskBasis::Source {
-                let made_of = format!("{} finger: {}", sample.rig.pad_key(finger), found.basis.key(source.key()));
-                *made_otherwise.entry(made_of).or_insert(0) += 1;
-            }
-            masks[finger] = Some(found.mask);
+        let contact = predictor.contact(args, imprints.map(|imprint| imprint.cloned()), inputs)?;
+        for (pad, found) in contact.masks.entries().filter(|(_, found)| found.basis != MaskBasis::Source) {
+            let made_of = format!("{} finger: {}", sample.rig.pad_key(pad), found.basis.key(contact.source.key()));
+            *made_otherwise.entry(made_of).or_insert(0) += 1;
         }
-        let inputs = Fingers::new(&sample.rig, |f| {
-            let camera = sample.pad(f)?.camera()?;
-            Some(FingerInput { imprint: imprints[f]?, camera, mask: masks[f].as_ref() })
+        let found = contact.points(sample).and_then(|points| {
+            pose::pose(&points, tool, &*engine.registration(), Ask::default(), sample.grasp_from_object)
         });
-        Ok(estimate(&inputs, tool, engine, false).ok().map(|r| r.object_from_grasp.theta_rad))
+        Ok(found.ok().map(|found| found.angle_rad))
     };
     let mut angles = Vec::new();
     for i in 0..usize::from(count) {

@@ -14,7 +14,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::args::DatasetArgs;
-use super::contact_mask::{MaskArgs, MaskFrom};
+use super::contact_mask::{MaskArgs, labels_of};
 use super::guard::{Bug, guarded};
 use super::output::says;
 use super::pose::{Engines, parse_engines};
@@ -27,6 +27,8 @@ use crate::io::dataset::{Dataset, cameras_of};
 use crate::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
 use crate::io::names::Outputs;
 use crate::work::job::Cancel;
+use crate::work::labels::{Labels, PairLabels};
+use crate::work::mask::MaskSource;
 use one::{Done, Worker};
 use summary::Summary;
 use write::Save;
@@ -92,8 +94,9 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
     let output = Output::new(args.common, "watching", 0);
     let stop = Cancel::default();
     take_signals(stop.clone())?;
-    if matches!(args.mask.mask, MaskFrom::Cad | MaskFrom::Truth) {
-        anyhow::bail!("--mask {} needs the true pose, which a new touch does not have", args.mask.mask.key());
+    let masks = args.mask.choice().source;
+    if matches!(masks, MaskSource::Cad | MaskSource::Truth) {
+        anyhow::bail!("--mask {} needs the true pose, which a new touch does not have", masks.key());
     }
     let mut outputs = args.out.as_deref().map(report::outputs).transpose()?;
     let patience = Duration::try_from_secs_f64(args.patience)
@@ -107,7 +110,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
     let mut follower = Follower::new(args.dataset.path(), config)?;
     let mut worker = Worker::new(args, Predictor::new(&args.model, &Rig::lab()), stop.clone())?;
     let ready = json!({
-        "event": "ready", "folder": args.dataset.path(), "recipe": worker.recipe(None)?, "period_ms": PERIOD.as_secs_f64() * 1e3,
+        "event": "ready", "folder": args.dataset.path(), "recipe": worker.recipe(None, &PairLabels::default())?, "period_ms": PERIOD.as_secs_f64() * 1e3,
         "load_and_warm_up_s": worker.warm_s,
     });
     output.line(&ready, || {
@@ -209,7 +212,9 @@ fn touch(
     };
     let source = Source::new(&ready.file, ready.stamp);
     let tool = worker.tool_name(follower.dataset().and_then(|d| d.index.get(ready.id)?.tool.clone()));
-    let recipe = worker.recipe(tool.as_deref())?;
+    let entry = follower.dataset().and_then(|dataset| Some((Labels::of(dataset), &dataset.index.get(ready.id)?.name)));
+    let labels = entry.map_or_else(PairLabels::default, |(labels, name)| labels_of(&labels, name, output));
+    let recipe = worker.recipe(tool.as_deref(), &labels)?;
     if write::is_done(&stem, &source, &recipe) {
         summary.skip();
         return output.line(&json!({"event": "skipped", "name": ready.name}), || {
@@ -227,7 +232,8 @@ fn touch(
         Arrival::Whole(loaded) => {
             let Some(dataset) = follower.dataset().cloned() else { return Ok(()) };
             let times = (ready, found, start);
-            let work = || worker.work(&dataset, &loaded.sample, tool.as_deref(), &stem, &source, &recipe, times);
+            let work =
+                || worker.work(&dataset, &loaded.sample, tool.as_deref(), &labels, &stem, &source, &recipe, times);
             match guarded(vec![ready.file.clone()], work) {
                 Ok(Some(done)) => return report(output, &done, summary),
                 // Ctrl-C.

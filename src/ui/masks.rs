@@ -10,7 +10,7 @@ use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::document::Review;
 use crate::app::keys::ImprintSource;
-use crate::app::settings::{BRUSH_RADIUS_PX, MaskSettings, MaskSource, MaskTool};
+use crate::app::settings::{BRUSH_RADIUS_PX, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use crate::app::state::Lookup;
 
 /// The pane.
@@ -70,49 +70,49 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
     let settings = &cx.state.settings.mask;
     let finger = cx.state.selection.finger;
     let combo = egui::ComboBox::from_id_salt("mask source").width(ui.available_width() - 8.0);
-    let response = combo.selected_text(settings.source.name()).show_ui(ui, |ui| {
+    let response = combo.selected_text(settings.choice.source.name()).show_ui(ui, |ui| {
         for source in MaskSource::iter() {
-            let option = ui.selectable_label(source == settings.source, source.name());
+            let option = ui.selectable_label(source == settings.choice.source, source.name());
             if option.on_hover_text(source.tooltip()).clicked() {
                 cx.out.push(Command::SetMaskSource(source));
             }
         }
     });
-    response.response.accessible_name("Mask source").on_hover_text(settings.source.tooltip());
+    response.response.accessible_name("Mask source").on_hover_text(settings.choice.source.tooltip());
     let mut new = settings.clone();
     ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
-    match settings.source {
+    match settings.choice.source {
         MaskSource::Threshold => {
-            let mut mm = new.threshold_m * 1e3;
+            let mut mm = new.choice.threshold_m * 1e3;
             let slider = egui::Slider::new(&mut mm, 0.0..=15.0).fixed_decimals(2).suffix(" mm");
             let response = ui.add(slider).accessible_name("Threshold");
             if response.double_clicked() {
-                mm = MaskSettings::default().threshold_m * 1e3;
+                mm = MaskChoice::default().threshold_m * 1e3;
             }
-            new.threshold_m = mm * 1e-3;
+            new.choice.threshold_m = mm * 1e-3;
             response
                 .on_hover_text("Pixels pushed in further than this, millimeters. Default 5.00; double-click resets");
         }
         MaskSource::TopPercent => {
-            let slider = egui::Slider::new(&mut new.top_percent, 0.0..=60.0).fixed_decimals(1).suffix(" %");
+            let slider = egui::Slider::new(&mut new.choice.top_percent, 0.0..=60.0).fixed_decimals(1).suffix(" %");
             let response = ui.add(slider).accessible_name("Top percent");
             if response.double_clicked() {
-                new.top_percent = MaskSettings::default().top_percent;
+                new.choice.top_percent = MaskChoice::default().top_percent;
             }
             response.on_hover_text("Share of the deepest pixels. Default 15.0; double-click resets");
         }
         MaskSource::Cad => {
-            let mut mm = new.cad_distance_m * 1e3;
+            let mut mm = new.choice.cad_distance_m * 1e3;
             let slider = egui::Slider::new(&mut mm, 0.0..=5.0).fixed_decimals(2).suffix(" mm");
             let response = ui.add(slider).accessible_name("CAD distance");
             if response.double_clicked() {
-                mm = MaskSettings::default().cad_distance_m * 1e3;
+                mm = MaskChoice::default().cad_distance_m * 1e3;
             }
-            new.cad_distance_m = mm * 1e-3;
+            new.choice.cad_distance_m = mm * 1e-3;
             response
                 .on_hover_text("Largest distance to the CAD model at the true pose. Default 1.00; double-click resets");
         }
-        MaskSource::Unet | MaskSource::Truth => {}
+        MaskSource::Auto | MaskSource::Unet | MaskSource::Truth => {}
     }
     if let Err(absent) = cx.state.mask_recipe(finger) {
         ui.label(RichText::new(absent.text()).size(SMALL).color(cx.p.caution));

@@ -8,6 +8,8 @@ use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{DepthCamera, Sample};
 
+const WHAT: &str = "Point cloud";
+
 /// The surface points of both fingers in the grasp frame.
 #[derive(Clone, Debug, Default)]
 pub struct Clouds {
@@ -58,10 +60,10 @@ impl FingerCloud {
 /// # Errors
 /// If the sizes differ or the camera's numbers cannot be right.
 pub fn finger_cloud(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Result<FingerCloud, TaskError> {
-    let lifted = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error("Point cloud", &err))?;
+    let lifted = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error(WHAT, &err))?;
     if let Some(mask) = mask.filter(|mask| mask.size() != imprint.size()) {
         let why = format!("the mask has {:?} pixels, the imprint {:?}", mask.size(), imprint.size());
-        return Err(TaskError::new("Point cloud", why).with_hint("Remove the correction of this mask."));
+        return Err(TaskError::new(WHAT, why).with_hint("Remove the correction of this mask."));
     }
     let contact = lifted
         .pixels
@@ -87,9 +89,33 @@ pub fn clouds(sample: &Sample, parts: &PerPad<(&DepthMap, Option<&Mask>)>) -> Re
     Ok(clouds)
 }
 
+/// The contact points of both fingers, right first: those of [`Clouds::contact_points`] where nobody looks at the rest of
+/// the surface. A finger without imprint, mask or camera is left out.
+///
+/// # Errors
+/// If no finger is left, the sizes differ, or a camera's numbers cannot be right.
+pub fn contact_points(
+    sample: &Sample,
+    imprints: &PerPad<&DepthMap>,
+    masks: &PerPad<&Mask>,
+) -> Result<Vec<DVec3>, TaskError> {
+    let (mut points, mut any) = (Vec::new(), false);
+    for pad in sample.rig.pads() {
+        let camera = sample.pad(pad).and_then(|t| t.camera());
+        let (Some(imprint), Some(mask), Some(camera)) = (imprints[pad], masks[pad], camera) else { continue };
+        let lifted = cloud::lift(imprint, camera, Some(mask));
+        let why = |err| TaskError::new(WHAT, format!("{} finger: {err}", sample.rig.pad_key(pad)));
+        points.extend(lifted.map_err(why)?.points);
+        any = true;
+    }
+    let why = "neither finger has an imprint with camera data, so there are no points to align";
+    if any { Ok(points) } else { Err(TaskError::new(WHAT, why)) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::rig::lab;
 
     #[test]
     fn points_are_found_by_pixel() {
@@ -102,5 +128,27 @@ mod tests {
         assert_eq!(cloud.at_pixel(2, 2), None);
         let clouds = Clouds { fingers: [None, Some(cloud)].into() };
         assert_eq!(clouds.contact_points().len(), 2);
+    }
+
+    #[test]
+    fn contact_points_are_those_of_the_surface_bit_for_bit() {
+        let (spec, config) = (&crate::domain::sim::tools()[0], crate::domain::sim::SimConfig::default());
+        let sample = crate::domain::sim::simulate(spec, crate::domain::sim::random_grasp(3), 3, &config);
+        let imprint = |pad| sample.pad(pad)?.depth().map(|bubble| bubble.imprint.clone());
+        let mut imprints: PerPad<DepthMap> = sample.rig.pads().map(imprint).collect();
+        // Holes within the mask have no point, in either way.
+        imprints[lab::LEFT].as_mut().unwrap().as_mut_slice()[5000..9000].fill(f32::NAN);
+        let masks: PerPad<Mask> = imprints.clone().map(|i| i.map(|i| i.map(|&d| !(d < 0.004))));
+        let parts = sample.rig.pads().map(|pad| Some((imprints[pad].as_ref()?, masks[pad].as_ref()))).collect();
+        let surface = clouds(&sample, &parts).unwrap();
+        let points = contact_points(&sample, &imprints.as_ref(), &masks.as_ref()).unwrap();
+        assert!(points.len() > 500 && points == surface.contact_points());
+        // A finger without a mask gives none, and none at all is an error.
+        let right = [masks[lab::RIGHT].as_ref(), None].into();
+        assert_eq!(
+            contact_points(&sample, &imprints.as_ref(), &right).unwrap(),
+            points[..surface.fingers[lab::RIGHT].as_ref().unwrap().contact.iter().filter(|c| **c).count()]
+        );
+        assert!(contact_points(&sample, &imprints.as_ref(), &PerPad::default()).is_err());
     }
 }

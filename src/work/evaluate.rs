@@ -24,6 +24,8 @@ use crate::infer::engine::{EngineChoice, threads};
 use crate::io::dataset::Dataset;
 use crate::work::error::TaskError;
 use crate::work::job::JobCx;
+use crate::work::mask::MaskChoice;
+use crate::work::models;
 use methods::{Method, Models};
 
 pub use export::{Report, export, rows};
@@ -31,32 +33,19 @@ pub use export::{Report, export, rows};
 /// What it is called in errors.
 const WHAT: &str = "Evaluate";
 
-/// Where the contact masks come from, for every method alike.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MaskBy {
-    /// The mask model: what a robot has.
-    #[default]
-    Unet,
-    /// The CAD model at the true pose, on whatever imprint: an upper bound.
-    Cad,
-    /// The simulator's true contact, whatever the imprint.
-    Truth,
-    /// Imprint depth above so many meters.
-    Threshold(f32),
-}
-
 /// What to evaluate, and how.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setup {
     /// Generator bundles: a row each.
     pub bundles: Vec<Origin>,
-    /// The mask model; without it there are no angles by [`MaskBy::Unet`].
+    /// The mask model; without it there are no angles by [`MaskSource::Unet`](super::mask::MaskSource).
     pub mask_bundle: Option<Origin>,
     /// The tool classifier; without it neither accuracy nor Fréchet distance.
     pub classifier: Option<Origin>,
-    /// Where the contact masks come from.
-    pub mask: MaskBy,
+    /// Where the contact masks come from that nobody drew, for every method alike.
+    pub mask: MaskChoice,
+    /// Whether a mask drawn by hand is taken where there is one, for every method alike.
+    pub hand: bool,
     /// The registration.
     pub engine: Engine,
     /// How decoder outputs become meters.
@@ -86,7 +75,8 @@ impl Default for Setup {
             bundles: Vec::new(),
             mask_bundle: None,
             classifier: None,
-            mask: MaskBy::default(),
+            mask: MaskChoice::default(),
+            hand: true,
             engine: Engine::default(),
             shift: ShiftMode::default(),
             steps: None,
@@ -142,15 +132,21 @@ pub struct Evaluation {
     pub scores: Vec<Scores>,
 }
 
-/// Scores every grasp of `dataset` by every method of `setup`. Stops early when told to, with what was scored so far.
+/// Scores every grasp of `dataset` by every method of `setup`. Predictions that are kept beside `models` are not made
+/// again. Stops early when told to, with what was scored so far.
 ///
 /// # Errors
 /// If a bundle cannot be used, nothing could be scored, or it was told to stop before anything was. Pairs and
 /// predictions that fail are left out and listed.
-pub fn evaluate(dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
+pub fn evaluate(
+    dataset: &Dataset,
+    setup: &Setup,
+    models: &models::Models,
+    cx: &JobCx,
+) -> Result<Evaluation, TaskError> {
     let start = Instant::now();
     cx.progress(0, 0, "loading the models");
-    let mut models = Models::open(setup, dataset)?;
+    let mut models = Models::open(setup, dataset, models)?;
     let work = load::plan(dataset, setup);
     let total: usize = work.iter().map(|tool| tool.ids.len()).sum();
     if total == 0 {

@@ -5,7 +5,7 @@ use super::prediction::{Chains, Prediction};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{DepthChain, PostprocessError, RawPrediction, ShiftMode};
 use crate::domain::resample::{bilinear, bilinear_rgb};
-use crate::domain::rig::PadId;
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{PadTouch, Sample};
 
 /// Longest side of a thumbnail, pixels.
@@ -34,6 +34,11 @@ pub fn imprint_of(
 ) -> Result<DepthMap, TaskError> {
     let bubble = sample.pad(finger).and_then(|t| t.depth());
     imprint(prediction, shift, bubble.map_or([0, 0], |b| b.imprint.size()))
+}
+
+/// The measured imprints of a pair.
+pub fn measured(sample: &Sample) -> PerPad<DepthMap> {
+    sample.rig.pads().map(|pad| Some(sample.pad(pad)?.depth()?.imprint.clone())).collect()
 }
 
 /// A prediction of a color sensor, as large as that sensor's picture `size` (`[width, height]`; with a zero in it the

@@ -6,27 +6,49 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
-use strum::EnumIter;
+use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::error::TaskError;
 use crate::domain::dataset::Problem;
-use crate::domain::grid::Mask;
+use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::hand::AcceptedPose;
 use crate::domain::rig::{PadId, PerPad};
 use crate::io::dataset::Dataset;
 use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
 
 /// Which imprint of a touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    EnumIter,
+    EnumString,
+    IntoStaticStr,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum ImprintSource {
     /// What the Soft Bubble measured.
+    #[default]
     Measured,
     /// What the generator predicts from the GelSlim image.
     Predicted,
 }
 
 impl ImprintSource {
+    /// The name in files and on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
     /// The name on screen.
     pub fn name(self) -> &'static str {
         match self {
@@ -115,6 +137,11 @@ impl PairLabels {
     /// Whether it says nothing, so that nothing need be stored.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// The mask drawn by hand of a pad, if it is as large as the imprint.
+    pub fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&HandMask> {
+        self.masks[pad].as_ref().filter(|hand| hand.mask.size() == imprint.size())
     }
 
     /// The pose accepted for `source`.

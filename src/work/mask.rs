@@ -1,14 +1,132 @@
-//! Contact masks that need no model: [`mask`].
+//! Contact masks: where they come from ([`MaskChoice`]), and how they are made.
+//!
+//! One rule, in the studio and in every verb: a mask drawn by hand wins where there is one, else the choice makes one,
+//! and what was taken is said with the mask.
 
 use std::sync::Arc;
 
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use strum::{EnumIter, EnumString, IntoStaticStr};
+
+use super::cloud::contact_points;
 use super::error::TaskError;
+use super::labels::PairLabels;
 use crate::domain::bits::Bits;
-use crate::domain::contact::{self, ContactMask};
-use crate::domain::frames::PlanarPose;
+use crate::domain::contact::{self, ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
 use crate::domain::grid::DepthMap;
 use crate::domain::pose::ToolModel;
-use crate::domain::sample::PadTouch;
+use crate::domain::rig::{PadId, PerPad, Rig};
+use crate::domain::sample::{PadTouch, Sample};
+
+const WHAT: &str = "Contact mask";
+
+/// Where a mask comes from when nobody drew one.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    EnumIter,
+    EnumString,
+    IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum MaskSource {
+    /// The mask model, and where there is none, the threshold.
+    #[default]
+    Auto,
+    /// The mask model.
+    Unet,
+    /// Imprint above a depth.
+    Threshold,
+    /// The deepest share of the pixels.
+    TopPercent,
+    /// Near the CAD model at the true pose: the lab's labels.
+    Cad,
+    /// The simulator's truth.
+    Truth,
+}
+
+impl MaskSource {
+    /// The name in files and on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "Auto",
+            Self::Unet => "UNet",
+            Self::Threshold => "Threshold",
+            Self::TopPercent => "Top percent",
+            Self::Cad => "CAD distance",
+            Self::Truth => "Simulator truth",
+        }
+    }
+
+    /// What it does, in a line.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::Auto => "What the mask model predicts from the imprint; without a mask model, the threshold",
+            Self::Unet => "What the mask model predicts from the imprint",
+            Self::Threshold => "Pixels pushed in further than a depth",
+            Self::TopPercent => "The deepest share of the pixels",
+            Self::Cad => "Pixels whose membrane point lies near the CAD model at the true pose (the lab's labels)",
+            Self::Truth => "What the simulator knows",
+        }
+    }
+}
+
+/// The source of the masks that nobody drew, with the number of each source that has one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct MaskChoice {
+    /// The source.
+    pub source: MaskSource,
+    /// Depth of the threshold source, meters.
+    pub threshold_m: f32,
+    /// Share of the deepest pixels of the top-percent source, percent.
+    pub top_percent: f32,
+    /// Distance to the CAD surface of the CAD source, meters.
+    pub cad_distance_m: f32,
+}
+
+impl Default for MaskChoice {
+    fn default() -> Self {
+        Self {
+            source: MaskSource::default(),
+            // The middle of the thresholds that the lab used for its tools (0.0048 to 0.0053 m).
+            threshold_m: 0.005,
+            top_percent: 15.0,
+            cad_distance_m: LAB_CAD_DISTANCE_M as f32,
+        }
+    }
+}
+
+impl MaskChoice {
+    /// The recipe, `model` being the mask model's identity; `None` if it takes a model and there is none.
+    pub fn recipe(&self, model: Option<&Arc<str>>) -> Option<MaskRecipe> {
+        let threshold = MaskRecipe::Threshold(self.threshold_m.into());
+        Some(match self.source {
+            MaskSource::Auto => model.cloned().map_or(threshold, MaskRecipe::Unet),
+            MaskSource::Unet => MaskRecipe::Unet(model?.clone()),
+            MaskSource::Threshold => threshold,
+            MaskSource::TopPercent => MaskRecipe::TopPercent(self.top_percent.into()),
+            MaskSource::Cad => MaskRecipe::Cad(self.cad_distance_m.into()),
+            MaskSource::Truth => MaskRecipe::Truth,
+        })
+    }
+}
 
 /// An automatic mask's recipe.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -25,21 +143,61 @@ pub enum MaskRecipe {
     Truth,
 }
 
-/// An automatic mask that needs no model, and what it is made of in the end: a flat imprint has no contact.
+impl MaskRecipe {
+    /// The source that it is of.
+    pub fn source(&self) -> MaskSource {
+        match self {
+            Self::Threshold(_) => MaskSource::Threshold,
+            Self::TopPercent(_) => MaskSource::TopPercent,
+            Self::Cad(_) => MaskSource::Cad,
+            Self::Unet(_) => MaskSource::Unet,
+            Self::Truth => MaskSource::Truth,
+        }
+    }
+}
+
+/// What masks of a pair can be made from, besides its imprints.
+#[derive(Clone, Copy, Debug)]
+pub struct MaskInputs<'a> {
+    /// The pair.
+    pub sample: &'a Sample,
+    /// Its tool, for [`MaskRecipe::Cad`].
+    pub tool: Option<&'a ToolModel>,
+    /// What people drew; `None` leaves that out.
+    pub labels: Option<&'a PairLabels>,
+}
+
+/// The mask of one pad's imprint: the one drawn by hand, else by the recipe; `unet` runs the mask model.
 ///
-/// `tool` and `truth` (`grasp_from_object`) are needed for [`MaskRecipe::Cad`], `touch` for it and for
-/// [`MaskRecipe::Truth`].
+/// # Errors
+/// If something the recipe needs is not there, the sizes differ, or the model fails.
+pub fn contact_mask(
+    recipe: &MaskRecipe,
+    imprint: &DepthMap,
+    pad: PadId,
+    inputs: MaskInputs<'_>,
+    unet: impl FnOnce(&DepthMap) -> Result<ContactMask, TaskError>,
+) -> Result<ContactMask, TaskError> {
+    if let Some(hand) = inputs.labels.and_then(|labels| labels.drawn(pad, imprint)) {
+        return Ok(ContactMask { mask: (*hand.mask).clone(), basis: MaskBasis::Hand });
+    }
+    match recipe {
+        MaskRecipe::Unet(_) => unet(imprint),
+        _ => without_model(recipe, imprint, pad, inputs),
+    }
+}
+
+/// The mask of a recipe that needs no model, and what it is made of in the end: a flat imprint has no contact.
 ///
 /// # Errors
 /// If something the recipe needs is not there, or the sizes differ.
-pub fn mask(
+pub fn without_model(
     recipe: &MaskRecipe,
     imprint: &DepthMap,
-    touch: Option<&PadTouch>,
-    tool: Option<&ToolModel>,
-    truth: Option<PlanarPose>,
+    pad: PadId,
+    inputs: MaskInputs<'_>,
 ) -> Result<ContactMask, TaskError> {
-    const WHAT: &str = "Contact mask";
+    let touch = inputs.sample.pad(pad);
     let mask = match recipe {
         MaskRecipe::Threshold(min_m) => contact::threshold(imprint, min_m.get()),
         MaskRecipe::TopPercent(percent) => contact::top_percent(imprint, f64::from(percent.get()), f32::NEG_INFINITY),
@@ -47,7 +205,8 @@ pub fn mask(
             let camera = touch
                 .and_then(PadTouch::camera)
                 .ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))?;
-            let tool = tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
+            let tool = inputs.tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
+            let truth = inputs.sample.grasp_from_object;
             let truth = truth.ok_or_else(|| TaskError::new(WHAT, "the true pose is not known"))?;
             contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), f64::from(limit_m.get()))
                 .map_err(|err| TaskError::from_error(WHAT, &err))?
@@ -58,7 +217,82 @@ pub fn mask(
                 .ok_or_else(|| TaskError::new(WHAT, "only simulated data knows the true contact"))?;
             truth.contact.clone()
         }
-        MaskRecipe::Unet(_) => return Err(TaskError::new(WHAT, "the mask model runs on another lane")),
+        MaskRecipe::Unet(_) => return Err(TaskError::new(WHAT, "the mask model is needed")),
     };
     Ok(contact::settled(imprint, mask))
+}
+
+/// The imprints of a pair with their contact masks.
+#[derive(Clone, Debug)]
+pub struct Contact {
+    /// Meters, raw orientation.
+    pub imprints: PerPad<DepthMap>,
+    /// One for each imprint.
+    pub masks: PerPad<ContactMask>,
+    /// Where those come from that nobody drew.
+    pub source: MaskSource,
+}
+
+impl Contact {
+    /// What the masks are made of: the key of the source; `hand` where one was drawn, `depth` where the model found
+    /// nothing, `flat` where there is no contact; of the pads in turn where they differ.
+    pub fn made_of(&self) -> String {
+        let mut keys: Vec<&'static str> = self.masks.iter().flatten().map(|m| m.basis.key(self.source.key())).collect();
+        keys.dedup();
+        if keys.is_empty() { self.source.key().to_owned() } else { keys.join(", ") }
+    }
+
+    /// In words, by pad, why masks are not of the source that was asked.
+    pub fn notes(&self, rig: &Rig) -> Vec<String> {
+        let note =
+            |(pad, found): (PadId, &ContactMask)| Some(format!("{} finger: {}", rig.pad_key(pad), found.basis.note()?));
+        self.masks.entries().filter_map(note).collect()
+    }
+
+    /// The contact points of the pair in the grasp frame, meters.
+    ///
+    /// # Errors
+    /// As [`contact_points`].
+    pub fn points(&self, sample: &Sample) -> Result<Vec<DVec3>, TaskError> {
+        contact_points(sample, &self.imprints.as_ref(), &self.masks.as_ref().map(|found| Some(&found?.mask)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::grid::Mask;
+    use crate::domain::rig::lab;
+    use crate::work::labels::HandMask;
+
+    #[test]
+    fn auto_is_the_model_or_else_the_threshold_and_a_drawn_mask_wins_over_all() {
+        let (choice, id) = (MaskChoice::default(), Arc::from("id"));
+        assert_eq!(choice.recipe(Some(&id)), Some(MaskRecipe::Unet(id.clone())));
+        assert_eq!(choice.recipe(None), Some(MaskRecipe::Threshold(0.005.into())));
+        assert_eq!(MaskChoice { source: MaskSource::Unet, ..choice }.recipe(None), None);
+        let imprint = DepthMap::from_fn(175, 140, |x, _| if x < 60 { 0.008 } else { 0.0 });
+        let sample = Sample::default();
+        let drawn = Mask::from_fn(175, 140, |x, _| x > 170);
+        let hand = HandMask { mask: Arc::new(drawn.clone()), revision: Default::default(), base: String::new() };
+        let labels = PairLabels { masks: [None, Some(hand)].into(), ..PairLabels::default() };
+        let inputs = MaskInputs { sample: &sample, tool: None, labels: Some(&labels) };
+        let threshold = MaskRecipe::Threshold(0.005.into());
+        let never = |_: &DepthMap| panic!("no model is asked");
+        let right = contact_mask(&threshold, &imprint, lab::RIGHT, inputs, never).unwrap();
+        let left = contact_mask(&threshold, &imprint, lab::LEFT, inputs, never).unwrap();
+        assert_eq!((right.basis, left.basis), (MaskBasis::Source, MaskBasis::Hand));
+        assert_eq!(left.mask, drawn);
+        // One of another size is of another image.
+        let small = DepthMap::from_fn(60, 60, |x, _| if x < 30 { 0.008 } else { 0.0 });
+        assert_eq!(contact_mask(&threshold, &small, lab::LEFT, inputs, never).unwrap().basis, MaskBasis::Source);
+        let masks = [Some(right), Some(left)].into();
+        let contact = Contact { imprints: PerPad::default(), masks, source: threshold.source() };
+        assert_eq!(contact.made_of(), "threshold, hand");
+        assert!(contact.notes(&Rig::lab()).is_empty());
+        for source in <MaskSource as strum::IntoEnumIterator>::iter() {
+            assert_eq!(source.key().parse(), Ok(source));
+            assert_eq!(serde_json::to_value(source).unwrap(), source.key());
+        }
+    }
 }

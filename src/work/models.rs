@@ -11,11 +11,13 @@ use super::bundles::BundleInfo;
 use super::error::TaskError;
 use super::imprint::in_meters;
 use super::job::{JobCx, PreviewPicture};
+use super::mask::{self, Contact, MaskChoice, MaskInputs, MaskRecipe};
 use super::prediction::{Chains, Prediction};
 use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GenerateConfig, Progress};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{ColorChain, RawPrediction, ShiftMode};
+use crate::domain::rig::{PadId, PerPad};
 use crate::infer::bundle::GeneratorSpec;
 use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
@@ -99,6 +101,16 @@ impl Models {
     /// Nothing is loaded yet. Predictions are kept in `store` and taken from it; `None` keeps none.
     pub fn new(store: Option<Store>) -> Self {
         Self { store: store.map(Mutex::new), ..Self::default() }
+    }
+
+    /// Further models, with the same kept predictions.
+    #[must_use]
+    pub fn beside(&self) -> Self {
+        let again = |store: &Mutex<Store>| {
+            let store = lock(store);
+            Store::new(store.folder().to_owned(), store.budget())
+        };
+        Self::new(self.store.as_ref().map(again))
     }
 
     /// Sets what kept predictions may take, bytes.
@@ -283,6 +295,66 @@ impl Models {
         })?;
         model.contact(imprint).map_err(|err| TaskError::from_error(&what, &err))
     }
+
+    /// The contact mask of one pad's imprint: the one drawn by hand, else as the choice says.
+    ///
+    /// # Errors
+    /// If something the choice needs is not there, or the model cannot be loaded or run.
+    pub fn contact_mask(
+        &self,
+        by: Masking<'_>,
+        imprint: &DepthMap,
+        pad: PadId,
+        inputs: MaskInputs<'_>,
+    ) -> Result<ContactMask, TaskError> {
+        let unet = |imprint: &DepthMap| match by.model {
+            Some(model) => self.mask(model, by.engine, imprint),
+            None => Err(no_mask_model()),
+        };
+        mask::contact_mask(&by.recipe()?, imprint, pad, inputs, unet)
+    }
+
+    /// The contact masks of all imprints of a pair, as [`Self::contact_mask`].
+    ///
+    /// # Errors
+    /// As [`Self::contact_mask`].
+    pub fn contact(
+        &self,
+        by: Masking<'_>,
+        imprints: PerPad<DepthMap>,
+        inputs: MaskInputs<'_>,
+    ) -> Result<Contact, TaskError> {
+        let mut masks = PerPad::default();
+        for (pad, imprint) in imprints.entries() {
+            masks[pad] = Some(self.contact_mask(by, imprint, pad, inputs)?);
+        }
+        Ok(Contact { imprints, masks, source: by.recipe()?.source() })
+    }
+}
+
+/// How contact masks are made.
+#[derive(Clone, Copy, Debug)]
+pub struct Masking<'a> {
+    /// Of what.
+    pub choice: MaskChoice,
+    /// The mask model, where there is one.
+    pub model: Option<&'a BundleInfo>,
+    /// The engine that runs it.
+    pub engine: EngineChoice,
+}
+
+impl Masking<'_> {
+    /// The recipe behind the choice.
+    ///
+    /// # Errors
+    /// If it takes a model and there is none.
+    pub fn recipe(&self) -> Result<MaskRecipe, TaskError> {
+        self.choice.recipe(self.model.map(|model| &model.id)).ok_or_else(no_mask_model)
+    }
+}
+
+fn no_mask_model() -> TaskError {
+    TaskError::new("Contact mask", "no mask model was found").with_hint("Name one with an option, or another source.")
 }
 
 /// The images of some items, each once (both fingers of a grasp have their own, many seeds share one), and which is

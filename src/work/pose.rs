@@ -2,14 +2,15 @@
 
 use std::time::Instant;
 
-use super::cloud::Clouds;
+use glam::DVec3;
+
 use super::error::TaskError;
 use super::job::JobCx;
 use crate::domain::align::basin::{Basin, BasinConfig, Plane};
-use crate::domain::align::{AlignReport, PointFit, TraceStep};
+use crate::domain::align::{AlignReport, Ask, PointFit, Register, TraceStep};
 use crate::domain::frames::PlanarPose;
-use crate::domain::inspect::{basin_map, recorded};
-use crate::domain::pose::{Engine, ToolModel, register};
+use crate::domain::inspect::basin_map;
+use crate::domain::pose::{Engine, ToolModel, register_with};
 use crate::domain::units;
 
 /// A registered pose.
@@ -38,6 +39,11 @@ pub struct PoseResult {
 }
 
 impl PoseResult {
+    /// The same the other way round; its angle is the number that the lab reports.
+    pub fn object_from_grasp(&self) -> PlanarPose {
+        self.grasp_from_object.inverse()
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         size_of::<Self>()
@@ -46,38 +52,19 @@ impl PoseResult {
     }
 }
 
-/// The pose of the tool from contact points. `truth` is `grasp_from_object`, where known.
+/// The pose of the tool from contact points (grasp frame, meters). `truth` is `grasp_from_object`, where known.
 ///
 /// # Errors
 /// If there are too few points, or they are nowhere near the tool.
 pub fn pose(
-    clouds: &Clouds,
+    points: &[DVec3],
     tool: &ToolModel,
-    engine: Engine,
+    registration: &dyn Register,
+    ask: Ask<'_>,
     truth: Option<PlanarPose>,
-) -> Result<PoseResult, TaskError> {
-    run(clouds, tool, engine, truth, None, false)
-}
-
-/// [`pose`] from a given start (`grasp_from_object`) where there is one, with everything recorded where asked.
-///
-/// # Errors
-/// As [`pose`].
-pub fn run(
-    clouds: &Clouds,
-    tool: &ToolModel,
-    engine: Engine,
-    truth: Option<PlanarPose>,
-    from: Option<PlanarPose>,
-    record: bool,
 ) -> Result<PoseResult, TaskError> {
     let start = Instant::now();
-    let points = clouds.contact_points();
-    let report = match record || from.is_some() {
-        true => recorded(&points, tool, engine, from),
-        false => register(&points, tool, engine, false),
-    };
-    let report = report.map_err(|err| TaskError::from_error("Pose", &err))?;
+    let report = register_with(registration, points, tool, ask).map_err(|err| TaskError::from_error("Pose", &err))?;
     let ms = start.elapsed().as_secs_f64() * 1e3;
     let angle_rad = report.lab_angle_rad();
     let truth_rad = truth.map(|t| t.inverse().theta_rad);
@@ -99,10 +86,10 @@ pub fn run(
 ///
 /// # Errors
 /// If the job was told to stop, or no start led anywhere.
-pub fn basin(clouds: &Clouds, tool: &ToolModel, engine: Engine, plane: Plane, cx: &JobCx) -> Result<Basin, TaskError> {
+pub fn basin(points: &[DVec3], tool: &ToolModel, engine: Engine, plane: Plane, cx: &JobCx) -> Result<Basin, TaskError> {
     const WHAT: &str = "Basin map";
     let config = BasinConfig::new(plane);
-    let map = basin_map(&clouds.contact_points(), tool, engine, &config, || cx.cancel.is_cancelled())
+    let map = basin_map(points, tool, engine, &config, || cx.cancel.is_cancelled())
         .ok_or_else(|| TaskError::cancelled(WHAT))?;
     match map.cells.iter().find_map(|cell| cell.failure.as_deref()) {
         Some(why) if map.basins.is_empty() => Err(TaskError::new(WHAT, why)),

@@ -33,7 +33,7 @@ pub(super) fn step(state: &mut State, command: Command, effects: &mut Vec<Effect
         Command::SetMask(mask) => settings.mask = mask,
         Command::SetMaskTool(tool) => set_tool(settings, tool),
         Command::LastMaskTool => set_tool(settings, settings.mask.last_tool),
-        Command::SetMaskSource(source) => settings.mask.source = source,
+        Command::SetMaskSource(source) => settings.mask.choice.source = source,
         Command::SetBrushRadius(radius_px) => settings.mask.radius_px = radius_px,
         Command::SetMaskVisible(visible) => settings.mask_visible = visible,
         Command::SetMaskOutline(outline) => settings.mask_outline = outline,

@@ -9,11 +9,13 @@ use super::super::keys::{CloudKey, ImprintKey, MaskRecipe, MaskVersion, PairKey,
 use super::super::services::SharedServices;
 use super::super::state::State;
 use super::{Lane, generate};
+use crate::domain::align::Ask;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::rig::{PerPad, SensorId};
 use crate::domain::sample::Sample;
 use crate::work::error::TaskError;
 use crate::work::job::JobCx;
+use crate::work::mask::MaskInputs;
 use crate::work::{cloud, compare, ensemble, imprint, layers, ledger, mask, pose, tool};
 
 /// The body of a job.
@@ -239,13 +241,8 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 "Contact mask".into(),
                 Box::new(move |_| {
                     let imprint = imprint.get().ok_or_else(gone)?;
-                    let mask = mask::mask(
-                        &recipe,
-                        imprint,
-                        sample.pad(touch.finger),
-                        tool.as_deref().map(|t| &t.model),
-                        sample.grasp_from_object,
-                    )?;
+                    let inputs = MaskInputs { sample: &sample, tool: tool.as_deref().map(|t| &t.model), labels: None };
+                    let mask = mask::without_model(&recipe, imprint, touch.finger, inputs)?;
                     Ok(Computed::Mask(Box::new(mask)))
                 }),
             )
@@ -283,7 +280,11 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
             job(
                 Lane::Compute,
                 "Pose".into(),
-                Box::new(move |_| Ok(Computed::Pose(Arc::new(pose::pose(&clouds, &tool.model, engine, truth)?)))),
+                Box::new(move |_| {
+                    let (points, registration) = (clouds.contact_points(), engine.registration());
+                    let found = pose::pose(&points, &tool.model, &*registration, Ask::default(), truth)?;
+                    Ok(Computed::Pose(Arc::new(found)))
+                }),
             )
         }
         Request::Run(RunKey { pose: key, start }) => {
@@ -296,7 +297,9 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "Registration, recorded".into(),
                 Box::new(move |_| {
-                    let run = pose::run(&clouds, &tool.model, engine, truth, start, true)?;
+                    let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true };
+                    let (points, registration) = (clouds.contact_points(), engine.registration());
+                    let run = pose::pose(&points, &tool.model, &*registration, ask, truth)?;
                     Ok(Computed::Pose(Arc::new(run)))
                 }),
             )
@@ -336,7 +339,8 @@ pub fn prepare(state: &State, services: &SharedServices, request: &Request) -> O
                 Lane::Compute,
                 "Basin map".into(),
                 Box::new(move |cx| {
-                    Ok(Computed::Basin(Arc::new(pose::basin(&clouds, &tool.model, engine, plane, cx)?)))
+                    let points = clouds.contact_points();
+                    Ok(Computed::Basin(Arc::new(pose::basin(&points, &tool.model, engine, plane, cx)?)))
                 }),
             )
         }

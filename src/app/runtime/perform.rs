@@ -123,11 +123,12 @@ impl Runtime {
                 );
             }
             Effect::Evaluate { ticket, source, setup } => {
+                let services = self.services.clone();
                 let body = Box::new(move |cx: &JobCx| {
                     let dataset = source.as_dataset().ok_or_else(|| {
                         TaskError::new("Evaluate", "this kind of source cannot be read outside the studio")
                     })?;
-                    let evaluation = Arc::new(evaluate::evaluate(dataset, &setup, cx)?);
+                    let evaluation = Arc::new(services.evaluate(dataset, &setup, cx)?);
                     Ok(Command::Evaluate(EvaluateCommand::Done(ticket, evaluation)))
                 });
                 self.task(Lane::Batch, ticket, "Evaluate".into(), body);

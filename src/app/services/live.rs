@@ -27,6 +27,7 @@ use crate::io::statistics::ShiftStatistics;
 use crate::io::{atomic, files, folders};
 use crate::work::bundles::{self, BundleInfo};
 use crate::work::error::TaskError;
+use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{ExportSetup, HandMasks, export_masks};
 use crate::work::job::JobCx;
 use crate::work::labels::Labels;
@@ -200,6 +201,10 @@ impl Services for LiveServices {
             (PredictionKey::new(touch, bundle, kept.engine, &kept.config), kept.prediction)
         };
         self.models.kept(bundles, engine, difference).into_iter().map(keyed).collect()
+    }
+
+    fn evaluate(&self, dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
+        evaluate::evaluate(dataset, setup, &self.models, cx)
     }
 
     fn mask_by_model(

@@ -1,6 +1,5 @@
 //! `touch2touch bench dataset`: how long a whole dataset takes on all cores.
 
-use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
@@ -10,18 +9,18 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Machine;
+use super::{Machine, contact_points};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::{Engine, FingerInput, Fingers, contact_cloud, estimate, register};
-use crate::domain::rig::{Rig, lab};
+use crate::domain::pose::{Engine, register};
+use crate::domain::rig::lab;
 use crate::domain::sample::DepthCamera;
 use crate::domain::sim::{self, SimConfig, Spoil, spoil_mask};
 use crate::domain::tool::ToolModel;
 use crate::domain::units::angle_error;
-use crate::headless::{Common, Output, VerbResult};
-use crate::io::atomic;
+use crate::headless::args::JsonArgs;
+use crate::headless::{Output, VerbResult};
 
 /// Pairs that are prepared, then timed, at a time: their cameras must fit into memory.
 const CHUNK: usize = 504;
@@ -44,9 +43,8 @@ pub(in crate::headless) struct DatasetArgs {
     /// The registration.
     #[arg(long, default_value_t = Engine::default())]
     engine: Engine,
-    /// Write the figures to this file.
-    #[arg(long, value_name = "OUT")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
 }
 
 /// A simulated grasp.
@@ -103,7 +101,7 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
     let tools_seconds = begin.elapsed().as_secs_f64();
 
     let count = specs.len() * args.grasps as usize;
-    let output = Output::new(Common { json: false }, "simulating", count);
+    let output = Output::new(args.json.common(), "simulating", count);
     let grasps: Vec<Grasp> = (0..count)
         .into_par_iter()
         .map(|i| {
@@ -135,8 +133,8 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
         let found: Vec<f64> = chunk
             .par_iter()
             .map(|p| {
-                let fingers = fingers(p.grasp, &p.cameras);
-                let report = estimate(&fingers, &tools[p.grasp.tool], args.engine, false);
+                let points = contact_points(&p.grasp.imprints, &p.cameras, &p.grasp.masks).unwrap_or_default();
+                let report = register(&points, &tools[p.grasp.tool], args.engine, false);
                 report.map_or(f64::NAN, |r| angle_error(r.grasp_from_object.theta_rad, p.truth.theta_rad))
             })
             .collect();
@@ -165,10 +163,7 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
             JITTER_M * 1e3
         ),
     };
-    if let Some(file) = &args.json {
-        atomic::write_bytes(file, serde_json::to_string_pretty(&report)?.as_bytes())
-            .map_err(|err| anyhow::anyhow!("cannot write {}: {err}", file.display()))?;
-    }
+    args.json.write(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(true)
 }
@@ -214,15 +209,8 @@ fn pair(grasp: &Grasp, i: usize, seed: u64) -> anyhow::Result<Pair<'_>> {
     });
     let place = moved.transform_yz(glam::DVec2::new(grasp.truth.y_m, grasp.truth.z_m));
     let truth = PlanarPose { theta_rad: moved.theta_rad + grasp.truth.theta_rad, y_m: place.x, z_m: place.y };
-    let points = contact_cloud(&fingers(grasp, &cameras))?.points;
+    let points = contact_points(&grasp.imprints, &cameras, &grasp.masks)?;
     Ok(Pair { grasp, cameras, points, truth })
-}
-
-fn fingers<'a>(grasp: &'a Grasp, cameras: &'a [DepthCamera; 2]) -> Fingers<'a> {
-    Fingers::new(&Rig::lab(), |pad| {
-        let f = pad.index();
-        Some(FingerInput { imprint: &grasp.imprints[f], camera: &cameras[f], mask: Some(&grasp.masks[f]) })
-    })
 }
 
 fn text(report: &Report) -> String {

@@ -19,7 +19,8 @@ use super::front::{self, Axis, FrontPoint, Picture};
 use crate::domain::diffusion::{GenerateConfig, Sampler, Spacing};
 use crate::domain::metrics::AngleSummary;
 use crate::domain::rig::Rig;
-use crate::headless::{Common, Output, VerbResult};
+use crate::headless::args::JsonArgs;
+use crate::headless::{Output, VerbResult};
 use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
@@ -62,9 +63,8 @@ pub(in crate::headless) struct GeneratorArgs {
     /// Only this engine: rten, or ort. Without it, all that are found; all but the first on a quarter of the grasps.
     #[arg(long, value_parser = engine)]
     engine: Option<EngineKind>,
-    /// Write everything measured to this file, and the error-against-time fronts beside it as .svg and .png.
-    #[arg(long, value_name = "OUT")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, Serialize)]
@@ -171,7 +171,7 @@ pub(super) fn run(args: &GeneratorArgs) -> VerbResult {
         _ => cases.iter().step_by(4).collect(),
     };
     let total: usize = (0..engines.len()).map(|e| subset(e).len()).sum();
-    let output = Output::new(Common { json: false }, "generating", total);
+    let output = Output::new(args.json.common(), "generating", total);
     let (mut rows, mut overhead, mut first) = (Vec::new(), Vec::new(), Vec::new());
     for (at, &engine) in engines.iter().enumerate() {
         let (found, mut generator) = timing::first(&bundle, engine, &cases[0], &defaults)?;
@@ -199,7 +199,7 @@ pub(super) fn run(args: &GeneratorArgs) -> VerbResult {
     report.rows.sort_by(|a, b| {
         (a.engine, a.median_ms).partial_cmp(&(b.engine, b.median_ms)).unwrap_or(std::cmp::Ordering::Equal)
     });
-    if let Some(file) = &args.json {
+    if let Some(file) = args.json.file() {
         write(file, &report)?;
         output.note(&format!("written: {} (pictures of both fronts beside it)", file.display()));
     }

@@ -13,16 +13,16 @@ use strum::IntoEnumIterator as _;
 use super::canvas;
 use super::figures::{Outcome, Summary, quantile};
 use super::front::{self, Axis, FrontPoint, Picture};
-use super::{Machine, peers};
+use super::{Machine, contact_points, peers};
 use crate::domain::align::{AlignError, AlignReport, DistanceField};
+use crate::domain::cloud::CloudError;
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
-use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, contact_cloud, estimate, register};
-use crate::domain::rig::Rig;
+use crate::domain::pose::{Engine, ToolModel, register};
 use crate::domain::units::angle_error;
-use crate::headless::args::{LimitArgs, at_least_one};
+use crate::headless::args::{JsonArgs, LimitArgs, at_least_one};
 use crate::headless::output::says;
-use crate::headless::{Common, Output, VerbResult, spread};
+use crate::headless::{Output, VerbResult, spread};
 use crate::io::atomic;
 use crate::io::cases::{Case, CaseSet, Stratum};
 
@@ -36,9 +36,8 @@ pub(in crate::headless) struct RegistrationArgs {
     /// Folder with `case_*.npz` and `tool_KK.stl` (`touch2touch bench cases` writes one).
     #[arg(long)]
     cases: PathBuf,
-    /// Write everything measured to this file, and the error-against-time front beside it as .svg and .png.
-    #[arg(long, value_name = "OUT")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
     /// Only these engines, separated by commas.
     #[arg(long, value_delimiter = ',')]
     engines: Vec<Engine>,
@@ -183,7 +182,7 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
     let chosen = args.limit.spread(set.cases.len());
     set.cases = chosen.into_iter().map(|i| set.cases[i].clone()).collect();
     let engines: Vec<Engine> = if args.engines.is_empty() { Engine::iter().collect() } else { args.engines.clone() };
-    let output = Output::new(Common { json: false }, "measuring", set.cases.len() * engines.len());
+    let output = Output::new(args.json.common(), "measuring", set.cases.len() * engines.len());
     let machine = Machine::now();
     // One thread, whatever an engine would like to use: the figures are the work, not the machine.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
@@ -200,7 +199,7 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
         }
     }
     report.front = front::front(&report.engines);
-    if let Some(file) = &args.json {
+    if let Some(file) = args.json.file() {
         write(file, &report)?;
         output.note(&format!("written: {} (.svg and .png beside it)", file.display()));
     }
@@ -221,15 +220,13 @@ pub(super) fn is_straight(mesh: &TriMesh) -> bool {
     half - root < (half + root) / 36.0
 }
 
-fn fingers(case: &Case, masks: Masks) -> Fingers<'_> {
+/// The contact points of both fingers, grasp frame, meters.
+fn points(case: &Case, masks: Masks) -> Result<Vec<DVec3>, CloudError> {
     let masks = match masks {
         Masks::Spoilt => &case.masks,
         Masks::Clean => &case.masks_clean,
     };
-    Fingers::new(&Rig::lab(), |pad| {
-        let f = pad.index();
-        Some(FingerInput { imprint: &case.imprints[f], camera: &case.cameras[f], mask: Some(&masks[f]) })
-    })
+    contact_points(&case.imprints, &case.cameras, masks)
 }
 
 fn prepare(set: &CaseSet, masks: Masks) -> anyhow::Result<Vec<Prepared>> {
@@ -237,14 +234,14 @@ fn prepare(set: &CaseSet, masks: Masks) -> anyhow::Result<Vec<Prepared>> {
     set.cases
         .iter()
         .map(|(name, case)| {
-            let cloud = contact_cloud(&fingers(case, masks)).map_err(|err| anyhow::anyhow!("{name}: {err}"))?;
+            let points = points(case, masks).map_err(|err| anyhow::anyhow!("{name}: {err}"))?;
             Ok(Prepared {
                 name: name.clone(),
                 stratum: case.stratum,
                 tool: case.tool,
                 straight: straight[&case.tool],
                 truth: case.grasp_from_object,
-                points: cloud.points,
+                points,
             })
         })
         .collect()
@@ -281,10 +278,10 @@ fn measure(
     let prepared = prepare(set, args.masks)?;
     let (mut lift_ms, mut whole_ms) = (Vec::new(), Vec::new());
     for (_, case) in &set.cases {
-        let fingers = fingers(case, args.masks);
         let model = &models[&case.tool];
-        lift_ms.push(timed(|| contact_cloud(&fingers).map(|c| c.yz())).median);
-        whole_ms.push(timed(|| estimate(&fingers, model, Engine::default(), false)).median);
+        lift_ms.push(timed(|| points(case, args.masks)).median);
+        let whole = || Ok::<_, anyhow::Error>(register(&points(case, args.masks)?, model, Engine::default(), false)?);
+        whole_ms.push(timed(whole).median);
     }
     let quantiles = |ms: &[f64]| Quantiles {
         median_ms: quantile(ms.iter().copied(), 0.5),

@@ -1,6 +1,7 @@
 //! One touch: prediction, masks, pose, files.
 
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
@@ -8,27 +9,26 @@ use std::time::{Instant, SystemTime};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::super::contact_mask::MaskFrom;
 use super::super::output::says;
 use super::super::predict::Predictor;
 use super::summary::Latency;
-use super::write::{self, FingerResult};
-use super::{Source, WatchArgs};
-use crate::domain::contact::MaskBasis;
+use super::{Source, WatchArgs, write};
+use crate::domain::align::Ask;
+use crate::domain::contact::ContactMask;
 use crate::domain::dataset::Problem;
 use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{Grid, RgbGrid};
-use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, estimate};
-use crate::domain::rig::Text;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::pose::{Engine, ToolModel};
+use crate::domain::rig::{PadId, PerPad, Text};
 use crate::domain::sample::Sample;
-use crate::domain::units::angle_error;
 use crate::infer::engine::resolve;
 use crate::io::dataset::{Dataset, read_in_meters};
 use crate::io::follow::Ready;
-use crate::work::imprint::imprint_of;
+use crate::work::compare;
 use crate::work::job::{Cancel, JobCx};
-use crate::work::mask::MaskRecipe;
-use crate::work::{compare, mask};
+use crate::work::labels::{ImprintSource, PairLabels};
+use crate::work::mask::{Contact, MaskInputs};
+use crate::work::pose;
 
 /// The models, loaded once, and the tools met so far.
 pub(super) struct Worker<'a> {
@@ -120,7 +120,7 @@ impl<'a> Worker<'a> {
             _ => anyhow::bail!("--engine all is for `touch2touch pose`; one registration is needed here"),
         };
         let start = Instant::now();
-        predictor.warm_up(matches!(args.mask.mask, MaskFrom::Unet | MaskFrom::Auto))?;
+        predictor.warm_up(&args.mask.choice())?;
         let warm_s = start.elapsed().as_secs_f64();
         Ok(Self { args, predictor, engine, tools: BTreeMap::new(), stop, warm_s })
     }
@@ -136,15 +136,22 @@ impl<'a> Worker<'a> {
     }
 
     /// Everything the result depends on besides the touch.
-    pub(super) fn recipe(&mut self, tool: Option<&str>) -> anyhow::Result<Value> {
+    pub(super) fn recipe(&mut self, tool: Option<&str>, labels: &PairLabels) -> anyhow::Result<Value> {
+        let choice = self.args.mask.choice();
+        let model = self.predictor.mask_model(&choice)?.map(|model| model.id);
+        let drawn: Vec<Option<String>> = self
+            .args
+            .mask
+            .drawn(labels)
+            .into_iter()
+            .flat_map(|l| l.masks.iter())
+            .map(|m| Some(digest(&m.as_ref()?.mask)))
+            .collect();
+        let mask = json!({"choice": choice, "model": model.as_deref(), "drawn": drawn});
         let config = self.predictor.config()?;
         let shift = self.predictor.shift();
         let engine = resolve(self.predictor.engine())?;
         let bundle = self.predictor.bundle()?;
-        let mask = match self.args.mask.mask {
-            MaskFrom::Threshold => json!({"threshold_mm": self.args.mask.threshold_mm}),
-            _ => json!("unet"),
-        };
         Ok(json!({
             "bundle": bundle.name, "bundle_hash": *bundle.id, "runtime": engine,
             "sampler": config.sampler, "steps": config.steps, "seed": config.seed, "eta": config.eta,
@@ -169,6 +176,7 @@ impl<'a> Worker<'a> {
         dataset: &Dataset,
         sample: &Sample,
         tool: Option<&str>,
+        labels: &PairLabels,
         stem: &Path,
         source: &Source,
         recipe: &Value,
@@ -181,34 +189,21 @@ impl<'a> Worker<'a> {
         let mut latency = Latency { found: since(ready.stamp.closed, found), load: ms(start), ..Latency::default() };
 
         let step = Instant::now();
-        let Some(mut fingers) = self.imprints(sample)? else { return Ok(None) };
+        let Some(imprints) = self.imprints(sample)? else { return Ok(None) };
         latency.generate = ms(step);
         let step = Instant::now();
-        for f in &mut fingers {
-            let found = match self.args.mask.mask {
-                MaskFrom::Threshold => {
-                    let recipe = MaskRecipe::Threshold((self.args.mask.threshold_mm / 1e3).into());
-                    mask::mask(&recipe, &f.imprint, None, None, None).map_err(|err| anyhow::anyhow!("{err}"))?
-                }
-                _ => self.predictor.mask(&f.imprint)?,
-            };
-            f.basis = found.basis;
-            f.mask = Some(found.mask);
-        }
-        let source_key = match self.args.mask.mask {
-            MaskFrom::Auto => MaskFrom::Unet.key(),
-            asked => asked.key(),
-        };
+        let inputs = MaskInputs { sample, tool: None, labels: self.args.mask.drawn(labels) };
+        let contact = self.predictor.contact(&self.args.mask, imprints, inputs)?;
         latency.mask = ms(step);
         let step = Instant::now();
-        let (pose, no_pose) = match self.pose(dataset, sample, tool, &fingers) {
+        let (pose, no_pose) = match self.pose(dataset, sample, tool, &contact) {
             Ok(pose) => (Some(pose), None),
             Err(why) => (None, Some(why)),
         };
         latency.pose = ms(step);
 
         let step = Instant::now();
-        let files = write::predictions(stem, &fingers, &self.args.save)?;
+        let files = write::predictions(stem, &sample.rig, &contact, &self.args.save)?;
         latency.write = ms(step);
         latency.total = since(ready.stamp.closed, SystemTime::now());
         let mut done = Done {
@@ -218,11 +213,8 @@ impl<'a> Worker<'a> {
             files,
             notes: sample.notes.clone(),
             scale: sample.scale.key(),
-            mask_notes: fingers
-                .iter()
-                .filter_map(|f| Some(format!("{} finger: {}", f.name, f.basis.note()?)))
-                .collect(),
-            fingers: fingers.iter().map(|f| figures(sample, f, source_key)).collect(),
+            mask_notes: contact.notes(&sample.rig),
+            fingers: sample.rig.pads().filter_map(|pad| figures(sample, pad, &contact)).collect(),
             pose,
             no_pose,
             latency,
@@ -235,26 +227,16 @@ impl<'a> Worker<'a> {
         Ok(Some(done))
     }
 
-    /// Imprints of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
-    fn imprints(&mut self, sample: &Sample) -> anyhow::Result<Option<Vec<FingerResult>>> {
-        let touched = self.predictor.conditions(sample)?;
-        if touched.is_empty() {
+    /// Predicted imprints of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
+    fn imprints(&mut self, sample: &Sample) -> anyhow::Result<Option<PerPad<DepthMap>>> {
+        if self.predictor.conditions(sample)?.is_empty() {
             return Err(self.predictor.no_condition());
         }
         let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
-        let differences: Vec<&RgbGrid> = touched.iter().map(|(_, picture)| &**picture).collect();
-        let made = match self.predictor.predict(&differences, &cx) {
-            Err(_) if self.stop.is_cancelled() => return Ok(None),
-            other => other?,
-        };
-        let shift = self.predictor.shift();
-        let mut out = Vec::new();
-        for ((finger, _), made) in touched.iter().zip(&made) {
-            let imprint = imprint_of(made, shift, sample, *finger)?;
-            let name = sample.rig.pad_key(*finger);
-            out.push(FingerResult { finger: *finger, name, imprint, mask: None, basis: MaskBasis::Source });
+        match self.predictor.imprints(sample, ImprintSource::Predicted, &cx) {
+            Err(_) if self.stop.is_cancelled() => Ok(None),
+            made => made.map(Some),
         }
-        Ok(Some(out))
     }
 
     /// The pose, or why there is none.
@@ -263,35 +245,38 @@ impl<'a> Worker<'a> {
         dataset: &Dataset,
         sample: &Sample,
         tool: Option<&str>,
-        fingers: &[FingerResult],
+        contact: &Contact,
     ) -> Result<PoseFigures, String> {
-        let engine = self.engine;
         let name = tool.ok_or("the file's name says no tool; name it with --tool")?;
-        let inputs = Fingers::new(&sample.rig, |finger| {
-            let f = fingers.iter().find(|f| f.finger == finger)?;
-            let camera = sample.pad(finger)?.camera()?;
-            Some(FingerInput { imprint: &f.imprint, camera, mask: f.mask.as_ref() })
-        });
-        if inputs.is_empty() {
+        if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             return Err("no bubble camera is known; name a bubble file of the rig with --camera".into());
         }
+        let points = contact.points(sample).map_err(|err| err.why)?;
+        let registration = self.engine.registration();
         let model = self.tool(dataset, name)?;
-        let found = estimate(&inputs, model, engine, false).map_err(|err| err.to_string())?;
-        let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
-        let theta = found.object_from_grasp.theta_rad;
+        let found = pose::pose(&points, model, &*registration, Ask::default(), sample.grasp_from_object);
+        let found = found.map_err(|err| err.why)?;
+        let place = found.object_from_grasp();
         Ok(PoseFigures {
             tool: name.to_owned(),
-            angle_deg: theta.to_degrees(),
-            y_m: found.object_from_grasp.y_m,
-            z_m: found.object_from_grasp.z_m,
+            angle_deg: found.angle_rad.to_degrees(),
+            y_m: place.y_m,
+            z_m: place.z_m,
             grasp_from_object: found.grasp_from_object,
-            rms_m: found.report.inlier_rms_m,
-            points: found.cloud.points.len(),
-            stop: found.report.stop.to_string(),
-            truth_deg: truth.map(f64::to_degrees),
-            error_deg: truth.map(|t| angle_error(theta, t).to_degrees()),
+            rms_m: found.rms_m,
+            points: found.num_points,
+            stop: found.stop,
+            truth_deg: found.truth_rad.map(f64::to_degrees),
+            error_deg: found.error_rad.map(f64::to_degrees),
         })
     }
+}
+
+/// Tells one drawn mask from another.
+fn digest(mask: &Mask) -> String {
+    let mut hasher = DefaultHasher::new();
+    (mask.size(), mask.as_slice()).hash(&mut hasher);
+    format!("{:016x}", hasher.finish())
 }
 
 /// The CAD model of a tool: a file, one of the dataset's, or one of the demo's.
@@ -314,20 +299,22 @@ fn load_tool(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<
 }
 
 /// Numbers of one prediction, against the measurement where there is one.
-fn figures(sample: &Sample, result: &FingerResult, source: &'static str) -> FingerFigures {
-    let stats = crate::domain::postprocess::Stats::of(&result.imprint);
-    let measured = sample.pad(result.finger).and_then(|t| t.depth()).map(|b| &b.imprint);
-    let measured = measured.filter(|m| m.size() == result.imprint.size());
-    let compared = measured.and_then(|m| compare::compare(&result.imprint, m, sample.scale).ok());
-    let count = |mask: &Grid<bool>| mask.as_slice().iter().filter(|&&m| m).count();
-    FingerFigures {
-        finger: sample.rig.pad_key(result.finger),
+fn figures(sample: &Sample, pad: PadId, contact: &Contact) -> Option<FingerFigures> {
+    let imprint = contact.imprints[pad].as_ref()?;
+    let stats = crate::domain::postprocess::Stats::of(imprint);
+    let measured = sample.pad(pad).and_then(|t| t.depth()).map(|b| &b.imprint);
+    let measured = measured.filter(|m| m.size() == imprint.size());
+    let compared = measured.and_then(|m| compare::compare(imprint, m, sample.scale).ok());
+    let mask = contact.masks[pad].as_ref();
+    let count = |found: &ContactMask| found.mask.as_slice().iter().filter(|&&m| m).count();
+    Some(FingerFigures {
+        finger: sample.rig.pad_key(pad),
         min_m: stats.min,
         max_m: stats.max,
         mean_m: stats.mean,
-        contact_px: result.mask.as_ref().map(count),
-        mask: result.basis.key(source),
+        contact_px: mask.map(count),
+        mask: mask.map_or(contact.source.key(), |found| found.basis.key(contact.source.key())),
         psnr_db: compared.as_ref().and_then(|c| c.psnr_db),
         ssim: compared.as_ref().and_then(|c| c.ssim),
-    }
+    })
 }

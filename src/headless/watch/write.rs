@@ -7,13 +7,13 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::Source;
-use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::rig::{PadId, Text};
+use crate::domain::rig::{Rig, Text};
 use crate::io::dataset::OUTPUT_MARK;
 use crate::io::pt::{PtItem, Tensor};
 use crate::io::{atomic, files, images, names, npz, pt};
+use crate::work::mask::Contact;
 
 /// A form of the prediction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -38,52 +38,43 @@ pub(super) fn is_done(stem: &Path, source: &Source, recipe: &Value) -> bool {
     before["error"].is_null() && before["source"] == json!(source) && before["recipe"] == *recipe
 }
 
-/// One finger's part of a result.
-#[derive(Debug)]
-pub(super) struct FingerResult {
-    pub finger: PadId,
-    pub name: Text,
-    pub imprint: DepthMap,
-    pub mask: Option<Mask>,
-    pub basis: MaskBasis,
-}
-
-/// Writes the predictions.
-pub(super) fn predictions(stem: &Path, fingers: &[FingerResult], save: &[Save]) -> anyhow::Result<Vec<String>> {
+/// Writes imprints and masks.
+pub(super) fn predictions(stem: &Path, rig: &Rig, contact: &Contact, save: &[Save]) -> anyhow::Result<Vec<String>> {
     let mut files = Vec::new();
     let bits = |mask: &Mask| mask.as_slice().iter().map(|&m| u8::from(m)).collect::<Vec<u8>>();
+    let fingers: Vec<(Text, &DepthMap, &Mask)> = contact
+        .imprints
+        .entries()
+        .filter_map(|(pad, imprint)| Some((rig.pad_key(pad), imprint, &contact.masks[pad].as_ref()?.mask)))
+        .collect();
     if save.contains(&Save::Npz) {
         let mut arrays: Vec<(String, Tensor)> = Vec::new();
-        for f in fingers {
-            let shape = [f.imprint.height(), f.imprint.width()];
-            arrays.push((format!("imprint_{}", f.name), Tensor::f32(&shape, f.imprint.as_slice().to_vec())));
-            if let Some(mask) = &f.mask {
-                arrays.push((format!("mask_{}", f.name), Tensor::u8(&shape, bits(mask))));
-            }
+        for (name, imprint, mask) in &fingers {
+            let shape = [imprint.height(), imprint.width()];
+            arrays.push((format!("imprint_{name}"), Tensor::f32(&shape, imprint.as_slice().to_vec())));
+            arrays.push((format!("mask_{name}"), Tensor::u8(&shape, bits(mask))));
         }
         let arrays: Vec<(&str, Tensor)> = arrays.iter().map(|(name, t)| (name.as_str(), t.clone())).collect();
         files.push(output(stem, "npz"));
         npz::write(&files[files.len() - 1], &arrays)?;
     }
     if save.contains(&Save::Png) {
-        for f in fingers {
-            let picture = f.imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
-            files.push(output(stem, &format!("{}.png", f.name)));
+        for (name, imprint, _) in &fingers {
+            let picture = imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
+            files.push(output(stem, &format!("{name}.png")));
             images::write_gray16(&files[files.len() - 1], &picture)?;
         }
     }
     if save.contains(&Save::Pt) {
-        let [w, h] = fingers.first().map_or([0, 0], |f| f.imprint.size());
+        let [w, h] = fingers.first().map_or([0, 0], |(_, imprint, _)| imprint.size());
         let shape = [fingers.len(), 1, h, w];
-        let depths = fingers.iter().flat_map(|f| f.imprint.as_slice()).copied().collect();
-        let mut items: Vec<(&str, PtItem)> = vec![
+        let depths = fingers.iter().flat_map(|(_, imprint, _)| imprint.as_slice()).copied().collect();
+        let masks = fingers.iter().flat_map(|(_, _, mask)| bits(mask)).collect();
+        let items: Vec<(&str, PtItem)> = vec![
             ("prediction", Tensor::f32(&shape, depths).into()),
-            ("fingers", PtItem::Texts(fingers.iter().map(|f| f.name.to_string()).collect())),
+            ("fingers", PtItem::Texts(fingers.iter().map(|(name, ..)| name.to_string()).collect())),
+            ("mask", Tensor::u8(&shape, masks).into()),
         ];
-        if fingers.iter().all(|f| f.mask.is_some()) {
-            let masks = fingers.iter().filter_map(|f| f.mask.as_ref()).flat_map(bits).collect();
-            items.push(("mask", Tensor::u8(&shape, masks).into()));
-        }
         files.push(output(stem, "pt"));
         pt::write_dict(&files[files.len() - 1], &items)?;
     }

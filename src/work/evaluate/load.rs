@@ -11,12 +11,15 @@ use crate::domain::grid::Grid;
 use crate::domain::sample::{Sample, Scale};
 use crate::io::dataset::{Dataset, SourceKind};
 use crate::work::job::JobCx;
+use crate::work::labels::{Labels, PairLabels};
 
 /// A loaded pair.
 pub(super) struct Case {
     pub(super) name: String,
     pub(super) group: Group,
     pub(super) sample: Sample,
+    /// What people drew, where that is to be taken.
+    pub(super) labels: Option<PairLabels>,
     /// The bubble picture as it is in its file, and the lab's prediction of it, where the source has pictures.
     pub(super) tile: Option<Grid<f32>>,
     pub(super) lab: Option<Grid<f32>>,
@@ -46,6 +49,7 @@ pub(super) fn plan(dataset: &Dataset, setup: &Setup) -> Vec<ToolWork> {
 pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &JobCx, mut score: impl FnMut(Batch<'_>)) {
     // Both fingers of a grasp go through the generator together.
     let grasps = setup.batch.div_ceil(2).max(1);
+    let labels = &setup.hand.then(|| Labels::of(dataset));
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(1);
         scope.spawn(move || {
@@ -53,7 +57,8 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
                 if cx.cancel.is_cancelled() {
                     return;
                 }
-                let loaded: Vec<Result<Case, Skipped>> = ids.par_iter().map(|&id| load(dataset, id)).collect();
+                let loaded: Vec<Result<Case, Skipped>> =
+                    ids.par_iter().map(|&id| load(dataset, labels.as_ref(), id)).collect();
                 let mut cases = Cases { good: Vec::new(), bad: Vec::new() };
                 for one in loaded {
                     match one {
@@ -85,7 +90,7 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
     });
 }
 
-fn load(dataset: &Dataset, id: PairId) -> Result<Case, Skipped> {
+fn load(dataset: &Dataset, labels: Option<&Labels>, id: PairId) -> Result<Case, Skipped> {
     let Some(entry) = dataset.index.get(id) else {
         return Err(Skipped { what: format!("pair {}", id.0), method: String::new(), why: "no such pair".into() });
     };
@@ -95,6 +100,7 @@ fn load(dataset: &Dataset, id: PairId) -> Result<Case, Skipped> {
     if sample.pads.iter().flatten().all(|t| t.color().is_none() || t.depth().is_none()) {
         return Err(skip("no finger has both a GelSlim image and a measured imprint".into()));
     }
+    let labels = labels.map(|labels| labels.load(&entry.name)).transpose().map_err(|err| skip(err.to_string()))?;
     let pictures = sample.scale == Scale::Assumed;
     let (tile, lab, clipped) = if pictures {
         let clipped = dataset.gelslim_is_clipped(id).map_err(fail)?;
@@ -104,5 +110,5 @@ fn load(dataset: &Dataset, id: PairId) -> Result<Case, Skipped> {
         (None, None, None)
     };
     let group = Group::of(entry, dataset.kind == SourceKind::Demo, clipped);
-    Ok(Case { name: entry.name.clone(), group, sample, tile, lab })
+    Ok(Case { name: entry.name.clone(), group, sample, labels, tile, lab })
 }

@@ -2,26 +2,27 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-use std::time::Instant;
 
 use super::load::Case;
-use super::{MaskBy, Setup, WHAT};
+use super::{Setup, WHAT};
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
-use crate::domain::postprocess::{Picture, RawPrediction, ShiftMode};
-use crate::domain::resample::{bilinear, bilinear_rgb};
+use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::{PadId, PerPad, SensorId, SensorKind};
 use crate::domain::sample::Scale;
 use crate::domain::upright::Turn;
 use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
-use crate::infer::generator::{GenerateError, Generator};
-use crate::infer::mask::MaskModel;
+use crate::infer::engine::{EngineChoice, resolve};
 use crate::io::dataset::{Dataset, SourceKind};
+use crate::work::bundles::BundleInfo;
 use crate::work::error::TaskError;
+use crate::work::imprint;
 use crate::work::job::JobCx;
+use crate::work::mask::MaskRecipe;
+use crate::work::models::{self, Wanted};
+use crate::work::prediction::Prediction;
 
 /// Pictures that are looked at for stored predictions: a folder has them from the start, or not at all.
 const LOOKED_AT: u32 = 16;
@@ -38,7 +39,10 @@ pub(super) enum Method {
 
 pub(super) struct GeneratorMethod {
     name: String,
-    generator: Generator,
+    bundle: BundleInfo,
+    /// Of its own: one generator is in memory at a time, and the methods take turns.
+    models: models::Models,
+    engine: EngineChoice,
     config: GenerateConfig,
     /// The sensor that it starts from.
     input: SensorId,
@@ -59,68 +63,64 @@ pub(super) struct Made {
 /// Everything that runs.
 pub(super) struct Models {
     pub(super) methods: Vec<Method>,
-    pub(super) mask: Option<MaskModel>,
+    /// Where the mask model is run.
+    pub(super) masks: models::Models,
+    pub(super) mask_bundle: Option<BundleInfo>,
     pub(super) classifier: Option<ToolClassifier>,
     engine: String,
     /// How many masks were not made of the source that was asked, by row and reason.
     pub(super) made_otherwise: BTreeMap<(String, &'static str), usize>,
 }
 
-fn open<T, E: std::error::Error>(
-    origin: &Origin,
-    load: impl FnOnce(&Bundle) -> Result<T, E>,
-) -> Result<(T, String), TaskError> {
-    let what = format!("{WHAT}: {origin}");
-    let bundle = Bundle::open(origin).map_err(|err| TaskError::from_error(&what, &err))?;
-    let model = load(&bundle).map_err(|err| TaskError::from_error(&what, &err))?;
-    Ok((model, bundle.name().to_owned()))
+fn open(origin: &Origin) -> Result<Bundle, TaskError> {
+    Bundle::open(origin).map_err(|err| TaskError::from_error(format!("{WHAT}: {origin}"), &err))
 }
 
 impl Models {
     /// Loads everything that the setup names.
-    pub(super) fn open(setup: &Setup, dataset: &Dataset) -> Result<Self, TaskError> {
+    pub(super) fn open(setup: &Setup, dataset: &Dataset, models: &models::Models) -> Result<Self, TaskError> {
         let mut methods = Vec::new();
         let pictures = dataset.kind == SourceKind::Pictures;
         if !pictures {
             methods.push(Method::Measured);
         }
-        let mut engine = String::new();
+        let fail = |err: &dyn std::error::Error| TaskError::from_error(WHAT, err);
+        let engine = resolve(setup.runtime).map_err(|err| fail(&err))?.label().to_owned();
         let mut names: Vec<String> = Vec::new();
         for origin in &setup.bundles {
-            let (generator, name) = open(origin, |bundle| Generator::open(bundle, setup.runtime))?;
-            let ends = generator.spec().sensors().ends(&name, &dataset.rig);
-            let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
-            let defaults = generator.spec().defaults;
+            let bundle = BundleInfo::of(&open(origin)?);
+            let info = bundle.generator.as_ref();
+            let info = info.ok_or_else(|| TaskError::new(WHAT, format!("{origin} is a {}", bundle.kind.name())))?;
+            let input = info.sensors.ends(&bundle.name, &dataset.rig).map_err(|err| fail(&err))?.input;
+            let (defaults, name) = (info.defaults, bundle.name.clone());
             let config = GenerateConfig {
                 steps: setup.steps.filter(|_| defaults.steps > 1).unwrap_or(defaults.steps),
                 seed: setup.seed.unwrap_or(defaults.seed),
                 sampler: setup.sampler.unwrap_or(defaults.sampler),
                 ..defaults
             };
-            engine = generator.engine().label().to_owned();
             // Two runs of one trainer have the same name: their folders tell them apart.
             let name = if names.contains(&name) { format!("{name} ({})", origin.short_name()) } else { name };
             names.push(name.clone());
-            methods.push(Method::Generator(Box::new(GeneratorMethod { name, generator, config, input })));
+            let (models, engine) = (models.beside(), setup.runtime);
+            methods.push(Method::Generator(Box::new(GeneratorMethod { name, bundle, models, engine, config, input })));
         }
         let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id), Turn::default()), Ok(Some(_)));
         if pictures && (0..LOOKED_AT).any(stored) {
             methods.push(Method::Stored);
         }
-        let mask = match (&setup.mask_bundle, setup.mask) {
-            (Some(origin), MaskBy::Unet) if !pictures => {
-                Some(open(origin, |bundle| MaskModel::open(bundle, setup.runtime))?.0)
-            }
+        let mask_bundle = match &setup.mask_bundle {
+            Some(origin) if !pictures => Some(BundleInfo::of(&open(origin)?)),
             _ => None,
         };
         let classifier = match &setup.classifier {
-            Some(origin) if !pictures => Some(open(origin, |bundle| ToolClassifier::open(bundle, setup.runtime))?.0),
+            Some(origin) if !pictures => {
+                Some(ToolClassifier::open(&open(origin)?, setup.runtime).map_err(|err| fail(&err))?)
+            }
             _ => None,
         };
-        if engine.is_empty() {
-            engine = mask.as_ref().map_or("no model", |m| m.engine().label()).to_owned();
-        }
-        Ok(Self { methods, mask, classifier, engine, made_otherwise: BTreeMap::new() })
+        let masks = models.beside();
+        Ok(Self { methods, masks, mask_bundle, classifier, engine, made_otherwise: BTreeMap::new() })
     }
 
     /// The engine's name.
@@ -143,7 +143,7 @@ impl Models {
         }];
         for method in &self.methods {
             if let Method::Generator(method) = method
-                && method.generator.spec().output.sensor.kind == SensorKind::Color
+                && method.bundle.generator.as_ref().is_some_and(|g| g.sensors.output.kind == SensorKind::Color)
             {
                 notes.push(format!(
                     "{}: predicts a color picture; PSNR and SSIM are of the difference image on the 0..255 scale, peak \
@@ -156,12 +156,22 @@ impl Models {
             notes.push("pictures have no camera, pose or tool: no angle, tool or Fréchet distance".into());
             return notes;
         }
-        notes.push(match setup.mask {
-            MaskBy::Unet if self.mask.is_none() => "no mask model: no angle".into(),
-            MaskBy::Unet => "contact masks of the mask model, for measured and predicted imprints alike".into(),
-            MaskBy::Cad => "contact masks of the CAD model at the true pose: the truth leaks into every angle".into(),
-            MaskBy::Truth => "contact masks of the simulator's truth: the truth leaks into every angle".into(),
-            MaskBy::Threshold(m) => format!("contact masks: imprint deeper than {:.1} mm", m * 1e3),
+        let recipe = setup.mask.recipe(self.mask_bundle.as_ref().map(|bundle| &bundle.id));
+        notes.push(match recipe {
+            None => "no mask model: no angle".into(),
+            Some(MaskRecipe::Unet(_)) => {
+                "contact masks of the mask model, for measured and predicted imprints alike".into()
+            }
+            Some(MaskRecipe::Cad(_)) => {
+                "contact masks of the CAD model at the true pose: the truth leaks into every angle".into()
+            }
+            Some(MaskRecipe::Truth) => {
+                "contact masks of the simulator's truth: the truth leaks into every angle".into()
+            }
+            Some(MaskRecipe::Threshold(m)) => format!("contact masks: imprint deeper than {:.1} mm", m.get() * 1e3),
+            Some(MaskRecipe::TopPercent(percent)) => {
+                format!("contact masks: the deepest {:.1} % of each imprint", percent.get())
+            }
         });
         if self.classifier.is_none() {
             notes.push("no tool classifier: no tool accuracy and no Fréchet distance".into());
@@ -216,55 +226,50 @@ impl GeneratorMethod {
             })
             .collect();
         let images: Vec<&RgbGrid> = touches.iter().map(|t| &*t.2).collect();
-        let start = Instant::now();
-        let raws = self.generate(&images, cx)?;
-        let seconds = start.elapsed().as_secs_f64() / images.len().max(1) as f64;
+        let predictions = self.predict(&images, cx)?;
         let mut made: Vec<Result<Made, String>> = cases
             .iter()
-            .map(|_| {
-                Ok(Made { imprints: PerPad::default(), colors: PerPad::default(), tile: None, seconds: Some(seconds) })
-            })
+            .map(|_| Ok(Made { imprints: PerPad::default(), colors: PerPad::default(), tile: None, seconds: None }))
             .collect();
-        for ((at, finger, _), raw) in touches.into_iter().zip(raws) {
-            let picture = raw.and_then(|raw| self.generator.picture(&raw, shift).map_err(|err| err.to_string()));
-            let touch = cases[at].sample.pad(finger);
+        for ((at, finger, _), prediction) in touches.into_iter().zip(predictions) {
+            let sample = &cases[at].sample;
+            let picture = prediction.and_then(|prediction| {
+                let seconds = prediction.seconds;
+                let measured = sample.pad(finger).and_then(|t| t.color()).map_or([0, 0], |c| c.difference.size());
+                Ok(match imprint::color(&prediction, measured)? {
+                    Some(color) => (seconds, None, Some(color)),
+                    None => (seconds, Some(imprint::imprint_of(&prediction, shift, sample, finger)?), None),
+                })
+            });
             match (picture, &mut made[at]) {
-                (Ok(Picture::Depth(depth)), Ok(made)) => {
-                    let bubble = touch.and_then(|t| t.depth());
-                    made.imprints[finger] = Some(match bubble.map(|b| b.imprint.size()) {
-                        Some([w, h]) if depth.size() != [w, h] && w * h > 0 => bilinear(&depth, w, h),
-                        _ => depth,
-                    });
+                (Ok((seconds, depth, color)), Ok(made)) => {
+                    // The images of one call took as long each; kept ones took what they took when they were made.
+                    made.seconds = Some(made.seconds.map_or(seconds, |first| 0.5 * (first + seconds)));
+                    (made.imprints[finger], made.colors[finger]) = (depth, color);
                 }
-                (Ok(Picture::Color(color)), Ok(made)) => {
-                    let measured = touch.and_then(|t| t.color()).map(|c| c.difference.size());
-                    made.colors[finger] = Some(match measured {
-                        Some([w, h]) if color.size() != [w, h] && w * h > 0 => bilinear_rgb(&color, w, h),
-                        _ => color,
-                    });
-                }
-                (Err(why), slot) => *slot = Err(why),
+                (Err(err), slot) => *slot = Err(err.why),
                 (Ok(_), Err(_)) => {}
             }
         }
         Some(made)
     }
 
-    /// The decoder's pictures. One that fails does not take the others of its batch with it. `None` once told to stop.
-    fn generate(&mut self, images: &[&RgbGrid], cx: &JobCx) -> Option<Vec<Result<RawPrediction, String>>> {
-        let mut go = |_| if cx.cancel.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        match self.generator.generate_batch(images, &self.config, &mut go) {
-            Ok(raws) => return Some(raws.into_iter().map(Ok).collect()),
-            Err(GenerateError::Cancelled) => return None,
-            Err(_) => {}
-        }
-        let mut out = Vec::new();
-        for image in images {
-            match self.generator.generate(image, &self.config, &mut go) {
-                Err(GenerateError::Cancelled) => return None,
-                one => out.push(one.map_err(|err| err.to_string())),
-            }
-        }
-        Some(out)
+    /// Predictions. One that fails does not take the others of its batch with it. `None` once told to stop.
+    fn predict(&mut self, images: &[&RgbGrid], cx: &JobCx) -> Option<Vec<Result<Prediction, TaskError>>> {
+        let seed = self.config.seed;
+        let wanted: Vec<Wanted<'_>> =
+            images.iter().map(|difference| Wanted { difference, seed, size: [0, 0] }).collect();
+        let cx = cx.quiet();
+        let run = |wanted: &[Wanted<'_>]| self.models.predict(&self.bundle, self.engine, &self.config, wanted, &cx);
+        let one = |image: &Wanted<'_>| {
+            let made = run(std::slice::from_ref(image))?.pop();
+            made.ok_or_else(|| TaskError::new(WHAT, "the generator gave no prediction"))
+        };
+        let made = match run(&wanted) {
+            Ok(made) => made.into_iter().map(Ok).collect(),
+            Err(err) if err.is_cancelled() => return None,
+            Err(_) => wanted.iter().map(one).collect::<Vec<_>>(),
+        };
+        (!cx.cancel.is_cancelled()).then_some(made)
     }
 }

@@ -7,22 +7,24 @@ use rayon::prelude::*;
 
 use super::load::Case;
 use super::methods::{Made, Method, Models};
-use super::{MaskBy, Setup, Skipped};
-use crate::domain::contact::{ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
+use super::{Setup, Skipped};
+use crate::domain::align::Ask;
+use crate::domain::contact::{ContactMask, MaskBasis};
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
 use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use crate::domain::metrics::{LEVELS, SsimRange, planes, ssim_ranges, unit_range};
-use crate::domain::pose::{FingerInput, Fingers, ToolModel, estimate};
+use crate::domain::pose::ToolModel;
 use crate::domain::resample::bilinear;
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::sim::pattern_of;
-use crate::domain::units::angle_error;
 use crate::infer::classifier::Verdict;
 use crate::io::dataset::Dataset;
+use crate::work::cloud::contact_points;
 use crate::work::job::JobCx;
-use crate::work::mask;
-use crate::work::mask::MaskRecipe;
+use crate::work::mask::MaskInputs;
+use crate::work::models::Masking;
+use crate::work::pose;
 
 /// A prediction that waits for its image figures.
 struct Image {
@@ -74,7 +76,9 @@ impl Tool {
         cx: &JobCx,
         say: &mut dyn FnMut(&str),
     ) {
-        let Models { methods, mask, classifier, made_otherwise, .. } = models;
+        let Models { methods, masks: by_models, mask_bundle, classifier, made_otherwise, .. } = models;
+        let by = Masking { choice: setup.mask, model: mask_bundle.as_ref(), engine: setup.runtime };
+        let with_masks = by.recipe().is_ok();
         self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
@@ -96,17 +100,16 @@ impl Tool {
                     if self.model.is_none() || case.sample.grasp_from_object.is_none() {
                         return None;
                     }
-                    let imprint = made.imprints[f].as_ref()?;
-                    let found = match (setup.mask, mask.as_mut()) {
-                        (MaskBy::Unet, Some(model)) => model.contact(imprint).map_err(|err| err.to_string()),
-                        (MaskBy::Unet, None) => return None,
-                        _ => self.mask(setup.mask, &case.sample, f, imprint),
-                    };
+                    let imprint = made.imprints[f].as_ref().filter(|_| with_masks)?;
+                    let tool = self.model.as_ref();
+                    let inputs = MaskInputs { sample: &case.sample, tool, labels: case.labels.as_ref() };
+                    let found = by_models.contact_mask(by, imprint, f, inputs).map_err(|err| err.why);
                     let finger = || case.sample.rig.pad_key(f);
                     let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
                     let ContactMask { mask, basis } = found.ok()?;
                     let why = match basis {
                         MaskBasis::Source => return Some(mask),
+                        MaskBasis::Hand => "were drawn by hand, and are taken whatever the imprint",
                         MaskBasis::Flat => "are empty: the imprints are flat",
                         MaskBasis::Depth(_) => {
                             "are by depth: the mask model found no contact in imprints that have some"
@@ -119,7 +122,6 @@ impl Tool {
                 kept.push((case, made, masks));
             }
             // Poses on all cores; the models run one by one.
-            let with_masks = setup.mask != MaskBy::Unet || mask.is_some();
             let angles: Vec<Option<f64>> = kept
                 .par_iter()
                 .map(|(case, made, masks)| {
@@ -154,34 +156,15 @@ impl Tool {
         }
     }
 
-    /// A mask that needs no model.
-    fn mask(&self, by: MaskBy, sample: &Sample, finger: PadId, imprint: &DepthMap) -> Result<ContactMask, String> {
-        let recipe = match by {
-            MaskBy::Cad => MaskRecipe::Cad((LAB_CAD_DISTANCE_M as f32).into()),
-            MaskBy::Threshold(m) => MaskRecipe::Threshold(m.into()),
-            MaskBy::Truth | MaskBy::Unet => MaskRecipe::Truth,
-        };
-        mask::mask(&recipe, imprint, sample.pad(finger), self.model.as_ref(), sample.grasp_from_object)
-            .map_err(|err| err.to_string())
-    }
-
     /// The error of the angle from both fingers: NaN without a pose, `None` where there can be none.
     fn angle(&self, setup: &Setup, sample: &Sample, made: &Made, masks: &PerPad<Mask>) -> Option<f64> {
         let (model, truth) = (self.model.as_ref()?, sample.grasp_from_object?);
-        let fingers = Fingers::new(&sample.rig, |f| {
-            let camera = sample.pad(f)?.depth()?.camera.as_ref()?;
-            let mask = Some(masks[f].as_ref()?);
-            Some(FingerInput { imprint: made.imprints[f].as_ref()?, camera, mask })
-        });
-        if sample.rig.pads().all(|f| {
-            let bubble = sample.pad(f).and_then(|t| t.depth());
-            bubble.is_none_or(|b| b.camera.is_none())
-        }) {
+        if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             return None;
         }
-        let found = estimate(&fingers, model, setup.engine, false).ok();
-        let truth = truth.inverse().theta_rad;
-        Some(found.map_or(f64::NAN, |p| angle_error(p.object_from_grasp.theta_rad, truth).abs()))
+        let found = contact_points(sample, &made.imprints.as_ref(), &masks.as_ref())
+            .and_then(|points| pose::pose(&points, model, &*setup.engine.registration(), Ask::default(), Some(truth)));
+        Some(found.ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN))
     }
 
     /// The image figures, now that all predictions of the tool are there.

@@ -3,14 +3,15 @@
 use rayon::prelude::*;
 
 use crate::domain::frames::PlanarPose;
-use crate::domain::grid::DepthMap;
+use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::{self, AngleSummary};
-use crate::domain::pose::{Engine, FingerInput, Fingers, ToolModel, estimate};
-use crate::domain::rig::{PadId, lab};
+use crate::domain::pose::{Engine, ToolModel, register};
+use crate::domain::rig::{PadId, PerPad, lab};
 use crate::domain::sample::{DepthTouch, Sample};
 use crate::domain::sim::{self, SimConfig};
 use crate::domain::units::angle_error;
 use crate::infer::mask::MaskModel;
+use crate::work::cloud::contact_points;
 use crate::work::compare::LAB_PEAK_M;
 
 /// A grasp of a simulated tool.
@@ -94,14 +95,12 @@ impl Judge {
     }
 
     fn error_rad(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Option<f64>> {
-        let masks = [self.masks.contact(&imprints[0])?.mask, self.masks.contact(&imprints[1])?.mask];
-        let fingers = Fingers::new(&case.sample.rig, |finger| {
-            let camera = case.sample.pad(finger)?.camera()?;
-            let (imprint, mask) = (&imprints[finger.index()], &masks[finger.index()]);
-            Some(FingerInput { imprint, camera, mask: Some(mask) })
-        });
+        let mut contact = |imprint| Ok::<_, anyhow::Error>(Some(self.masks.contact(imprint)?.mask));
+        let masks: PerPad<Mask> = [contact(&imprints[0])?, contact(&imprints[1])?].into();
+        let imprints = [Some(&imprints[0]), Some(&imprints[1])].into();
+        let points = contact_points(&case.sample, &imprints, &masks.as_ref())?;
         // Too few contact points are no pose; that is counted.
-        let report = estimate(&fingers, &case.tool, Engine::default(), false).ok();
+        let report = register(&points, &case.tool, Engine::default(), false).ok();
         Ok(report.map(|r| angle_error(r.grasp_from_object.theta_rad, case.truth.theta_rad)))
     }
 }
