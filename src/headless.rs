@@ -12,6 +12,7 @@ mod doctor;
 mod evaluate;
 mod generate;
 mod guard;
+mod label;
 mod ledger;
 mod masks;
 mod models;
@@ -80,6 +81,8 @@ enum Verb {
     Evaluate(Box<evaluate::EvaluateArgs>),
     /// Where starts of the registration lead, for one pair: the numbers behind the basin map.
     Basin(Box<basin::BasinArgs>),
+    /// List what people said about the pairs, or say it: corrected masks, review states, accepted poses.
+    Label(Box<label::LabelArgs>),
     /// Contact masks.
     #[command(subcommand)]
     Masks(masks::MasksVerb),
@@ -219,6 +222,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
         Some(Verb::Basin(args)) => basin::run(&args),
+        Some(Verb::Label(args)) => label::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
         Some(Verb::Bench(verb)) => bench::run(&verb),

@@ -15,7 +15,6 @@ use super::workbench::PoseOf;
 use crate::domain::grid::{DepthMap, Mask, RgbGrid};
 use crate::domain::rig::{PadId, PerPad, SensorKind};
 use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
-use crate::domain::units;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::cloud::Clouds;
 use crate::work::compare::Comparison;
@@ -264,15 +263,11 @@ impl State {
 
     /// An automatic source in words, with its number.
     pub fn mask_label(&self, recipe: &MaskRecipe) -> String {
-        match recipe {
-            MaskRecipe::Threshold(m) => format!("Threshold {}", units::text_mm(f64::from(m.get()))),
-            MaskRecipe::TopPercent(percent) => format!("Top {:.1} %", percent.get()),
-            MaskRecipe::Cad(m) => format!("CAD within {}", units::text_mm(f64::from(m.get()))),
-            MaskRecipe::Unet(id) => {
-                format!("UNet {}", self.library.bundle(id).map_or("", |bundle| bundle.name.as_str()))
-            }
-            MaskRecipe::Truth => "Simulator truth".into(),
-        }
+        let model = match recipe {
+            MaskRecipe::Unet(id) => self.library.bundle(id).map_or("", |bundle| &bundle.name),
+            _ => "",
+        };
+        recipe.label(model)
     }
 
     /// The tool of the selected pair.

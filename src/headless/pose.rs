@@ -105,7 +105,7 @@ pub(super) fn parse_engines() -> impl TypedValueParser<Value = Engines> {
     })
 }
 
-fn parse_start(text: &str) -> Result<PlanarPose, String> {
+pub(super) fn parse_start(text: &str) -> Result<PlanarPose, String> {
     let numbers: Vec<f64> =
         text.split(',').filter_map(|n| n.trim().parse().ok()).filter(|n: &f64| n.is_finite()).collect();
     let (&[degrees, y_mm, z_mm], 3) = (numbers.as_slice(), text.split(',').count()) else {

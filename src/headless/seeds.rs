@@ -176,7 +176,7 @@ pub(super) fn fan(
     let mut angle = |imprints: PerPad<&DepthMap>| -> anyhow::Result<Option<f64>> {
         let contact = predictor.contact(args, imprints.map(|imprint| imprint.cloned()), inputs)?;
         for (pad, found) in contact.masks.entries().filter(|(_, found)| found.basis != MaskBasis::Source) {
-            let made_of = format!("{} finger: {}", sample.rig.pad_key(pad), found.basis.key(contact.source.key()));
+            let made_of = format!("{} finger: {}", sample.rig.pad_key(pad), found.basis.key(contact.source().key()));
             *made_otherwise.entry(made_of).or_insert(0) += 1;
         }
         let found = contact.points(sample).and_then(|points| {

@@ -59,8 +59,24 @@ impl ImprintSource {
 }
 
 /// How far the review of a pair is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    EnumIter,
+    EnumString,
+    IntoStaticStr,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Review {
     /// Nobody looked at it.
     #[default]
@@ -89,16 +105,12 @@ impl Review {
 
     /// The name in files.
     pub fn stored(self) -> &'static str {
-        match self {
-            Self::InProgress => "in_progress",
-            other => other.name(),
-        }
+        self.into()
     }
 
     /// The state of a name in files; `None` for an unknown one.
     pub fn from_stored(name: &str) -> Option<Self> {
-        use strum::IntoEnumIterator as _;
-        Self::iter().find(|review| review.stored() == name)
+        name.parse().ok()
     }
 
     /// Whether nothing more is to be done.
@@ -142,6 +154,14 @@ impl PairLabels {
     /// The mask drawn by hand of a pad, if it is as large as the imprint.
     pub fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&HandMask> {
         self.masks[pad].as_ref().filter(|hand| hand.mask.size() == imprint.size())
+    }
+
+    /// Corrects the mask of a pad, or takes the correction back; the pair counts as begun.
+    pub fn draw(&mut self, pad: PadId, mask: Option<HandMask>) {
+        self.masks[pad] = mask;
+        if self.review == Review::Todo {
+            self.review = Review::InProgress;
+        }
     }
 
     /// The pose accepted for `source`.

@@ -18,6 +18,7 @@ use crate::domain::grid::DepthMap;
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad, Rig};
 use crate::domain::sample::{PadTouch, Sample};
+use crate::domain::units;
 
 const WHAT: &str = "Contact mask";
 
@@ -144,6 +145,17 @@ pub enum MaskRecipe {
 }
 
 impl MaskRecipe {
+    /// In words, with its number; `model` is the mask model's name.
+    pub fn label(&self, model: &str) -> String {
+        match self {
+            Self::Threshold(m) => format!("Threshold {}", units::text_mm(f64::from(m.get()))),
+            Self::TopPercent(percent) => format!("Top {:.1} %", percent.get()),
+            Self::Cad(m) => format!("CAD within {}", units::text_mm(f64::from(m.get()))),
+            Self::Unet(_) => format!("UNet {model}"),
+            Self::Truth => "Simulator truth".into(),
+        }
+    }
+
     /// The source that it is of.
     pub fn source(&self) -> MaskSource {
         match self {
@@ -229,17 +241,25 @@ pub struct Contact {
     pub imprints: PerPad<DepthMap>,
     /// One for each imprint.
     pub masks: PerPad<ContactMask>,
-    /// Where those come from that nobody drew.
-    pub source: MaskSource,
+    /// What those are made by that nobody drew.
+    pub recipe: MaskRecipe,
+    /// The name of the mask model, where there is one.
+    pub model: Option<String>,
 }
 
 impl Contact {
+    /// Where the masks come from that nobody drew.
+    pub fn source(&self) -> MaskSource {
+        self.recipe.source()
+    }
+
     /// What the masks are made of: the key of the source; `hand` where one was drawn, `depth` where the model found
     /// nothing, `flat` where there is no contact; of the pads in turn where they differ.
     pub fn made_of(&self) -> String {
-        let mut keys: Vec<&'static str> = self.masks.iter().flatten().map(|m| m.basis.key(self.source.key())).collect();
+        let mut keys: Vec<&'static str> =
+            self.masks.iter().flatten().map(|m| m.basis.key(self.source().key())).collect();
         keys.dedup();
-        if keys.is_empty() { self.source.key().to_owned() } else { keys.join(", ") }
+        if keys.is_empty() { self.source().key().to_owned() } else { keys.join(", ") }
     }
 
     /// In words, by pad, why masks are not of the source that was asked.
@@ -287,7 +307,7 @@ mod tests {
         let small = DepthMap::from_fn(60, 60, |x, _| if x < 30 { 0.008 } else { 0.0 });
         assert_eq!(contact_mask(&threshold, &small, lab::LEFT, inputs, never).unwrap().basis, MaskBasis::Source);
         let masks = [Some(right), Some(left)].into();
-        let contact = Contact { imprints: PerPad::default(), masks, source: threshold.source() };
+        let contact = Contact { imprints: PerPad::default(), masks, recipe: threshold, model: None };
         assert_eq!(contact.made_of(), "threshold, hand");
         assert!(contact.notes(&Rig::lab()).is_empty());
         for source in <MaskSource as strum::IntoEnumIterator>::iter() {

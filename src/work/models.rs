@@ -328,7 +328,7 @@ impl Models {
         for (pad, imprint) in imprints.entries() {
             masks[pad] = Some(self.contact_mask(by, imprint, pad, inputs)?);
         }
-        Ok(Contact { imprints, masks, source: by.recipe()?.source() })
+        Ok(Contact { imprints, masks, recipe: by.recipe()?, model: by.model.map(|model| model.name.clone()) })
     }
 }
 

@@ -313,7 +313,7 @@ fn figures(sample: &Sample, pad: PadId, contact: &Contact) -> Option<FingerFigur
         max_m: stats.max,
         mean_m: stats.mean,
         contact_px: mask.map(count),
-        mask: mask.map_or(contact.source.key(), |found| found.basis.key(contact.source.key())),
+        mask: mask.map_or(contact.source().key(), |found| found.basis.key(contact.source().key())),
         psnr_db: compared.as_ref().and_then(|c| c.psnr_db),
         ssim: compared.as_ref().and_then(|c| c.ssim),
     })
