@@ -412,9 +412,10 @@ fn stored_predictions_get_a_row() {
 
 /// A grasp of the simulator in the lab's layout, spoilt.
 fn write_spoilt(root: &Path, number: u64, spoil: impl Fn(&mut touch2touch::domain::sample::DepthTouch)) {
+    use touch2touch::domain::catalog;
     use touch2touch::domain::sim;
     use touch2touch::io::simulated::{Layout, write_pair, write_tools};
-    let tool = &sim::tools()[0];
+    let tool = &catalog::tools()[0];
     let grasp = sim::Grasp { theta_rad: 0.2, x_m: 0.001, y_m: -0.001 };
     let mut sample = sim::simulate(tool, grasp, 7, &sim::SimConfig::default());
     for touch in sample.pads.iter_mut().flatten() {

@@ -74,7 +74,7 @@ fn the_trainer_names_the_simulators_tools() {
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("training/baselines.py")).unwrap();
     let list = text.split_once("NAMES = (").unwrap().1.split_once(')').unwrap().0;
     let names: Vec<&str> = list.split('"').skip(1).step_by(2).collect();
-    let tools: Vec<&str> = touch2touch::domain::sim::tools().iter().map(|t| t.name.as_str()).collect();
+    let tools: Vec<&str> = touch2touch::domain::catalog::tools().iter().map(|t| t.name.as_str()).collect();
     assert_eq!(names, tools);
 }
 

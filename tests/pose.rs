@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use strum::IntoEnumIterator as _;
-use touch2touch::domain::align::{AlignConfig, AlignReport, DistanceField, align};
+use touch2touch::domain::align::{AlignConfig, AlignReport, align};
 use touch2touch::domain::contact::{
     LAB_CAD_DISTANCE_M, MaskBasis, cad_signed_distance, rest_and_top, settled_model, threshold,
 };
 use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::field::DistanceField;
 use touch2touch::domain::grid::Mask;
 use touch2touch::domain::pose::{Engine, FingerInput, Fingers, ToolModel, contact_cloud, estimate, fingers_of};
 use touch2touch::domain::rig::{PerPad, Rig, lab};

@@ -19,8 +19,8 @@ use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::rig::{PadId, Rig, Sensor, SensorKind};
 use crate::domain::sample::Scale;
+use crate::domain::turn::Turn;
 use crate::domain::units;
-use crate::domain::upright::Turn;
 use crate::work::error::TaskError;
 
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.

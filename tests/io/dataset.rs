@@ -5,7 +5,7 @@ use std::path::Path;
 use touch2touch::domain::dataset::{PairId, Split};
 use touch2touch::domain::grid::Grid;
 use touch2touch::domain::rig::lab;
-use touch2touch::domain::upright::Turn;
+use touch2touch::domain::turn::Turn;
 use touch2touch::io::dataset::{Dataset, LoadError, OpenError, SourceKind};
 use touch2touch::io::images;
 use touch2touch::io::pt::{PtItem, Tensor, read_dict, write_dict};

@@ -3,12 +3,12 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use touch2touch::domain::catalog;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Grid;
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::Sample;
-use touch2touch::domain::sim;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::doctor::{DoctorReport, examine};
 use touch2touch::io::pt::read_text_lists;
@@ -203,7 +203,7 @@ fn the_reference_sets_are_healthy() {
 fn what_the_simulator_writes_is_healthy() {
     let dir = tempfile::tempdir().unwrap();
     let demo = Dataset::demo();
-    let tools: Vec<_> = sim::tools().iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
+    let tools: Vec<_> = catalog::tools().iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
     write_tools(dir.path(), &tools).unwrap();
     for i in [0, 120, 250] {
         let pair = demo.index.get(PairId(i)).unwrap();

@@ -6,6 +6,7 @@ use touch2touch::app::keys::ShiftMode;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch::domain::ambiguity::Touch;
+use touch2touch::domain::catalog;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::postprocess::FlagKind;
 use touch2touch::domain::rig::lab;
@@ -95,7 +96,7 @@ fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
 #[test]
 fn seen_and_invented_stand_beside_each_other_and_a_bare_shaft_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    let tool = sim::on_a_shaft(sim::tools()[3].clone());
+    let tool = catalog::on_a_shaft(catalog::tools()[3].clone());
     let config = sim::SimConfig::default();
     for index in 0..2 {
         let sample = sim::simulate(&tool, sim::random_grasp(index), index, &config);

@@ -11,6 +11,7 @@ use touch2touch::app::services::Services;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::State;
+use touch2touch::domain::catalog;
 use touch2touch::domain::contact::ContactMask;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::{DepthMap, Grid, RgbGrid};
@@ -170,7 +171,7 @@ impl Services for QuickGenerator {
 
 /// Writes a data set of a few simulated grasps of two tools.
 pub(super) fn write_dataset(root: &Path, grasps: u64) {
-    let tools: Vec<_> = sim::tools().iter().take(2).collect();
+    let tools: Vec<_> = catalog::tools().iter().take(2).collect();
     let config = sim::SimConfig::default();
     for tool in &tools {
         for index in 0..grasps {

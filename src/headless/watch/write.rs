@@ -11,7 +11,7 @@ use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::rig::{PadId, Text};
-use crate::io::dataset::OUTPUT_MARK;
+use crate::io::names::OUTPUT_MARK;
 use crate::io::pt::{PtItem, Tensor};
 use crate::io::{atomic, files, images, names, npz, pt};
 

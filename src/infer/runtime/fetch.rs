@@ -7,9 +7,9 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::{library_in, runtime_dir};
-use crate::infer::bundle::sha256;
 use crate::infer::engine;
+use crate::infer::library::{library_in, runtime_dir};
+use crate::io::digest::sha256;
 use crate::io::files;
 
 /// The version fetched.

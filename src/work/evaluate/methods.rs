@@ -14,7 +14,7 @@ use crate::domain::postprocess::{Picture, RawPrediction, ShiftMode};
 use crate::domain::resample::{bilinear, bilinear_rgb};
 use crate::domain::rig::{PadId, PerPad, SensorId, SensorKind};
 use crate::domain::sample::Scale;
-use crate::domain::upright::Turn;
+use crate::domain::turn::Turn;
 use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::generator::{GenerateError, Generator};
