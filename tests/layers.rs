@@ -1,6 +1,7 @@
 //! The rules of ARCHITECTURE.md that the compiler cannot check: who may name whom, and how long a file may be.
 
 mod circles;
+mod skips;
 
 use std::path::{Path, PathBuf};
 

@@ -188,12 +188,13 @@ fn a_whole_dataset_of_broken_files_is_a_page() {
 
 #[test]
 fn the_reference_sets_are_healthy() {
-    let Some(shared) = support::shared() else { return };
-    let pictures = doctor(&shared.join("real-pairs"));
+    let Some(pictures) = support::shared("real-pairs") else { return };
+    let Some(lab) = support::shared("lab-sample") else { return };
+    let pictures = doctor(&pictures);
     assert_eq!((pictures.pairs, pictures.problems.len()), (36, 1), "{:#?}", pictures.problems);
     assert!(pictures.problems[0].what.contains("do not lie upright"));
     // The lab's sample has mirrored cameras in every file and nothing else.
-    let lab = doctor(&shared.join("lab-sample"));
+    let lab = doctor(&lab);
     assert_eq!((lab.pairs, lab.problems.len()), (4, 1), "{:#?}", lab.problems);
     assert!(lab.problems[0].what.contains("mirrored camera frame"));
     assert_eq!((lab.problems[0].count, lab.problems[0].examples.len()), (4, 4));

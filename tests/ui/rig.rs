@@ -197,11 +197,7 @@ impl Rig {
     ///
     /// `None` where there is no graphics adapter; a failure where the check script demands one.
     pub(super) fn new(size: [f32; 2], grasps: u64) -> Option<Self> {
-        if let Err(err) = touch2touch::gpu::Gpu::headless() {
-            assert!(!crate::support::require("REQUIRE_GPU"), "the check script demands a graphics adapter: {err}");
-            eprintln!("left out: {err}");
-            return None;
-        }
+        crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
         write_dataset(&data, grasps);
@@ -245,8 +241,9 @@ impl Rig {
         self.harness.step();
     }
 
-    /// A studio with the shipped models on a place, for pictures. Panics without a graphics adapter.
+    /// A studio with the shipped models on a place. `None` as for [`Rig::new`].
     pub(super) fn live(size: [f32; 2], place: Place) -> Option<Self> {
+        crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
         let services = Arc::new(LiveServices::with_config_folder(Some(config.clone())));
