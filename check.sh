@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Passes the tests: everything that CI runs, fastest first, with all set-up of its own.
 # On Debian and Ubuntu it installs a software Vulkan driver and the window libraries (asks for sudo if need be);
-# a missing GPU, ONNX Runtime or window is then a failure, not a skip.
+# a missing GPU, ONNX Runtime or window is then a failure, not a skip. Tests on reference data that is not part of the
+# repository run, and are demanded, where that data lies in ../shared (or TOUCH2TOUCH_SHARED); what is not tried is said.
 set -euo pipefail
 cd "$(dirname "$0")"
 step() { printf '\n== %s (%ss)\n' "$*" "$SECONDS"; }
@@ -19,6 +20,12 @@ cargo clippy --locked --features ui-test --all-targets -- -D warnings
 
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --document-private-items --features ui-test
+
+if [ -d "${TOUCH2TOUCH_SHARED:-../shared}" ]; then
+  export REQUIRE_SHARED=1
+else
+  printf '\nNOT TRIED: tests on the reference data, which is not in %s\n' "${TOUCH2TOUCH_SHARED:-../shared}"
+fi
 
 step "tests: the science alone"
 cargo test --locked --no-default-features

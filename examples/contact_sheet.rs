@@ -3,11 +3,12 @@
 //!
 //! `cargo run --release --no-default-features --example contact_sheet -- [OUT.png [PER_TOOL [SEED [SENSOR]]]]`
 //!
-//! Columns are tools in the order of `sim::tools()`, six to a row; values are rounded to [`STEP`] so that the noise
+//! Columns are tools in the order of `catalog::tools()`, six to a row; values are rounded to [`STEP`] so that the noise
 //! does not fill the repository.
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{Rgb, RgbImage};
+use touch2touch::domain::catalog;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
 
@@ -25,7 +26,7 @@ fn main() -> anyhow::Result<()> {
     let sensor: Option<u64> = arguments.next().map(|n| n.parse()).transpose()?;
     let config = sensor.map_or_else(sim::SimConfig::default, sim::SimConfig::randomised);
 
-    let tools = sim::tools();
+    let tools = catalog::tools();
     let count = tools.len() as u32 * per_tool;
     let rows = count.div_ceil(COLUMNS);
     let mut sheet = RgbImage::from_pixel(COLUMNS * (TILE + GAP), 2 * rows * (TILE + GAP), Rgb([255; 3]));

@@ -17,10 +17,11 @@ use anyhow::{Context, Result, ensure};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use touch2touch::domain::catalog::{self, ToolSpec};
 use touch2touch::domain::grid::DepthMap;
 use touch2touch::domain::resample;
 use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim::{self, Condition, Grasp, MISALIGNMENT_M, SimConfig, ToolSpec};
+use touch2touch::domain::sim::{self, Condition, Grasp, MISALIGNMENT_M, SimConfig};
 
 /// Side of the resized GelSlim image, pixels.
 const SIDE: usize = 128;
@@ -96,7 +97,7 @@ fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
 fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Record>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(index));
     let pick = |rng: &mut ChaCha8Rng, seen: bool| {
-        let tools: Vec<usize> = (0..sim::tools().len()).filter(|&i| sim::tools()[i].seen == seen).collect();
+        let tools: Vec<usize> = (0..catalog::tools().len()).filter(|&i| catalog::tools()[i].seen == seen).collect();
         tools[rng.random_range(0..tools.len())]
     };
     let random = mix == Mix::Train && rng.random_bool(0.4);
@@ -104,20 +105,20 @@ fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Re
     let invented;
     let nominal = mix != Mix::Train || rng.random_bool(0.4);
     let tool = match number {
-        Some(i) if nominal => &sim::tools()[i],
+        Some(i) if nominal => &catalog::tools()[i],
         Some(i) => {
-            invented = stretched(sim::tools()[i].clone(), &mut rng);
+            invented = stretched(catalog::tools()[i].clone(), &mut rng);
             &invented
         }
         None => {
-            let tool = sim::random_tool(rng.random());
+            let tool = catalog::random_tool(rng.random());
             invented = if nominal { tool } else { stretched(tool, &mut rng) };
             &invented
         }
     };
     let config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
     let grasp = sim::random_grasp(rng.random());
-    let on_shaft = if condition == Condition::Ambiguous { Some(sim::on_a_shaft(tool.clone())) } else { None };
+    let on_shaft = if condition == Condition::Ambiguous { Some(catalog::on_a_shaft(tool.clone())) } else { None };
     let tool = on_shaft.as_ref().unwrap_or(tool);
     let noise = rng.random();
     // the bubbles' own grasp, if it is another one

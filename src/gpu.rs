@@ -23,6 +23,7 @@ pub mod target;
 pub mod view;
 
 mod buffer;
+mod vertex;
 
 /// What can go wrong between a scene and its picture.
 #[derive(Debug, thiserror::Error)]

@@ -3,7 +3,7 @@
 //! * [`bundle`]: a folder with a manifest and ONNX graphs, checked completely when it is opened.
 //! * [`engine`]: one small trait over two engines, rten (built in) and ONNX Runtime (used where its library is found).
 //! * [`trial`]: whether an engine takes a bundle, found out in a process of its own, before its first use.
-//! * [`runtime`]: where that library is looked for, and how it is fetched.
+//! * [`runtime`]: what was found of that library, and how it is fetched.
 //! * [`generator`], [`mask`], [`classifier`]: what a bundle does, from a GelSlim difference to a decoder's picture, and
 //!   from a depth map to a contact mask or to the tool that made it.
 //! * [`recipe`]: everything a generated result depends on; [`store`]: results on the disk, by recipe.
@@ -15,6 +15,7 @@ pub mod bundle;
 pub mod classifier;
 pub mod engine;
 pub mod generator;
+mod library;
 pub mod mask;
 mod onnx_header;
 pub mod recipe;

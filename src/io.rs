@@ -6,6 +6,7 @@ pub mod atomic;
 pub mod cases;
 pub mod caught;
 pub mod dataset;
+pub(crate) mod digest;
 pub mod doctor;
 pub mod export_unet;
 pub mod files;

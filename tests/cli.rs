@@ -260,9 +260,9 @@ fn predictions_are_written_scored_and_equal_for_equal_seeds() {
 
 #[test]
 fn the_lab_sample_is_within_two_degrees() {
-    let Some(shared) = support::shared() else { return };
+    let Some(lab) = support::shared("lab-sample") else { return };
     let dir = tempfile::tempdir().unwrap();
-    let pose = run(&["pose", shared.join("lab-sample").to_str().unwrap(), "--json"], dir.path());
+    let pose = run(&["pose", lab.to_str().unwrap(), "--json"], dir.path());
     assert!(pose.status.success(), "{}", error_text(&pose));
     let report = json(&pose);
     assert_eq!(report["cases"].as_array().unwrap().len(), 4);
@@ -396,7 +396,7 @@ fn the_results_table_is_printed_and_written() {
 #[cfg(feature = "onnx")]
 #[test]
 fn stored_predictions_get_a_row() {
-    let Some(pairs) = support::shared().map(|dir| dir.join("real-pairs")) else { return };
+    let Some(pairs) = support::shared("real-pairs") else { return };
     let dir = tempfile::tempdir().unwrap();
     let generator = format!("{}/tests/data/bundles/generator", env!("CARGO_MANIFEST_DIR"));
     let args = ["evaluate", "--input", pairs.to_str().unwrap(), "--bundle", &generator, "--json"];
@@ -412,9 +412,10 @@ fn stored_predictions_get_a_row() {
 
 /// A grasp of the simulator in the lab's layout, spoilt.
 fn write_spoilt(root: &Path, number: u64, spoil: impl Fn(&mut touch2touch::domain::sample::DepthTouch)) {
+    use touch2touch::domain::catalog;
     use touch2touch::domain::sim;
     use touch2touch::io::simulated::{Layout, write_pair, write_tools};
-    let tool = &sim::tools()[0];
+    let tool = &catalog::tools()[0];
     let grasp = sim::Grasp { theta_rad: 0.2, x_m: 0.001, y_m: -0.001 };
     let mut sample = sim::simulate(tool, grasp, 7, &sim::SimConfig::default());
     for touch in sample.pads.iter_mut().flatten() {

@@ -22,18 +22,6 @@ use crate::support;
 const SIZE: [u32; 2] = [320, 240];
 const BACKGROUND: [u8; 3] = [26, 28, 33];
 
-/// A device, or `None` with a note where there is no adapter; with `REQUIRE_GPU=1` that is a failure.
-fn gpu_or_skip() -> Option<Gpu> {
-    match Gpu::headless() {
-        Ok(gpu) => Some(gpu),
-        Err(error) if support::require("REQUIRE_GPU") => panic!("REQUIRE_GPU is set, but: {error}"),
-        Err(error) => {
-            eprintln!("GPU test left out: {error}");
-            None
-        }
-    }
-}
-
 /// One view, ready to draw.
 struct View {
     gpu: Gpu,
@@ -45,7 +33,7 @@ struct View {
 impl View {
     /// With the smoothest edges that the adapter can draw.
     fn new() -> Option<Self> {
-        Some(Self::on(gpu_or_skip()?.smooth()))
+        Some(Self::on(support::gpu()?.smooth()))
     }
 
     fn on(gpu: Gpu) -> Self {
@@ -135,7 +123,7 @@ fn a_point_appears_at_its_pixel_in_its_color_and_size() {
 
 #[test]
 fn one_sample_per_pixel_shows_the_same_point() {
-    let Some(mut gpu) = gpu_or_skip() else { return };
+    let Some(mut gpu) = support::gpu() else { return };
     gpu.samples = 1;
     let mut view = View::on(gpu);
     let p = DVec3::new(0.004, 0.003, 0.002);
@@ -441,7 +429,7 @@ fn empty_and_impossible_input_is_a_picture_or_an_error_not_a_panic() {
 
 #[test]
 fn a_refused_call_is_a_value() {
-    let Some(gpu) = gpu_or_skip() else { return };
+    let Some(gpu) = support::gpu() else { return };
     let result = gpu.guarded("making a buffer that cannot be", || {
         Ok(gpu.device.create_buffer(&touch2touch::gpu::wgpu::BufferDescriptor {
             label: Some("test"),

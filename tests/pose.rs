@@ -5,12 +5,13 @@ use std::time::Instant;
 
 use glam::{DVec2, DVec3};
 use strum::IntoEnumIterator as _;
-use touch2touch::domain::align::{AlignConfig, AlignReport, Ask, DistanceField, align};
+use touch2touch::domain::align::{AlignConfig, AlignReport, Ask, align};
 use touch2touch::domain::cloud::lift;
 use touch2touch::domain::contact::{
     LAB_CAD_DISTANCE_M, MaskBasis, cad_signed_distance, rest_and_top, settled_model, threshold,
 };
 use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::field::DistanceField;
 use touch2touch::domain::grid::Mask;
 use touch2touch::domain::pose::{Engine, ToolModel, register};
 use touch2touch::domain::rig::{PerPad, lab};
@@ -41,9 +42,7 @@ fn median(values: &[f64]) -> f64 {
 
 #[test]
 fn forty_known_grasps_with_spoilt_masks() {
-    let Some(folder) = shared().map(|s| s.join("pose-cases")) else {
-        return;
-    };
+    let Some(folder) = shared("pose-cases") else { return };
     let set = CaseSet::open(&folder).unwrap();
     assert_eq!(set.cases.len(), 40);
     let mut build_ms = Vec::new();
@@ -117,9 +116,7 @@ fn forty_known_grasps_with_spoilt_masks() {
 
 #[test]
 fn the_fast_answer_costs_what_the_proved_one_does() {
-    let Some(folder) = shared().map(|s| s.join("pose-cases")) else {
-        return;
-    };
+    let Some(folder) = shared("pose-cases") else { return };
     let set = CaseSet::open(&folder).unwrap();
     let fields: BTreeMap<usize, DistanceField> =
         set.tools.iter().map(|(number, mesh)| (*number, DistanceField::from_mesh(mesh).unwrap())).collect();
@@ -140,7 +137,7 @@ fn the_fast_answer_costs_what_the_proved_one_does() {
 
 #[test]
 fn the_labs_files_with_the_mask_from_the_cad_give_the_stored_angle() {
-    let Some(folder) = shared().map(|s| s.join("lab-sample")) else { return };
+    let Some(folder) = shared("lab-sample") else { return };
     let dataset = Dataset::open(&folder).unwrap();
     let mut seen = 0;
     for (i, entry) in dataset.index.pairs.iter().enumerate() {
@@ -198,7 +195,7 @@ fn depth_stands_in_where_the_mask_model_finds_nothing() {
     let demo = Dataset::demo();
     let some = (0..demo.index.pairs.len()).step_by(23).map(|i| PairId(i as u32));
     let mut sets = vec![("demo", some.collect::<Vec<_>>(), demo, 6.0)];
-    if let Some(folder) = shared().map(|s| s.join("lab-sample")) {
+    if let Some(folder) = shared("lab-sample") {
         let lab = Dataset::open(&folder).unwrap();
         sets.push(("lab-sample", (0..4).map(PairId).collect(), lab, 12.0));
     }

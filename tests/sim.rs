@@ -3,10 +3,11 @@
 use std::sync::LazyLock;
 
 use glam::{DVec2, DVec3};
+use touch2touch::domain::catalog::{self, ToolSpec};
 use touch2touch::domain::grid::Grid;
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::domain::sample::{ColorTouch, DepthTouch, Sample};
-use touch2touch::domain::sim::{self, Grasp, SimConfig, ToolSpec};
+use touch2touch::domain::sim::{self, Grasp, SimConfig};
 
 fn bubble_of(sample: &Sample, finger: PadId) -> &DepthTouch {
     sample.pad(finger).and_then(|t| t.depth()).expect("both fingers have a bubble")
@@ -36,7 +37,7 @@ fn contact_pixels(sample: &Sample, finger: PadId) -> Vec<(usize, usize)> {
 /// One sample of each tool and of a few random ones, made once for all tests.
 fn a_few() -> &'static [(ToolSpec, Sample)] {
     static SAMPLES: LazyLock<Vec<(ToolSpec, Sample)>> = LazyLock::new(|| {
-        let tools = sim::tools().iter().cloned().chain((0..3).map(sim::random_tool));
+        let tools = catalog::tools().iter().cloned().chain((0..3).map(catalog::random_tool));
         tools
             .enumerate()
             .map(|(i, tool)| {
@@ -66,7 +67,7 @@ fn same_bits(a: &Sample, b: &Sample) -> bool {
 
 #[test]
 fn the_same_seed_gives_the_same_sample_in_any_thread() {
-    let tool = &sim::tools()[4];
+    let tool = &catalog::tools()[4];
     let make = move |seed| sim::simulate(tool, sim::grid_grasp(100), seed, &SimConfig::default());
     let here = make(5);
     let there = std::thread::spawn(move || make(5)).join().unwrap();
@@ -188,7 +189,7 @@ fn gelslim_streaks_frame_the_bars() {
 /// (bubble: about the row direction, apart from the cameras' different offsets).
 #[test]
 fn the_fingers_mirror_each_other() {
-    let sample = sim::simulate(&sim::tools()[5], Grasp::default(), 1, &SimConfig::default());
+    let sample = sim::simulate(&catalog::tools()[5], Grasp::default(), 1, &SimConfig::default());
     let object = |finger| lifted(&sample, finger);
     let (right, left) = (object(lab::RIGHT), object(lab::LEFT));
     // the same (y, z) has mirrored x: compare over a common grid of (y, z)
@@ -218,7 +219,7 @@ fn the_fingers_mirror_each_other() {
 /// Turning the grasp the other way is mirroring the tool: the simulator prefers no direction.
 #[test]
 fn opposite_angles_are_mirror_images() {
-    let rod = &sim::tools()[5];
+    let rod = &catalog::tools()[5];
     let at = |theta: f64| {
         let grasp = Grasp { theta_rad: theta, x_m: 0.0, y_m: 0.0 };
         sim::Membrane::press(&SimConfig::default().bubble, rod, grasp.object_from_grasp())
@@ -257,7 +258,7 @@ fn moments(values: impl Iterator<Item = f64>) -> Moments {
 fn statistics_are_those_of_the_labs_data() {
     let samples: Vec<Sample> = (0..24)
         .map(|i| {
-            let tool = &sim::tools()[i % 9];
+            let tool = &catalog::tools()[i % 9];
             sim::simulate(tool, sim::random_grasp(900 + i as u64), i as u64, &SimConfig::default())
         })
         .collect();
@@ -295,7 +296,7 @@ fn statistics_are_those_of_the_labs_data() {
 fn random_sensors_and_tools_give_finite_images() {
     for seed in 0..6 {
         let config = SimConfig::randomised(seed);
-        let sample = sim::simulate(&sim::random_tool(seed), sim::random_grasp(seed), seed, &config);
+        let sample = sim::simulate(&catalog::random_tool(seed), sim::random_grasp(seed), seed, &config);
         for finger in lab::PADS {
             let touch = bubble_of(&sample, finger);
             assert!(touch.imprint.as_slice().iter().all(|v| v.is_finite() && v.abs() < 0.06));

@@ -13,10 +13,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use strum::IntoEnumIterator as _;
 use touch2touch::domain::align::{
-    AlignConfig, AlignError, AlignReport, DistanceField, FieldError, LabIcpConfig, LabModel, align, closed_form,
-    lab_icp,
+    AlignConfig, AlignError, AlignReport, LabIcpConfig, LabModel, align, closed_form, lab_icp,
 };
 use touch2touch::domain::cloud::{Lifted, lift};
+use touch2touch::domain::field::{DistanceField, FieldError};
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::mesh::TriMesh;
@@ -186,7 +186,7 @@ fn e04_a_large_offset_does_not_cost_the_angle() {
     let reference = align(&yz(&scene), &model.field, &near(pose(5.0, 0.0, 0.0))).unwrap().grasp_from_object;
     let lab = |offset: DVec2, scene: &[DVec3]| {
         let start = PlanarPose { y_m: offset.x, z_m: offset.y, ..pose(0.0, 0.0, 0.0) };
-        lab_icp(scene, model.lab_model(), &LabIcpConfig { starts: vec![start], ..LabIcpConfig::default() })
+        lab_icp(scene, &LabModel::of(&model), &LabIcpConfig { starts: vec![start], ..LabIcpConfig::default() })
             .unwrap()
             .grasp_from_object
     };

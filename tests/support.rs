@@ -1,23 +1,49 @@
 //! What several test modules need.
 
+use std::ffi::OsString;
+use std::fmt::Display;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// The folder with real and reference data that only some machines have: `TOUCH2TOUCH_SHARED`, else `../shared`
-/// beside the checkout. `None` (with a note) where it is absent: the product's tests pass without it.
-pub(crate) fn shared() -> Option<PathBuf> {
-    let path = std::env::var_os("TOUCH2TOUCH_SHARED")
+/// A folder of real and reference data that only some machines have: in `TOUCH2TOUCH_SHARED`, else in `../shared` beside
+/// the checkout. `REQUIRE_SHARED=1` demands it.
+pub(crate) fn shared(folder: &str) -> Option<PathBuf> {
+    let root = std::env::var_os("TOUCH2TOUCH_SHARED")
         .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);
+    let path = root.join(folder);
     if path.is_dir() {
-        return Some(path);
+        Some(path)
+    } else {
+        left_out(format!("no reference data at {}", path.display()), "REQUIRE_SHARED")
     }
-    eprintln!("no reference data at {}: this part of the test is left out", path.display());
+}
+
+/// A graphics device. `REQUIRE_GPU=1` demands it.
+#[cfg(feature = "gui")]
+pub(crate) fn gpu() -> Option<touch2touch::gpu::Gpu> {
+    touch2touch::gpu::Gpu::headless().map_or_else(|err| left_out(err, "REQUIRE_GPU"), Some)
+}
+
+/// A Python with PyTorch, named by `TOUCH2TOUCH_TORCH_PYTHON`. `REQUIRE_TORCH=1` demands it.
+pub(crate) fn torch() -> Option<OsString> {
+    let python = std::env::var_os("TOUCH2TOUCH_TORCH_PYTHON");
+    python.or_else(|| left_out("TOUCH2TOUCH_TORCH_PYTHON is not set: PyTorch itself is not asked", "REQUIRE_TORCH"))
+}
+
+/// Says that this machine lacks something that the running test needs, which is then not tried: a failure where
+/// `variable` demands it. Every test that leaves something out does it through here.
+pub(crate) fn left_out<T>(why: impl Display, variable: &str) -> Option<T> {
+    assert!(!require(variable), "{variable} is set, but: {why}");
+    let test = std::thread::current().name().unwrap_or("a test").to_owned();
+    // Not by the macro: what it prints is only shown for tests that fail.
+    writeln!(std::io::stderr(), "NOT TRIED by {test}: {why} ({variable}=1 makes this a failure)").ok();
     None
 }
 
-/// Whether a missing GPU, model runtime or window is a failure instead of a reason to leave a test out.
-/// The check script sets it, so that nothing is skipped unnoticed.
-pub(crate) fn require(variable: &str) -> bool {
+/// Whether what is missing is a failure instead of a reason to leave a test out. The check script sets it, so that nothing
+/// is skipped unnoticed.
+fn require(variable: &str) -> bool {
     std::env::var_os(variable).is_some_and(|v| v != "0" && !v.is_empty())
 }
 

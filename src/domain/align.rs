@@ -1,7 +1,7 @@
 //! Registration: contact points to the planar in-hand pose of the tool.
 //!
 //! Registrations of several kinds behind one trait ([`Register`]), one kind of result:
-//! * [`align`]: robust Levenberg-Marquardt on a [`DistanceField`] of the tool's silhouette, from a few starts. The
+//! * [`align`]: robust Levenberg-Marquardt on a [`DistanceField`](super::field::DistanceField) of the tool's silhouette, from a few starts. The
 //!   default. Points outside the outline pay their distance, points on the silhouette pay nothing.
 //! * [`lab_icp()`]: the lab's planar point-to-point loop, reproduced for comparison.
 //! * [`icp`]: planar and spatial ICP put together from small values, the peers of the default.
@@ -13,11 +13,11 @@
 //! Source of the method: Fitzgibbon, Robust registration of 2D and 3D point sets, 2003.
 
 pub mod basin;
+mod batch;
 mod certify;
 pub mod closed_form;
 pub mod correspond;
 mod directions;
-pub mod field;
 pub mod icp;
 pub mod lab_icp;
 mod observability;
@@ -37,7 +37,6 @@ use serde::{Deserialize, Serialize};
 use super::frames::PlanarPose;
 
 pub use directions::{Directions, Distances};
-pub use field::{DistanceField, FieldError, FieldSample};
 pub use icp::IcpConfig;
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub use observability::{DEGENERATE_BELOW, MotionEllipse, Observability, observability};
@@ -459,7 +458,7 @@ struct Cleaned<'a> {
 /// Drops points that are not finite and refuses sets without a size.
 fn clean(points: &[DVec2], needed: usize) -> Result<Cleaned<'_>, AlignError> {
     /// Four cells of the field: below this no outline can be told from a dot.
-    const MIN_EXTENT_M: f64 = 4.0 * field::CELL_M;
+    const MIN_EXTENT_M: f64 = 4.0 * super::field::CELL_M;
     // Larger coordinates would lose the millimeters that matter; no gripper is a kilometer long.
     const MAX_COORDINATE_M: f64 = 1e6;
     // False for NaN too.

@@ -8,6 +8,7 @@
 //! spacing of the public latent-diffusion release.
 
 mod ddim;
+mod denoiser;
 mod guidance;
 mod noise;
 mod preset;
@@ -15,13 +16,11 @@ mod schedule;
 mod tensor;
 mod watch;
 
-pub use ddim::{
-    Denoiser, DiffusionError, GenerateConfig, Latent, ModelError, Prediction, Progress, Sampler, sample, sample_seeds,
-    sample_watched,
-};
+pub use ddim::{DiffusionError, GenerateConfig, Latent, Sampler, sample, sample_seeds, sample_watched};
+pub use denoiser::{Denoiser, ModelError, Prediction};
 pub use guidance::{GUIDANCE, Guided};
 pub use noise::GaussianNoise;
 pub use preset::Preset;
 pub use schedule::{Schedule, ScheduleError, Spacing, Step};
 pub use tensor::Tensor;
-pub use watch::Watch;
+pub use watch::{Progress, Watch};

@@ -14,11 +14,11 @@ use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
+use super::catalog;
 use super::dataset::{PairEntry, Split};
 use super::metrics::{AngleSummary, frechet_distance};
 use super::rig::{PadId, Rig};
 use super::sample::Scale;
-use super::sim;
 
 pub use paper::paper_rows;
 pub use write::{Column, NOTES, columns, conventions, csv, markdown, text};
@@ -78,7 +78,7 @@ impl Group {
             (Some(true), _) => Self::ClippedPictures,
             (Some(false), _) => Self::CleanPictures,
             (None, Some(_)) if !simulated && matches!(entry.split, Split::Train | Split::TrainOnly) => Self::Training,
-            (None, Some(tool)) => match sim::tools().iter().find(|t| t.name == sim::pattern_of(tool)) {
+            (None, Some(tool)) => match catalog::tools().iter().find(|t| t.name == catalog::pattern_of(tool)) {
                 Some(known) if known.seen => Self::SeenTools,
                 Some(_) => Self::UnseenTools,
                 None => Self::Unknown,

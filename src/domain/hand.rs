@@ -3,7 +3,7 @@
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::align::DistanceField;
+use super::field::DistanceField;
 use super::frames::PlanarPose;
 use super::mesh::MeshDistance;
 use super::mesh::sampling::spread;

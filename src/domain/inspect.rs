@@ -45,7 +45,12 @@ pub struct Counterparts {
 impl Counterparts {
     /// For a registration with a tool.
     pub fn new(tool: &ToolModel, engine: Engine) -> Self {
-        Self { model: (!uses_field(engine)).then(|| ModelPoints::new(&tool.model_points)) }
+        Self {
+            model: (!uses_field(engine)).then(|| {
+                let surface = tool.surface().iter().map(|(p, _)| *p);
+                ModelPoints::new(&in_plane(&surface.collect::<Vec<_>>()))
+            }),
+        }
     }
 
     /// The correspondences of a step, of at most `most` points. `tool` is that of [`Self::new`]. Some 10 µs for

@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::align::{
-    AlignConfig, AlignError, AlignReport, Ask, Directions, IcpConfig, LabIcpConfig, RefineConfig, Register, Scene,
+    AlignConfig, AlignError, AlignReport, Ask, Directions, IcpConfig, LabIcpConfig, RefineConfig, Register, Scene, icp,
 };
 use super::frames::PlanarPose;
 
@@ -155,7 +155,7 @@ pub fn register_with(
     let scene = Scene::new(points);
     let mut report = registration.run(&scene, tool, ask)?;
     if ask.record {
-        report.directions = Directions::at(scene.yz(), tool.silhouette(), report.grasp_from_object);
+        report.directions = Directions::at(scene.yz(), &icp::silhouette(tool), report.grasp_from_object);
     }
     Ok(report)
 }

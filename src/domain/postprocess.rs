@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 mod color;
 mod flags;
 mod ledger;
+mod record;
 mod refit;
 
 pub use color::{ColorChain, Picture};
 pub use flags::{Flag, FlagKind, Severity};
-pub use ledger::{
-    Against, ChainReading, Histogram, Ledger, Orientation, Stage, StageRecord, Stats, correlation, ledger, readings,
-};
+pub use ledger::{ChainReading, Ledger, correlation, ledger, readings};
+pub use record::{Against, Histogram, Orientation, Stage, StageRecord, Stats};
 pub use refit::{BundleTag, RefitShift, ShiftFit};
 
 use super::grid::{DepthMap, Grid};

@@ -10,7 +10,7 @@ use super::frames::PlanarPose;
 use super::grid::{DepthMap, Mask, RgbGrid};
 use super::rig::{Crop, PadId, PerPad, Rig, SensorId};
 use super::sensor::Intrinsics;
-use super::upright::Turn;
+use super::turn::Turn;
 
 /// One grasp, as far as the source has it.
 #[derive(Clone, Debug)]

@@ -1,6 +1,7 @@
 //! Simulator of both sensors of the lab's rig and their ground truth.
 //!
-//! [`simulate`] presses a tool ([`tools()`], [`random_tool`]) between two Soft Bubbles and two GelSlims at a
+//! [`simulate`] presses a tool ([`tools()`](super::catalog::tools()),
+//! [`random_tool`](super::catalog::random_tool)) between two Soft Bubbles and two GelSlims at a
 //! [`Grasp`] and returns what the lab's files hold, plus the truth. The same arguments give the same numbers on
 //! every machine and for every number of threads.
 //!
@@ -19,16 +20,13 @@ mod faults;
 mod gelslim;
 mod grasp;
 mod membrane;
-mod noise;
 mod relax;
 mod rig;
 mod spoil;
-mod tool_mesh;
-mod tools;
 
 use glam::{DAffine3, DQuat, DVec3};
 
-pub use condition::{Condition, MISALIGNMENT_M, TEST_GRASPS, on_a_shaft, pattern_of, test_grasp};
+pub use condition::{Condition, MISALIGNMENT_M, TEST_GRASPS, test_grasp};
 pub use config::{BubbleConfig, GelSlimConfig, SimConfig};
 pub use depth_camera::CONTACT_DISTANCE_M;
 pub use faults::Fault;
@@ -36,11 +34,11 @@ pub use grasp::{GRID_GRASPS, Grasp, POSITION_RANGE_M, THETA_RANGE_RAD, grid_gras
 pub use membrane::{Dome, Membrane};
 pub use rig::{INTRINSICS, RANGE_M, gelslim_pixel, gelslim_yz, grasp_from_camera, outward};
 pub use spoil::{Spoil, spoil_mask};
-pub use tools::{Bar, ToolSpec, random_tool, tools};
 
+use super::catalog::ToolSpec;
+use super::noise::{Noise, Stream};
 use super::rig::{PadId, lab};
 use super::sample::{DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
-use noise::{Noise, Stream};
 
 /// Grid spacing of the membrane, meters.
 const MEMBRANE_STEP_M: f64 = 0.000_5;

@@ -1,27 +1,19 @@
-//! [`ToolModel`]: a tool's CAD model with everything that registration and labeling derive from it.
+//! [`ToolModel`]: a tool's CAD model with the distances to it, and a place for what others derive from it.
 
-use std::sync::OnceLock;
+use std::any::{Any, TypeId};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
-use super::align::icp::Samples;
-use super::align::lab_icp::LAB_MODEL_POINTS;
-use super::align::{DistanceField, FieldError, LabModel};
+use super::field::{DistanceField, FieldError};
 use super::mesh::distance::MeshError;
 use super::mesh::{MeshDistance, TriMesh};
 
-/// Seed of the model points, so that every run compares with the same ones.
-const MODEL_SEED: u64 = 0;
-/// Samples this close to the outline of the silhouette, meters, get its normal.
-const OUTLINE_M: f64 = 0.5e-3;
-/// Points of the surface that stand for triangles which are too dear to search: less than half a millimeter apart on a
-/// hand-held tool.
-const DENSE_POINTS: usize = 50_000;
-/// Most triangles that a search may look at, on average. Ordinary meshes take some ten, however many they have.
-const MAX_EFFORT: usize = 500;
-/// Searches that tell, each this far from the surface, meters.
-const EFFORT_SEARCHES: usize = 64;
-const EFFORT_OFFSET_M: f64 = 1e-3;
+/// Points of the surface that registrations compare with: as many as the lab samples.
+pub const SURFACE_POINTS: usize = 5000;
+/// Seed of those points, so that every run compares with the same ones.
+pub const SURFACE_SEED: u64 = 0;
 
 /// Why a CAD model cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -34,7 +26,7 @@ pub enum ToolError {
     Mesh(#[from] MeshError),
 }
 
-/// A tool's CAD model with everything that registration and labeling derive from it, built once and shared.
+/// A tool's CAD model with the distances to its silhouette and its surface, built once and shared.
 #[derive(Clone, Debug)]
 pub struct ToolModel {
     /// The model, meters, object frame.
@@ -43,16 +35,8 @@ pub struct ToolModel {
     pub field: DistanceField,
     /// Distance to its surface.
     pub distance: MeshDistance,
-    /// 5000 points of its surface, `(y, z)`, meters: what the lab's loop compares with.
-    pub model_points: Vec<DVec2>,
-    /// The same points in space with their normals.
     surface: Vec<(DVec3, DVec3)>,
-    /// Only the peers look at these, so they are built when first asked for.
-    samples: OnceLock<Samples>,
-    silhouette: OnceLock<Samples>,
-    lab: OnceLock<LabModel>,
-    /// `None` inside where the triangles themselves can be searched.
-    dense: OnceLock<Option<Samples>>,
+    derived: Derived,
 }
 
 impl ToolModel {
@@ -63,69 +47,72 @@ impl ToolModel {
     pub fn new(mesh: TriMesh) -> Result<Self, ToolError> {
         let field = DistanceField::from_mesh(&mesh)?;
         let distance = MeshDistance::new(&mesh)?;
-        let surface = mesh.sample_surface_with_normals(LAB_MODEL_POINTS, MODEL_SEED);
-        let model_points = surface.iter().map(|(p, _)| DVec2::new(p.y, p.z)).collect();
-        Ok(Self {
-            mesh,
-            field,
-            distance,
-            model_points,
-            surface,
-            samples: OnceLock::new(),
-            silhouette: OnceLock::new(),
-            lab: OnceLock::new(),
-            dense: OnceLock::new(),
-        })
+        let surface = mesh.sample_surface_with_normals(SURFACE_POINTS, SURFACE_SEED);
+        Ok(Self { mesh, field, distance, surface, derived: Derived::default() })
     }
 
-    /// Points of the surface with the normals of their triangles, in space.
-    pub fn samples(&self) -> &Samples {
-        self.samples.get_or_init(|| Samples::in_space(&self.surface))
+    /// [`SURFACE_POINTS`] points of the surface with the normals of their triangles, meters, object frame.
+    pub fn surface(&self) -> &[(DVec3, DVec3)] {
+        &self.surface
     }
 
-    /// What to compare with in place of the triangles, where looking for the nearest triangle takes too long: points of
-    /// the surface, close together, each with the plane of its triangle. `None` for nearly all tools.
-    pub fn instead_of_triangles(&self) -> Option<&Samples> {
-        let dense = self.dense.get_or_init(|| {
-            let (mut effort, mut searches) = (0, 0);
-            for (i, (point, normal)) in self.surface.iter().take(EFFORT_SEARCHES).enumerate() {
-                // In turn outside and inside.
-                let side = if i % 2 == 0 { EFFORT_OFFSET_M } else { -EFFORT_OFFSET_M };
-                let at = *point + *normal * side;
-                if at.is_finite() {
-                    effort += self.distance.effort(at);
-                    searches += 1;
-                }
+    /// What a registration needs of the tool in a form of its own: made at the first request for the type `T`, kept
+    /// with the tool, and shared by all threads. The tool does not know what it keeps.
+    ///
+    /// `make` must depend on the tool alone; whoever asks for one type always passes the same function.
+    pub fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Self) -> T) -> Arc<T> {
+        self.derived.cell().get_or_init(|| Arc::new(make(self))).clone()
+    }
+}
+
+/// One value of each type, each made once, shared by clones of the tool.
+#[derive(Clone, Default)]
+struct Derived(Arc<Mutex<HashMap<TypeId, Arc<dyn Any + Send + Sync>>>>);
+
+impl Derived {
+    /// The place for a value of this type. The list is not held while the value is made.
+    fn cell<T: Any + Send + Sync>(&self) -> Arc<OnceLock<Arc<T>>> {
+        // The list is whole at any time: a cell is in it or not.
+        let mut cells = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let cell = cells.entry(TypeId::of::<T>()).or_insert_with(|| Arc::new(OnceLock::<Arc<T>>::new()));
+        Arc::clone(cell).downcast().expect("the entry of a type holds that type")
+    }
+}
+
+impl std::fmt::Debug for Derived {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Derived").finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+    use crate::domain::align::testing::cross;
+
+    #[derive(Debug, PartialEq)]
+    struct Count(usize);
+
+    #[test]
+    fn what_is_derived_is_made_once_for_each_type_on_any_thread() {
+        let tool = ToolModel::new(cross()).unwrap();
+        let made = AtomicUsize::new(0);
+        let count = |tool: &ToolModel| {
+            made.fetch_add(1, Ordering::Relaxed);
+            Count(tool.surface().len())
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| assert_eq!(*tool.derived(count), Count(SURFACE_POINTS)));
             }
-            (effort > MAX_EFFORT * searches)
-                .then(|| Samples::in_space(&self.mesh.sample_surface_with_normals(DENSE_POINTS, MODEL_SEED)))
         });
-        dense.as_ref()
-    }
-
-    /// The same points as the lab's loop sees them.
-    pub fn lab_model(&self) -> &LabModel {
-        self.lab.get_or_init(|| LabModel::new(&self.surface.iter().map(|(p, _)| *p).collect::<Vec<_>>()))
-    }
-
-    /// The same points projected along the closing axis (x = 0). Those on the outline of the silhouette carry its
-    /// normal; the others, which say nothing about the place in the plane, carry none (zero).
-    pub fn silhouette(&self) -> &Samples {
-        self.silhouette.get_or_init(|| {
-            let flat: Vec<(DVec3, DVec3)> = self
-                .surface
-                .iter()
-                .map(|(p, _)| {
-                    let sample = self.field.sample(DVec2::new(p.y, p.z));
-                    let normal = if sample.distance > -OUTLINE_M {
-                        sample.gradient.try_normalize().unwrap_or(DVec2::ZERO)
-                    } else {
-                        DVec2::ZERO
-                    };
-                    (DVec3::new(0.0, p.y, p.z), DVec3::new(0.0, normal.x, normal.y))
-                })
-                .collect();
-            Samples::in_plane(&flat)
-        })
+        assert_eq!(made.load(Ordering::Relaxed), 1);
+        // While one is made another may be asked for, of the same tool.
+        let nested = tool.derived(|tool| tool.derived(count).0.to_string());
+        assert_eq!(*nested, SURFACE_POINTS.to_string());
+        assert_eq!(made.load(Ordering::Relaxed), 1);
+        assert_eq!(ToolModel::new(cross()).unwrap().derived(|_| Count(7)).0, 7, "another tool has its own");
     }
 }

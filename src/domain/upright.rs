@@ -9,7 +9,8 @@
 
 use super::grid::{Grid, RgbGrid};
 use super::resample;
-use super::sim::GelSlimConfig;
+use super::rig::lab;
+use super::turn::Turn;
 
 /// The estimate is made at this size, pixels: ridges are some pixels wide, camera noise is averaged out.
 const SIDE: usize = 128;
@@ -21,55 +22,6 @@ const MARGIN: usize = 8;
 const CONSISTENT: f64 = 0.7;
 /// By how much the right reading must be more consistent than the best wrong one.
 const CLEARER: f64 = 0.05;
-
-/// One of the eight ways to lay down a square picture: quarter turns, then perhaps mirrored left to right.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Turn {
-    /// Counter-clockwise quarter turns, 0 to 3.
-    pub quarters: u8,
-    /// Mirrored left to right after turning.
-    pub mirrored: bool,
-}
-
-impl Turn {
-    /// All eight, the upright one first.
-    pub fn all() -> impl Iterator<Item = Self> {
-        [false, true].into_iter().flat_map(|mirrored| (0..4).map(move |quarters| Self { quarters, mirrored }))
-    }
-
-    /// The image laid down this way.
-    pub fn apply<T: Clone>(self, upright: &Grid<T>) -> Grid<T> {
-        let turned = (0..self.quarters % 4).fold(upright.clone(), |image, _| quarter(&image));
-        if self.mirrored { mirrored(&turned) } else { turned }
-    }
-
-    /// The upright image that was laid down this way.
-    pub fn undo<T: Clone>(self, image: &Grid<T>) -> Grid<T> {
-        let image = if self.mirrored { mirrored(image) } else { image.clone() };
-        (0..(4 - self.quarters % 4) % 4).fold(image, |image, _| quarter(&image))
-    }
-}
-
-impl std::fmt::Display for Turn {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match (self.quarters % 4, self.mirrored) {
-            (0, false) => f.write_str("upright"),
-            (0, true) => f.write_str("mirrored"),
-            (n, false) => write!(f, "turned by {}°", 90 * u32::from(n)),
-            (n, true) => write!(f, "turned by {}° and mirrored", 90 * u32::from(n)),
-        }
-    }
-}
-
-/// Counter-clockwise by a quarter.
-fn quarter<T: Clone>(image: &Grid<T>) -> Grid<T> {
-    let [width, height] = image.size();
-    Grid::from_fn(height, width, |x, y| image[(width - 1 - y, x)].clone())
-}
-
-fn mirrored<T: Clone>(image: &Grid<T>) -> Grid<T> {
-    Grid::from_fn(image.width(), image.height(), |x, y| image[(image.width() - 1 - x, y)].clone())
-}
 
 /// How a square difference image (signed, any scale) lies, by the directions of the nominal sensor's lights.
 ///
@@ -126,9 +78,9 @@ impl Sums {
 
 /// The gel's slope along x and y (up to a factor), from the colors without their gray part, blurred.
 fn slopes(difference: &RgbGrid) -> [Grid<f64>; 2] {
-    let config = GelSlimConfig::default();
     let lights: [[f64; 2]; 3] = std::array::from_fn(|c| {
-        [config.led_angle_rad[c].cos(), config.led_angle_rad[c].sin()].map(|v| v * config.led_gain[c])
+        let angle_rad = lab::GELSLIM_LED_ANGLE_RAD[c];
+        [angle_rad.cos(), angle_rad.sin()].map(|v| v * lab::GELSLIM_LED_GAIN[c])
     });
     let mean: [f64; 2] = std::array::from_fn(|i| lights.iter().map(|l| l[i]).sum::<f64>() / 3.0);
     let lights = lights.map(|l| [l[0] - mean[0], l[1] - mean[1]]);
@@ -169,22 +121,13 @@ fn blurred(image: &Grid<f64>) -> Grid<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::catalog;
     use crate::domain::rig::lab;
     use crate::domain::sim::{self, SimConfig};
 
     #[test]
-    fn undo_is_the_inverse_of_apply() {
-        let image = Grid::from_fn(3, 5, |x, y| 10 * x + y);
-        for turn in Turn::all() {
-            assert_eq!(turn.undo(&turn.apply(&image)), image, "{turn}");
-        }
-        let turned = Turn { quarters: 1, mirrored: false }.apply(&image);
-        assert_eq!((turned.size(), turned[(0, 0)]), ([5, 3], image[(2, 0)]));
-    }
-
-    #[test]
     fn simulated_touches_tell_how_they_were_laid_down() {
-        let tools = sim::tools();
+        let tools = catalog::tools();
         let (mut right, mut wrong, mut silent) = (0, 0, 0);
         for (i, tool) in tools.iter().enumerate() {
             let touch = sim::simulate(tool, sim::random_grasp(i as u64), i as u64, &SimConfig::default());

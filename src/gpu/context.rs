@@ -5,6 +5,11 @@ use std::task::{Context, Poll, Waker};
 
 use super::{GpuError, wgpu};
 
+/// sRGB-encoded bytes behind a plain format: the window toolkit samples its images so, and blends so.
+pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+/// Depth is reversed (1 near, 0 far), which spreads the precision of a float evenly.
+pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
 /// A device with its queue, and what the renderer needs to know about them. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Gpu {
@@ -16,7 +21,7 @@ pub struct Gpu {
     /// are made for this number.
     ///
     /// [`Pipelines`]: super::pipelines::Pipelines
-    /// [`Target`]: super::target::Target
+    /// [`Target`]: Target
     pub samples: u32,
     /// The adapter is a program: four samples cost it 2.5 times the time of one, so it is spared them.
     pub software: bool,
@@ -34,10 +39,10 @@ impl Gpu {
             flags.contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_X4)
         };
         let resolves = adapter
-            .get_texture_format_features(super::target::COLOR_FORMAT)
+            .get_texture_format_features(COLOR_FORMAT)
             .flags
             .contains(wgpu::TextureFormatFeatureFlags::MULTISAMPLE_RESOLVE);
-        let can = resolves && four(super::target::COLOR_FORMAT) && four(super::target::DEPTH_FORMAT);
+        let can = resolves && four(COLOR_FORMAT) && four(DEPTH_FORMAT);
         let info = adapter.get_info();
         device.on_uncaptured_error(Arc::new(|error| log::error!("graphics device: {error}")));
         let software = info.device_type == wgpu::DeviceType::Cpu;

@@ -8,6 +8,7 @@ use glam::{DAffine3, DVec3};
 
 use super::buffer::{Elements, Uniform};
 use super::pipelines::Pipelines;
+use super::vertex::MeshVertex;
 use super::{Gpu, GpuError, view, wgpu};
 use crate::domain::mesh::TriMesh;
 
@@ -64,21 +65,6 @@ impl Default for MeshStyle {
         Self { world_from_mesh: DAffine3::IDENTITY, color: [0.75, 0.75, 0.78], opacity: 1.0, look: Look::Solid }
     }
 }
-
-/// One corner of one triangle.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-pub(super) struct MeshVertex {
-    position: [f32; 3],
-    normal: [f32; 3],
-}
-
-/// [`MeshVertex`] as the inputs of `shaders/mesh.wgsl`.
-pub(super) const VERTEX_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
-    array_stride: size_of::<MeshVertex>() as u64,
-    step_mode: wgpu::VertexStepMode::Vertex,
-    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3],
-};
 
 /// Twin of the struct in `shaders/mesh.wgsl`.
 #[repr(C)]

@@ -1,7 +1,8 @@
 //! The render pipelines, built once per device and shared by all views.
 
-use super::target::{COLOR_FORMAT, DEPTH_FORMAT};
-use super::{Gpu, GpuError, mesh, shaders, wgpu};
+use super::context::{COLOR_FORMAT, DEPTH_FORMAT};
+use super::vertex::VERTEX_LAYOUT;
+use super::{Gpu, GpuError, shaders, wgpu};
 
 /// All pipelines and the layouts of their bindings.
 #[derive(Debug)]
@@ -64,7 +65,7 @@ impl Pipelines {
                 label: "Mesh::solid",
                 module: &mesh,
                 item_layout: &plain_layout,
-                vertices: &[Some(mesh::VERTEX_LAYOUT)],
+                vertices: &[Some(VERTEX_LAYOUT)],
                 blend: true,
                 ..pulled
             };

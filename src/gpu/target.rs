@@ -2,12 +2,8 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::context::{COLOR_FORMAT, DEPTH_FORMAT};
 use super::{Gpu, GpuError, wgpu};
-
-/// sRGB-encoded bytes behind a plain format: the window toolkit samples its images so, and blends so.
-pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-/// Depth is reversed (1 near, 0 far), which spreads the precision of a float evenly.
-pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// Color (multisampled where possible), its resolved picture and depth, in physical pixels.
 #[derive(Debug)]

@@ -11,7 +11,8 @@ use strum::IntoEnumIterator;
 
 use super::args::at_least_one;
 use super::{Common, Output, VerbResult};
-use crate::domain::sim::{self, Condition, Fault, SimConfig, ToolSpec};
+use crate::domain::catalog::{self, ToolSpec};
+use crate::domain::sim::{self, Condition, Fault, SimConfig};
 use crate::io::simulated::{Layout, Writing};
 
 /// Arguments of `simulate`.
@@ -112,7 +113,7 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
             let touched = args.condition.tool(tool, g);
             let (grasp, seed) = if args.test_set {
                 // By the place in the whole list, so that a choice of tools does not change their grasps.
-                sim::test_grasp(sim::tools().iter().position(|t| t.name == tool.name).unwrap_or(t), g)
+                sim::test_grasp(catalog::tools().iter().position(|t| t.name == tool.name).unwrap_or(t), g)
             } else {
                 // One seed per pair, so that a pair does not depend on how many others were asked for.
                 let seed = args.seed.wrapping_mul(1_000_003) ^ ((t as u64) << 32) ^ g;
@@ -168,7 +169,7 @@ fn write_faults(args: &SimulateArgs) -> VerbResult {
 
 /// The tools that a list names.
 fn chosen_tools(list: &str) -> anyhow::Result<Vec<&'static ToolSpec>> {
-    let all = sim::tools();
+    let all = catalog::tools();
     Ok(match list {
         "all" => all.iter().collect(),
         "seen" => all.iter().filter(|t| t.seen).collect(),

@@ -108,9 +108,9 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use crate::domain::dataset::Problem;
+use crate::io::digest::sha256;
 use crate::io::files;
 
 pub use find::{Found, find, find_all};
@@ -342,14 +342,4 @@ impl Problems {
 fn stays_inside(name: &str) -> bool {
     let plain = Path::new(name).components().all(|c| matches!(c, std::path::Component::Normal(_)));
     plain && !name.is_empty()
-}
-
-/// SHA-256 in lower-case hex.
-pub(super) fn sha256(bytes: &[u8]) -> String {
-    hex(&Sha256::digest(bytes))
-}
-
-/// Lower-case hex.
-pub(super) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

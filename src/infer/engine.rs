@@ -100,7 +100,21 @@ pub enum EngineError {
     },
     /// The bundle failed its trial.
     #[error(transparent)]
-    Refused(#[from] super::trial::Refusal),
+    Refused(#[from] Refusal),
+}
+
+/// Why an engine does not take a bundle.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{} does not take the model bundle \"{bundle}\": {reason} ({})", engine.label(), folder.display())]
+pub struct Refusal {
+    /// Its name.
+    pub bundle: String,
+    /// Its folder.
+    pub folder: PathBuf,
+    /// The engine.
+    pub engine: EngineKind,
+    /// What happened.
+    pub reason: String,
 }
 
 /// One input of a run.
@@ -226,7 +240,7 @@ pub fn resolve(_: EngineChoice) -> Result<EngineKind, EngineError> {
 
 /// The library of ONNX Runtime in use, loaded on the first call, or all the places that were searched in vain.
 #[cfg(feature = "onnx")]
-pub(super) fn library() -> Result<Library, Vec<super::runtime::Searched>> {
+pub(super) fn library() -> Result<Library, Vec<super::library::Searched>> {
     ort_engine::library()
 }
 

@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::bundle::{hex, sha256};
 use super::engine::EngineKind;
 use crate::domain::diffusion::{GenerateConfig, Sampler, Spacing};
 use crate::domain::grid::RgbGrid;
+use crate::io::digest::{hex, sha256};
 
 /// Same recipe, same result. The shift is not part of it: it is applied to the result.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]

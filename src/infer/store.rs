@@ -13,10 +13,10 @@ use std::time::{Duration, SystemTime};
 
 use serde::{Deserialize, Serialize};
 
-use super::bundle::sha256;
 use super::recipe::Recipe;
 use crate::domain::grid::Grid;
 use crate::domain::postprocess::RawPrediction;
+use crate::io::digest::sha256;
 use crate::io::{files, folders};
 
 /// The format and its version, in every file.
@@ -76,15 +76,9 @@ struct Header {
     seconds: f64,
 }
 
-/// The folder of this user's predictions, in [`user_cache`].
+/// The folder of this user's predictions, in [`folders::program_cache`].
 pub fn user_folder() -> Option<PathBuf> {
-    user_cache().map(|folder| folder.join("predictions"))
-}
-
-/// The folder of what can be made again, by the rules of the platform; `TOUCH2TOUCH_CACHE` overrides it.
-pub(super) fn user_cache() -> Option<PathBuf> {
-    let named = std::env::var_os("TOUCH2TOUCH_CACHE").map(PathBuf::from).filter(|p| p.is_absolute());
-    named.or_else(folders::cache)
+    folders::program_cache().map(|folder| folder.join("predictions"))
 }
 
 impl Store {

@@ -22,9 +22,11 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use super::bundle::contract::promised;
-use super::bundle::{Bundle, Origin, TimestepType, sha256};
-use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, build, resolve};
+use super::bundle::{Bundle, Origin, TimestepType};
+use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, Refusal, build, resolve};
 use crate::domain::diffusion::{ModelError, Tensor};
+use crate::io::digest::sha256;
+use crate::io::folders;
 use watch::{End, Limits, Seen};
 
 /// Most time a trial may take.
@@ -39,20 +41,6 @@ pub const VERB: [&str; 2] = ["bundle", "try"];
 const AT: &str = "at ";
 const REFUSED: &str = "refused ";
 const TAKEN: &str = "taken";
-
-/// Why an engine does not take a bundle.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{} does not take the model bundle \"{bundle}\": {reason} ({})", engine.label(), folder.display())]
-pub struct Refusal {
-    /// Its name.
-    pub bundle: String,
-    /// Its folder.
-    pub folder: PathBuf,
-    /// The engine.
-    pub engine: EngineKind,
-    /// What happened.
-    pub reason: String,
-}
 
 /// The program that can be started for a trial.
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
@@ -218,7 +206,7 @@ fn key(bundle: &Bundle, engine: EngineKind) -> String {
 
 /// The file that says that a bundle passed, whether it exists or not.
 fn kept(key: &str) -> Option<PathBuf> {
-    Some(super::store::user_cache()?.join("trials").join(key))
+    Some(folders::program_cache()?.join("trials").join(key))
 }
 
 fn keep(key: &str, bundle: &Bundle, engine: EngineKind) {

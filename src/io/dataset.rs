@@ -23,13 +23,13 @@ use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::rig::{PerPad, Rig};
 use crate::domain::sample::{DepthCamera, Sample};
-use crate::domain::upright::Turn;
+use crate::domain::turn::Turn;
 
 use super::stl::MeshError;
 
 pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
-pub use grow::{Growth, OUTPUT_MARK, RIG_FILE, cameras_of, is_output};
+pub use grow::{Growth, RIG_FILE, cameras_of};
 pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_meters};
 pub use tool_scale::{ToolFile, ToolScale, UNIT_FILE, read_in_meters, read_tool};
 

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::dataset::{Dataset, Loaded};
 use crate::domain::dataset::{PairId, Problem};
 use crate::domain::findings::{Finding, Findings};
-use crate::domain::upright::Turn;
+use crate::domain::turn::Turn;
 
 /// What the doctor found.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use sha2::Digest as _;
 
+use super::digest::sha256;
 use super::files;
 use super::images::{self, PictureError};
 use super::masks::MaskStore;
@@ -311,10 +311,6 @@ pub fn export(
 
 fn io(path: &Path, what: &'static str, source: std::io::Error) -> ExportError {
     ExportError::Io { path: path.to_owned(), what, source }
-}
-
-fn sha256(bytes: &[u8]) -> String {
-    sha2::Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// The loader's 8-bit image of an imprint, in 32-bit arithmetic as the lab's script has it.

@@ -7,7 +7,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use sha2::Digest as _;
+/// What is in the name of every file that is written beside a touch; such files are never taken for touches.
+pub const OUTPUT_MARK: &str = ".t2t.";
+
+/// Whether a file name is one that this program writes beside touches.
+pub fn is_output(name: &str) -> bool {
+    name.contains(OUTPUT_MARK)
+}
 
 /// Longest label; file systems end at 255 bytes and suffixes are added.
 const LONGEST_LABEL: usize = 180;
@@ -68,7 +74,7 @@ fn push_escaped(out: &mut String, byte: u8) {
 
 fn shortened(mut out: String, pair: &str, longest: usize) -> String {
     if out.len() > longest {
-        let hash: String = sha2::Sha256::digest(pair.as_bytes()).iter().map(|b| format!("{b:02x}")).collect();
+        let hash = super::digest::sha256(pair.as_bytes());
         let end = (0..=longest - hash.len() - 2).rev().find(|&at| out.is_char_boundary(at)).unwrap_or(0);
         out.truncate(end);
         out.push_str("%%");

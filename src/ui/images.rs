@@ -13,14 +13,14 @@ use super::widget::{brush_cursor, empty};
 use crate::app::command::{Command, Hover, Pane};
 use crate::app::keys::{ImprintSource, MaskVersion, ShiftMode};
 use crate::app::results::Preview;
-use crate::app::settings::{ColorMap, ColorRange, MaskTool};
+use crate::app::settings::{ColorMap as MapChoice, ColorRange, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::rig::{PadId, Rig, Sensor, SensorKind};
 use crate::domain::sample::Scale;
+use crate::domain::turn::Turn;
 use crate::domain::units;
-use crate::domain::upright::Turn;
 use crate::work::error::TaskError;
 
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
@@ -34,8 +34,8 @@ pub(super) fn range_of(state: &State) -> Range {
 /// The color map of imprints.
 pub(super) fn map_of(state: &State) -> ColorMap {
     match state.settings.color_map {
-        ColorMap::Viridis => ColorMap::Viridis,
-        ColorMap::Gray => ColorMap::Gray,
+        MapChoice::Viridis => ColorMap::Viridis,
+        MapChoice::Gray => ColorMap::Gray,
     }
 }
 

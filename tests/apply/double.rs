@@ -14,6 +14,7 @@ use touch2touch::app::services::{DataSource, Services};
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::State;
 use touch2touch::app::tasks::Level;
+use touch2touch::domain::catalog;
 use touch2touch::domain::contact::{ContactMask, settled_model};
 use touch2touch::domain::dataset::{Index, PairEntry, PairId, Problem, Split};
 use touch2touch::domain::diffusion::GenerateConfig;
@@ -65,7 +66,7 @@ impl Source {
         let mut pairs: Vec<PairEntry> =
             ["tool_a", "tool_b"].iter().flat_map(|tool| (0..6).map(|n| entry(tool, n))).collect();
         if simulated {
-            pairs.push(entry(&sim::tools()[0].name, 0));
+            pairs.push(entry(&catalog::tools()[0].name, 0));
         }
         Self {
             index: Index { pairs },
@@ -126,7 +127,7 @@ impl DataSource for Source {
         }
         if pair == SIMULATED {
             let grasp = sim::Grasp { theta_rad: 0.2, x_m: 0.001, y_m: -0.001 };
-            return Ok(sim::simulate(&sim::tools()[0], grasp, 7, &sim::SimConfig::default()));
+            return Ok(sim::simulate(&catalog::tools()[0], grasp, 7, &sim::SimConfig::default()));
         }
         let finger = |sign: f32| {
             let [w, h] = IMPRINT_SIZE;
@@ -147,8 +148,8 @@ impl DataSource for Source {
     }
 
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
-        let tool = sim::tools().iter().find(|t| t.name == tool);
-        tool.map(sim::ToolSpec::mesh).ok_or_else(|| TaskError::new("CAD model", "there is none"))
+        let tool = catalog::tools().iter().find(|t| t.name == tool);
+        tool.map(catalog::ToolSpec::mesh).ok_or_else(|| TaskError::new("CAD model", "there is none"))
     }
 
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use crate::support;
 use touch2touch::domain::dataset::{PairId, Split};
 use touch2touch::domain::grid::Grid;
 use touch2touch::domain::rig::lab;
-use touch2touch::domain::upright::Turn;
+use touch2touch::domain::turn::Turn;
 use touch2touch::io::dataset::{Dataset, LoadError, OpenError, SourceKind};
 use touch2touch::io::images;
 use touch2touch::io::pt::{PtItem, Tensor, read_dict, write_dict};
@@ -295,10 +296,7 @@ fn pytorch_reads_a_written_pair() {
     let dir = tempfile::tempdir().unwrap();
     let [gelslim, bubble] = write_pair(dir.path(), Layout::Train, "pattern_32", 0, &touch(0.0)).unwrap();
     assert!(read_dict(&bubble).unwrap().keys().contains(&"contact_mask".to_string()));
-    let Some(python) = std::env::var_os("TOUCH2TOUCH_TORCH_PYTHON") else {
-        eprintln!("TOUCH2TOUCH_TORCH_PYTHON is not set: PyTorch itself is not asked");
-        return;
-    };
+    let Some(python) = support::torch() else { return };
     let script = "
 import sys, torch
 g, b = (torch.load(p, weights_only=True) for p in sys.argv[1:])

@@ -3,12 +3,12 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use touch2touch::domain::catalog;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Grid;
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::Sample;
-use touch2touch::domain::sim;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::doctor::{DoctorReport, examine};
 use touch2touch::io::pt::read_text_lists;
@@ -188,12 +188,13 @@ fn a_whole_dataset_of_broken_files_is_a_page() {
 
 #[test]
 fn the_reference_sets_are_healthy() {
-    let Some(shared) = support::shared() else { return };
-    let pictures = doctor(&shared.join("real-pairs"));
+    let Some(pictures) = support::shared("real-pairs") else { return };
+    let Some(lab) = support::shared("lab-sample") else { return };
+    let pictures = doctor(&pictures);
     assert_eq!((pictures.pairs, pictures.problems.len()), (36, 1), "{:#?}", pictures.problems);
     assert!(pictures.problems[0].what.contains("do not lie upright"));
     // The lab's sample has mirrored cameras in every file and nothing else.
-    let lab = doctor(&shared.join("lab-sample"));
+    let lab = doctor(&lab);
     assert_eq!((lab.pairs, lab.problems.len()), (4, 1), "{:#?}", lab.problems);
     assert!(lab.problems[0].what.contains("mirrored camera frame"));
     assert_eq!((lab.problems[0].count, lab.problems[0].examples.len()), (4, 4));
@@ -203,7 +204,7 @@ fn the_reference_sets_are_healthy() {
 fn what_the_simulator_writes_is_healthy() {
     let dir = tempfile::tempdir().unwrap();
     let demo = Dataset::demo();
-    let tools: Vec<_> = sim::tools().iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
+    let tools: Vec<_> = catalog::tools().iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
     write_tools(dir.path(), &tools).unwrap();
     for i in [0, 120, 250] {
         let pair = demo.index.get(PairId(i)).unwrap();

@@ -10,7 +10,7 @@ use crate::support;
 
 #[test]
 fn every_tensor_of_the_reference_set_is_right() {
-    let Some(root) = support::shared().map(|p| p.join("lab-sample")) else { return };
+    let Some(root) = support::shared("lab-sample") else { return };
     let dataset = Dataset::open(&root).unwrap();
     assert_eq!(dataset.kind, SourceKind::Lab);
     assert_eq!(dataset.problems, []);
@@ -49,7 +49,7 @@ fn every_tensor_of_the_reference_set_is_right() {
 
 #[test]
 fn the_deepest_pixels_of_both_fingers_lie_on_the_tool() {
-    let Some(root) = support::shared().map(|p| p.join("lab-sample")) else { return };
+    let Some(root) = support::shared("lab-sample") else { return };
     let dataset = Dataset::open(&root).unwrap();
     for (i, entry) in dataset.index.pairs.iter().enumerate() {
         let sample = dataset.load(PairId(i as u32)).unwrap();
@@ -79,7 +79,7 @@ fn the_deepest_pixels_of_both_fingers_lie_on_the_tool() {
 
 #[test]
 fn every_folder_of_the_reference_set_opens_the_same_pairs() {
-    let Some(root) = support::shared().map(|p| p.join("lab-sample")) else { return };
+    let Some(root) = support::shared("lab-sample") else { return };
     let whole = Dataset::open(&root).unwrap();
     let bubbles = "train/bubbles/data/bubble_style_transfer_dataset_bubbles_pattern_35";
     for (sub, pairs) in [("train", 2), ("test", 2), ("test/test_only", 2), ("train/bubbles", 2), (bubbles, 1)] {
@@ -99,7 +99,7 @@ fn every_folder_of_the_reference_set_opens_the_same_pairs() {
 
 #[test]
 fn the_real_pictures_open_without_a_problem() {
-    let Some(root) = support::shared().map(|p| p.join("real-pairs")) else { return };
+    let Some(root) = support::shared("real-pairs") else { return };
     let dataset = Dataset::open(&root).unwrap();
     assert_eq!((dataset.kind, dataset.index.pairs.len()), (SourceKind::Pictures, 36));
     assert_eq!(dataset.problems, []);
@@ -137,7 +137,7 @@ fn the_real_pictures_open_without_a_problem() {
 
 #[test]
 fn the_pose_cases_and_their_meshes_are_read() {
-    let Some(root) = support::shared().map(|p| p.join("pose-cases")) else { return };
+    let Some(root) = support::shared("pose-cases") else { return };
     let arrays = npz::read(&root.join("case_000.npz")).unwrap();
     assert_eq!(arrays["depth_ref"].shape, [2, 140, 175]);
     assert_eq!(arrays["mask"].shape, [2, 140, 175]);

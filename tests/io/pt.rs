@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::support;
 use touch2touch::io::pt::{PtError, PtItem, Tensor, Values, read_dict, read_text_lists, write_dict};
 
 fn data(name: &str) -> PathBuf {
@@ -138,10 +139,7 @@ fn what_is_written_reads_back_and_is_the_same_every_time() {
 /// Needs a Python with PyTorch, named by `TOUCH2TOUCH_TORCH_PYTHON`.
 #[test]
 fn pytorch_reads_what_is_written() {
-    let Some(python) = std::env::var_os("TOUCH2TOUCH_TORCH_PYTHON") else {
-        eprintln!("TOUCH2TOUCH_TORCH_PYTHON is not set: PyTorch itself is not asked");
-        return;
-    };
+    let Some(python) = support::torch() else { return };
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.pt");
     write_dict(&path, &sample_items()).unwrap();

@@ -6,6 +6,7 @@ use touch2touch::app::keys::ShiftMode;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch::domain::ambiguity::Touch;
+use touch2touch::domain::catalog;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::postprocess::FlagKind;
 use touch2touch::domain::rig::lab;
@@ -95,7 +96,7 @@ fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
 #[test]
 fn seen_and_invented_stand_beside_each_other_and_a_bare_shaft_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    let tool = sim::on_a_shaft(sim::tools()[3].clone());
+    let tool = catalog::on_a_shaft(catalog::tools()[3].clone());
     let config = sim::SimConfig::default();
     for index in 0..2 {
         let sample = sim::simulate(&tool, sim::random_grasp(index), index, &config);
@@ -118,10 +119,8 @@ fn seen_and_invented_stand_beside_each_other_and_a_bare_shaft_is_said() {
 
 /// Pictures for looking at, with the shipped model: only where a folder for them is given.
 #[test]
+#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
 fn pictures_of_the_depth_chain() {
-    if std::env::var_os("TOUCH2TOUCH_SCREENSHOTS").is_none() {
-        return;
-    }
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
         rig.send(Command::DismissHint);

@@ -6,6 +6,7 @@ use touch2touch::app::command::Command;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::state::{Absent, Lookup};
+use touch2touch::domain::catalog;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
 use touch2touch::io::simulated::{Layout, pair_paths, write_pair};
@@ -29,7 +30,7 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     assert!(rig.harness.query_by_label("Stop following").is_some(), "the status says that it follows");
 
     // A whole grasp.
-    let tool = &sim::tools()[0];
+    let tool = &catalog::tools()[0];
     let sample = |seed| sim::simulate(tool, sim::random_grasp(seed), seed, &sim::SimConfig::default());
     write_pair(&rig.data, Layout::Train, &tool.name, 40, &sample(40)).unwrap();
     rig.harness.step();

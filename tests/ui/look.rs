@@ -41,10 +41,8 @@ fn every_workspace_draws_in_both_themes() {
 ///
 /// `TOUCH2TOUCH_SCREENSHOTS` is the folder, `TOUCH2TOUCH_REAL_PAIRS` a folder of image pairs to show as well.
 #[test]
+#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
 fn pictures_for_the_docs() {
-    if std::env::var_os("TOUCH2TOUCH_SCREENSHOTS").is_none() {
-        return;
-    }
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
         rig.shoot(&format!("{name}-first-start"));
@@ -106,10 +104,8 @@ fn pictures_for_the_docs() {
 
 /// The five faults of `touch2touch simulate --faults`, as docs/workbench.md shows them.
 #[test]
+#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
 fn pictures_of_the_faults() {
-    if std::env::var_os("TOUCH2TOUCH_SCREENSHOTS").is_none() {
-        return;
-    }
     let folder = tempfile::tempdir().unwrap();
     let models: Vec<_> = Fault::iter().map(|f| (f.to_string(), f.mesh())).collect();
     let tools: Vec<_> = models.iter().map(|(name, mesh)| (name.as_str(), false, mesh.clone())).collect();

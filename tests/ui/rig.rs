@@ -11,6 +11,7 @@ use touch2touch::app::services::Services;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::State;
+use touch2touch::domain::catalog;
 use touch2touch::domain::contact::ContactMask;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::{DepthMap, Grid, RgbGrid};
@@ -170,7 +171,7 @@ impl Services for QuickGenerator {
 
 /// Writes a data set of a few simulated grasps of two tools.
 pub(super) fn write_dataset(root: &Path, grasps: u64) {
-    let tools: Vec<_> = sim::tools().iter().take(2).collect();
+    let tools: Vec<_> = catalog::tools().iter().take(2).collect();
     let config = sim::SimConfig::default();
     for tool in &tools {
         for index in 0..grasps {
@@ -196,11 +197,7 @@ impl Rig {
     ///
     /// `None` where there is no graphics adapter; a failure where the check script demands one.
     pub(super) fn new(size: [f32; 2], grasps: u64) -> Option<Self> {
-        if let Err(err) = touch2touch::gpu::Gpu::headless() {
-            assert!(!crate::support::require("REQUIRE_GPU"), "the check script demands a graphics adapter: {err}");
-            eprintln!("left out: {err}");
-            return None;
-        }
+        crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
         write_dataset(&data, grasps);
@@ -244,8 +241,9 @@ impl Rig {
         self.harness.step();
     }
 
-    /// A studio with the shipped models on a place, for pictures. Panics without a graphics adapter.
+    /// A studio with the shipped models on a place. `None` as for [`Rig::new`].
     pub(super) fn live(size: [f32; 2], place: Place) -> Option<Self> {
+        crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
         let services = Arc::new(LiveServices::with_config_folder(Some(config.clone())));

@@ -273,7 +273,8 @@ mod tests {
 
     use super::*;
     use crate::domain::align::testing::{cross, cross_contacts};
-    use crate::domain::align::{AlignConfig, DistanceField, align};
+    use crate::domain::align::{AlignConfig, align};
+    use crate::domain::field::DistanceField;
 
     const POSE: PlanarPose = PlanarPose { theta_rad: 0.15, y_m: 0.002, z_m: -0.001 };
 

@@ -8,7 +8,7 @@
 
 use glam::DVec2;
 
-use super::field::batch::{Cloud, Extent, Slopes, State};
+use super::batch::{Cloud, Extent, Slopes, State};
 use super::search::{Progress, Search};
 use super::{AlignConfig, Certificate};
 
@@ -211,7 +211,8 @@ mod tests {
 
     use super::*;
     use crate::domain::align::testing::{cross, cross_contacts, cuboid, filled};
-    use crate::domain::align::{AlignReport, DistanceField, Rung, align};
+    use crate::domain::align::{AlignReport, Rung, align};
+    use crate::domain::field::DistanceField;
     use crate::domain::frames::PlanarPose;
     use glam::DVec3;
 

@@ -5,7 +5,7 @@
 
 use glam::DVec2;
 
-use super::DistanceField;
+use crate::domain::field::DistanceField;
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::sampling::spread;
 

@@ -7,6 +7,7 @@
 //! registration of multiple range images, 1992.
 
 mod policy;
+mod prepared;
 mod problem;
 mod samples;
 mod tree;
@@ -21,6 +22,7 @@ use crate::domain::mesh::sampling::spread;
 use crate::domain::tool::ToolModel;
 
 pub use policy::{Dof, Kernel, Rejector, Residual, Solver, Target};
+pub use prepared::{in_space, instead_of_triangles, silhouette};
 use problem::{Problem, State, Sums};
 pub(super) use samples::Matcher;
 pub use samples::Samples;

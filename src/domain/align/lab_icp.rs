@@ -24,8 +24,6 @@ use crate::domain::tool::ToolModel;
 
 /// Fewest contact points the lab's loop works with.
 pub const LAB_MIN_POINTS: usize = 4;
-/// Points the lab samples from the CAD model's surface.
-pub const LAB_MODEL_POINTS: usize = 5000;
 /// Starts of the lab's multi-start variant.
 pub const LAB_STARTS: usize = 10;
 /// Distance below which a contact counts as an inlier in the report, meters; the loop itself does not use it.
@@ -121,6 +119,11 @@ pub struct LabModel {
 }
 
 impl LabModel {
+    /// The tool's, made at the first request and kept with it.
+    pub fn of(tool: &ToolModel) -> Arc<Self> {
+        tool.derived(|tool| Self::new(&tool.surface().iter().map(|(p, _)| *p).collect::<Vec<_>>()))
+    }
+
     /// From points of the surface, meters, object frame. Those that are not finite are left out.
     pub fn new(points: &[DVec3]) -> Self {
         let points: Arc<[DVec3]> = points.iter().copied().filter(|p| p.is_finite()).collect();
@@ -146,7 +149,7 @@ impl Register for LabIcpConfig {
         if finite.clone().count() >= LAB_MIN_POINTS {
             check_overlap(finite, &tool.field, &config.starts)?;
         }
-        let mut report = lab_icp(scene.points(), tool.lab_model(), &config)?;
+        let mut report = lab_icp(scene.points(), &LabModel::of(tool), &config)?;
         report.observability = Some(observability(scene.yz(), &tool.field, report.grasp_from_object));
         Ok(report)
     }

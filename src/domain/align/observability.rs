@@ -3,8 +3,9 @@
 use glam::DVec2;
 use nalgebra::Matrix3;
 
-use super::field::batch::{Cloud, State};
-use super::{ANGLE_SCALE_M, DistanceField};
+use super::ANGLE_SCALE_M;
+use super::batch::{Cloud, State};
+use crate::domain::field::DistanceField;
 use crate::domain::frames::PlanarPose;
 use crate::domain::linear::eigen_symmetric;
 use crate::domain::units::fixed;

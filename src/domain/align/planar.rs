@@ -12,14 +12,15 @@
 
 use glam::DVec2;
 
+use super::batch::{Cloud, State};
 use super::certify::certify;
-use super::field::batch::{Cloud, State};
 use super::observability::of_cloud;
 use super::search::{Progress, Search};
 use super::{
-    AlignConfig, AlignError, AlignReport, Certificate, DistanceField, Fate, MIN_POINTS, Observability, PointFit, Prior,
-    Run, Rung, RungAttempt, Verdict, clean,
+    AlignConfig, AlignError, AlignReport, Certificate, Fate, MIN_POINTS, Observability, PointFit, Prior, Run, Rung,
+    RungAttempt, Verdict, clean,
 };
+use crate::domain::field::DistanceField;
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::sampling::spread;
 

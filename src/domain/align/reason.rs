@@ -95,8 +95,9 @@ pub fn counts<'a>(grids: impl IntoIterator<Item = &'a Grid<Reason>>) -> ReasonCo
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::align::{AlignConfig, DistanceField, align, testing};
+    use crate::domain::align::{AlignConfig, align, testing};
     use crate::domain::cloud::{lift, testing::camera};
+    use crate::domain::field::DistanceField;
     use crate::domain::frames::PlanarPose;
     use crate::domain::grid::DepthMap;
     use glam::DVec2;

@@ -2,7 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{AlignConfig, AlignError, AlignReport, Cleaned, DistanceField, align, clean};
+use super::{AlignConfig, AlignError, AlignReport, Cleaned, align, clean};
+use crate::domain::field::DistanceField;
 use crate::domain::frames::PlanarPose;
 use crate::domain::tool::ToolModel;
 

@@ -2,8 +2,9 @@
 
 use glam::DVec2;
 
-use super::field::batch::{Cloud, State, Sums};
-use super::{DistanceField, Stop, TraceStep};
+use super::batch::{Cloud, State, Sums};
+use super::{Stop, TraceStep};
+use crate::domain::field::DistanceField;
 
 /// A step that moves no point by more than about this, meters, ends the search with the narrowest kernel.
 const STEP_FINE_M: f64 = 5e-6;

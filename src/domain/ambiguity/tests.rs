@@ -1,6 +1,7 @@
 use rayon::prelude::*;
 
 use super::*;
+use crate::domain::catalog;
 use crate::domain::grid::Grid;
 use crate::domain::rig::lab;
 use crate::domain::sim::{self, SimConfig};
@@ -10,10 +11,10 @@ fn survey(seeds: std::ops::Range<u64>, on_a_shaft: bool) -> Vec<(String, Ambigui
     seeds
         .into_par_iter()
         .flat_map_iter(|seed| {
-            let tools = sim::tools();
+            let tools = catalog::tools();
             let tool = tools[seed as usize % tools.len()].clone();
             let name = tool.name.clone();
-            let tool = if on_a_shaft { sim::on_a_shaft(tool) } else { tool };
+            let tool = if on_a_shaft { catalog::on_a_shaft(tool) } else { tool };
             let config = if seed % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(seed) };
             let sample = sim::simulate(&tool, sim::random_grasp(seed), seed, &config);
             let found = lab::PADS.map(|finger| {

@@ -4,22 +4,13 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use super::{GUIDANCE, GaussianNoise, Schedule, ScheduleError, Spacing, Step, Tensor, Watch};
+use super::{
+    Denoiser, GUIDANCE, GaussianNoise, ModelError, Prediction, Progress, Schedule, ScheduleError, Spacing, Step,
+    Tensor, Watch,
+};
 
 /// A clean latent, `[batch, channels, height, width]`.
 pub type Latent = Tensor;
-
-/// What a denoiser's output means, with `x = √ᾱ·x₀ + √(1-ᾱ)·ε`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Prediction {
-    /// The noise ε.
-    Epsilon,
-    /// The velocity `√ᾱ·ε - √(1-ᾱ)·x₀` (Salimans & Ho 2022).
-    V,
-    /// The clean sample x₀.
-    Sample,
-}
 
 /// How the noise is taken away.
 #[derive(
@@ -88,48 +79,6 @@ fn no_guidance() -> f64 {
     1.0
 }
 
-/// How far a generation is. Sent before each step; answer `Break` to cancel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Progress {
-    /// Steps done.
-    pub step: u32,
-    /// Steps in all.
-    pub of: u32,
-}
-
-/// A model could not do its part.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ModelError {
-    /// The engine gave up.
-    #[error("the graph `{graph}` could not be run: {reason}")]
-    Run {
-        /// The graph's role in its bundle.
-        graph: String,
-        /// The engine's words.
-        reason: String,
-    },
-    /// A tensor of another shape than agreed.
-    #[error("the graph `{graph}` gave a tensor of shape {found:?} instead of {expected:?}")]
-    Shape {
-        /// The graph's role in its bundle.
-        graph: String,
-        /// What the bundle says.
-        expected: Vec<usize>,
-        /// What came.
-        found: Vec<usize>,
-    },
-    /// NaN or infinity in an output.
-    #[error(
-        "the graph `{graph}` gave {count} values that are not numbers; its input may be far from what it was trained on"
-    )]
-    NonFinite {
-        /// The graph's role in its bundle.
-        graph: String,
-        /// How many.
-        count: usize,
-    },
-}
-
 /// Why a generation has no result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DiffusionError {
@@ -156,23 +105,6 @@ pub enum DiffusionError {
         /// Conditions given.
         conditions: usize,
     },
-}
-
-/// A trained (or closed-form) model that tells signal from noise.
-pub trait Denoiser {
-    /// Predicts, for each entry of the batch, what [`Denoiser::prediction`] names.
-    ///
-    /// `latent` is `[batch, …latent_shape]`, `condition` has the same batch; the result has the shape of `latent`.
-    ///
-    /// # Errors
-    /// [`ModelError`] if the model cannot be run.
-    fn predict(&mut self, latent: &Tensor, timestep: u32, condition: &Tensor) -> Result<Tensor, ModelError>;
-
-    /// What the output of [`Denoiser::predict`] means.
-    fn prediction(&self) -> Prediction;
-
-    /// Shape of one latent, without the batch.
-    fn latent_shape(&self) -> Vec<usize>;
 }
 
 /// Generates one latent per entry of `condition`, all from `config.seed`, so that a batch gives exactly what its

@@ -1,8 +1,17 @@
-//! [`Watch`]: what follows a sampling run from outside.
+//! [`Watch`]: what follows a sampling run from outside, step by step ([`Progress`]).
 
 use std::ops::ControlFlow;
 
-use super::{Progress, Tensor};
+use super::Tensor;
+
+/// How far a generation is. Sent before each step; answer `Break` to cancel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Steps done.
+    pub step: u32,
+    /// Steps in all.
+    pub of: u32,
+}
 
 /// Follows a sampling run. Every closure from [`Progress`] to [`ControlFlow`] is one that wants no estimates.
 pub trait Watch {

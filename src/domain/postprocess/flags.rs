@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::ledger::{Against, Stage, StageRecord};
+use super::record::{Against, Stage, StageRecord};
 use super::{DepthChain, DepthRange, Mapping, RawPrediction, Shift};
 use crate::domain::units::{text_mm, text_percent};
 

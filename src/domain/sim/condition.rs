@@ -1,22 +1,16 @@
 //! What can be wrong with a pair: the data conditions of the paper's Table I, for test sets and for training data.
 
-use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::noise::{Noise, Stream};
-use super::tools::{Bar, ToolSpec};
 use super::{Grasp, SimConfig, simulate, simulate_apart};
+use crate::domain::catalog::{ToolSpec, on_a_shaft};
 use crate::domain::grid::RgbGrid;
+use crate::domain::noise::{Noise, Stream};
 use crate::domain::rig::lab;
 use crate::domain::sample::Sample;
 
 /// Largest distance along y and z between the grasps of a misaligned pair, meters.
 pub const MISALIGNMENT_M: f64 = 0.008;
-/// How far beyond the grasp an ambiguous pair's pattern begins, meters: out of the GelSlim's 18 mm, within the bubble's
-/// 74 mm.
-const SHAFT_M: f64 = 0.018;
-/// Ends the name of a tool that was put on a bare shaft.
-const SHAFT_SUFFIX: &str = "_on_shaft";
 /// Standard deviation of the noise on the condition, 0..255 scale, RGB: half that of the lab's difference images.
 const NOISE_STD: [f32; 3] = [0.5 * 0.0687 * 255.0, 0.5 * 0.0428 * 255.0, 0.5 * 0.0576 * 255.0];
 
@@ -115,22 +109,6 @@ fn add(image: &mut RgbGrid, other: &RgbGrid) {
     }
 }
 
-/// The tool pushed towards the tip, on a bare shaft that reaches far back to the wrist; its name says so.
-pub fn on_a_shaft(mut tool: ToolSpec) -> ToolSpec {
-    let half_width_m = tool.bars.iter().map(|bar| bar.half_width_m).fold(0.0, f64::max);
-    for p in tool.bars.iter_mut().flat_map(|bar| &mut bar.core) {
-        p.y = if p.y < 0.0 { 0.2 * p.y } else { p.y } + SHAFT_M;
-    }
-    tool.bars.push(Bar { core: vec![DVec2::new(0.0, -0.07), DVec2::new(0.0, SHAFT_M)], half_width_m });
-    tool.name += SHAFT_SUFFIX;
-    tool
-}
-
-/// The name of the tool whose pattern `tool` carries: the same, or without the shaft it was put on.
-pub fn pattern_of(tool: &str) -> &str {
-    tool.strip_suffix(SHAFT_SUFFIX).unwrap_or(tool)
-}
-
 /// Grasps per tool of the paper's test set.
 pub const TEST_GRASPS: u64 = 46;
 /// Seeds of the test sets: apart from the demo's, and from those that a training shard draws (64 random bits).
@@ -145,8 +123,8 @@ pub fn test_grasp(tool: usize, index: u64) -> (Grasp, u64) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tools;
     use super::*;
+    use crate::domain::catalog::{pattern_of, tools};
     use strum::IntoEnumIterator as _;
 
     fn imprint(sample: &Sample) -> &crate::domain::grid::DepthMap {

@@ -2,7 +2,8 @@
 
 use glam::DVec2;
 
-use super::noise::{Noise, Stream};
+use crate::domain::noise::{Noise, Stream};
+use crate::domain::rig::lab;
 
 /// One pair of sensors.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -137,9 +138,8 @@ impl Default for GelSlimConfig {
             lean_rad: 0.0,
             decay_m: 0.000_8,
             smoothing_m: 0.000_08,
-            // green lights the wrist side; red and blue 120 degrees away
-            led_angle_rad: [-1.12, std::f64::consts::PI, 1.05],
-            led_gain: [82.0, 39.0, 48.0],
+            led_angle_rad: lab::GELSLIM_LED_ANGLE_RAD,
+            led_gain: lab::GELSLIM_LED_GAIN,
             led_falloff: 0.16,
             base: [78.0, 102.0, 147.0],
             saturation: 150.0,

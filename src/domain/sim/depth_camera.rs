@@ -3,9 +3,9 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::membrane::{Dome, Membrane};
-use super::noise::{Noise, Stream, blur3};
 use super::{BubbleConfig, rig};
 use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::noise::{Noise, Stream, blur3};
 use crate::domain::rig::{PadId, lab};
 use crate::domain::sensor::Intrinsics;
 

@@ -2,7 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Bar, Grasp, SimConfig, ToolSpec, simulate, tools};
+use super::{Grasp, SimConfig, simulate};
+use crate::domain::catalog::{Bar, ToolSpec, tools};
 use crate::domain::mesh::TriMesh;
 use crate::domain::rig::lab;
 use crate::domain::sample::Sample;

@@ -7,12 +7,12 @@
 
 use glam::DVec2;
 
-use super::noise::{Noise, Stream};
 use super::relax::{Field, Problem};
-use super::tools::ToolSpec;
 use super::{GelSlimConfig, rig};
+use crate::domain::catalog::ToolSpec;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::RgbGrid;
+use crate::domain::noise::{Noise, Stream};
 use crate::domain::rig::{PadId, lab};
 use crate::domain::sample::{ColorImages, ColorTouch};
 

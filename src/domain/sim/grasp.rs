@@ -1,7 +1,7 @@
 //! Where the tool is held: the lab's grid of grasps, and random ones.
 
-use super::noise::{Noise, Stream};
 use crate::domain::frames::PlanarPose;
+use crate::domain::noise::{Noise, Stream};
 
 /// Half the range of the grasp angle, radians.
 pub const THETA_RANGE_RAD: f64 = 22.5 * std::f64::consts::PI / 180.0;

@@ -10,8 +10,8 @@
 use glam::DVec2;
 
 use super::relax::{Field, Problem};
-use super::tools::ToolSpec;
 use super::{BubbleConfig, MEMBRANE_STEP_M};
+use crate::domain::catalog::ToolSpec;
 use crate::domain::frames::PlanarPose;
 
 /// A pressed membrane.
@@ -210,7 +210,8 @@ const SWEEPS: usize = 24;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::sim::{Grasp, SimConfig, random_grasp, tools};
+    use crate::domain::catalog::tools;
+    use crate::domain::sim::{Grasp, SimConfig, random_grasp};
 
     #[test]
     fn few_sweeps_are_enough() {

@@ -1,7 +1,7 @@
 //! Contact masks as a learned model gets them wrong: a wavering outline, blobs, halos, missing ends.
 
-use super::noise::{Noise, Stream};
 use crate::domain::grid::{Grid, Mask};
+use crate::domain::noise::{Noise, Stream};
 use crate::domain::rig::PadId;
 
 /// How badly a mask is spoilt. Lengths in pixels; ranges are drawn from uniformly.

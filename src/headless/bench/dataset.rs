@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Machine, contact_points};
+use crate::domain::catalog;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::AngleSummary;
@@ -95,7 +96,7 @@ struct Report {
 
 pub(super) fn run(args: &DatasetArgs) -> VerbResult {
     let machine = Machine::now();
-    let specs = sim::tools();
+    let specs = catalog::tools();
     let begin = Instant::now();
     let tools: Vec<ToolModel> = specs.par_iter().map(|t| ToolModel::new(t.mesh())).collect::<Result<_, _>>()?;
     let tools_seconds = begin.elapsed().as_secs_f64();
@@ -170,10 +171,10 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
 
 /// Simulated grasp number `i`, of the tools in turn.
 fn grasp(i: usize, seed: u64) -> anyhow::Result<Grasp> {
-    let tool = i % sim::tools().len();
+    let tool = i % catalog::tools().len();
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(i as u64));
     let held = sim::random_grasp(rng.random());
-    let sample = sim::simulate(&sim::tools()[tool], held, rng.random(), &SimConfig::default());
+    let sample = sim::simulate(&catalog::tools()[tool], held, rng.random(), &SimConfig::default());
     let mask_seed = rng.random();
     let mut parts = Vec::new();
     for finger in lab::PADS {

@@ -14,8 +14,9 @@ use super::canvas;
 use super::figures::{Outcome, Summary, quantile};
 use super::front::{self, Axis, FrontPoint, Picture};
 use super::{Machine, contact_points, peers};
-use crate::domain::align::{AlignError, AlignReport, DistanceField};
+use crate::domain::align::{AlignError, AlignReport, icp};
 use crate::domain::cloud::CloudError;
+use crate::domain::field::DistanceField;
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
 use crate::domain::pose::{Engine, ToolModel, register};
@@ -272,7 +273,7 @@ fn measure(
             build_ms: fastest(&|| ToolModel::new(mesh.clone()).is_ok()),
         });
         // Built when first asked for; asked for here, so that the first case of a tool is not charged for it.
-        std::hint::black_box((model.samples(), model.silhouette()));
+        std::hint::black_box((icp::in_space(&model), icp::silhouette(&model)));
         models.insert(number, model);
     }
     let prepared = prepare(set, args.masks)?;

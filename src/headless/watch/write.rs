@@ -10,7 +10,7 @@ use super::Source;
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::rig::{Rig, Text};
-use crate::io::dataset::OUTPUT_MARK;
+use crate::io::names::OUTPUT_MARK;
 use crate::io::pt::{PtItem, Tensor};
 use crate::io::{atomic, files, images, names, npz, pt};
 use crate::work::mask::Contact;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Bundle, MANIFEST, Origin};
 use crate::domain::dataset::Problem;
-use crate::infer::runtime::data_dir;
+use crate::io::folders;
 
 /// The folder with more bundles, if the user has one.
 const MODELS_VARIABLE: &str = "TOUCH2TOUCH_MODELS";
@@ -26,7 +26,7 @@ pub struct Found {
 pub fn find_all(more: &[PathBuf]) -> Found {
     let beside = std::env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join("assets/models")));
     let named = std::env::var_os(MODELS_VARIABLE).map(PathBuf::from);
-    let folders = [named, beside, data_dir().map(|dir| dir.join("models"))];
+    let folders = [named, beside, folders::program_data().map(|dir| dir.join("models"))];
     let mut found = find(&folders.into_iter().flatten().collect::<Vec<_>>());
     for origin in Origin::built_in() {
         found.open(&origin);

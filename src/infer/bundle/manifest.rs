@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::sensor::SensorSpec;
+use super::sensor::{SensorPair, SensorSpec};
 use super::{Problems, Role};
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
 use crate::domain::postprocess::{
@@ -90,6 +90,11 @@ pub enum Unconditional {
 }
 
 impl GeneratorSpec {
+    /// The sensors that it is for.
+    pub fn sensors(&self) -> SensorPair {
+        SensorPair { input: self.input.sensor.clone(), output: self.output.sensor.clone() }
+    }
+
     /// The steps from the decoder's picture to depth, for the user's choice of shift.
     ///
     /// # Errors

@@ -9,7 +9,8 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::{MANIFEST, sha256};
+use super::MANIFEST;
+use crate::io::digest::sha256;
 
 use crate::io::files;
 

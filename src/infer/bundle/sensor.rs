@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Bundle, GeneratorSpec};
+use super::Bundle;
 use crate::domain::rig::{Rig, Sensor, SensorId, SensorKind};
 
 /// A sensor as a manifest declares it.
@@ -98,13 +98,6 @@ impl SensorPair {
                 rig: rig.sensors.iter().map(SensorSpec::of).collect(),
             }),
         }
-    }
-}
-
-impl GeneratorSpec {
-    /// The sensors that it is for.
-    pub fn sensors(&self) -> SensorPair {
-        SensorPair { input: self.input.sensor.clone(), output: self.output.sensor.clone() }
     }
 }
 

@@ -8,7 +8,7 @@ use ort::value::TensorRef;
 
 use super::{Input, Library, Session, threads};
 use crate::domain::diffusion::Tensor;
-use crate::infer::runtime::{Searched, candidates};
+use crate::infer::library::{Searched, candidates};
 
 /// The library stays loaded once it is: ONNX Runtime cannot be unloaded safely.
 enum State {

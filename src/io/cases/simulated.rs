@@ -11,9 +11,10 @@ use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::{Case, Stratum};
+use crate::domain::catalog::{self, Bar, ToolSpec};
 use crate::domain::mesh::TriMesh;
 use crate::domain::rig::{PadId, lab};
-use crate::domain::sim::{self, Bar, Spoil, ToolSpec, spoil_mask};
+use crate::domain::sim::{self, Spoil, spoil_mask};
 
 /// Deviation of the camera's true angle and place from the nominal ones, per axis.
 const CALIBRATION_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
@@ -24,8 +25,8 @@ const DROPPED: f64 = 0.01;
 /// The tools that [`simulated`] uses; the position is [`Case::tool`]. The last two are straight.
 pub fn simulated_tools() -> Vec<ToolSpec> {
     let is_rod = |t: &&ToolSpec| t.name.ends_with("_rod");
-    let rod = sim::tools().iter().find(is_rod).cloned();
-    let mut tools: Vec<ToolSpec> = sim::tools().iter().filter(|t| !is_rod(t)).cloned().collect();
+    let rod = catalog::tools().iter().find(is_rod).cloned();
+    let mut tools: Vec<ToolSpec> = catalog::tools().iter().filter(|t| !is_rod(t)).cloned().collect();
     let peg = rod.clone().map(|rod| ToolSpec {
         name: "peg".into(),
         bars: vec![Bar { core: vec![DVec2::ZERO, DVec2::new(0.0, 0.05)], half_width_m: 0.003 }],

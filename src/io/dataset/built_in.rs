@@ -1,10 +1,11 @@
 //! The built-in data sets: the simulator behind the face of a dataset. A sample is rendered when it is asked for, so
 //! nothing large ships; the same name is the same sample on every machine.
 
+use crate::domain::catalog::{self, ToolSpec};
 use crate::domain::dataset::{PairEntry, PairId, Split};
 use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
-use crate::domain::sim::{self, Condition, SimConfig, ToolSpec};
+use crate::domain::sim::{self, Condition, SimConfig};
 
 /// Grasps of each tool in the demo.
 const DEMO_GRASPS: u64 = 24;
@@ -57,7 +58,7 @@ impl BuiltIn {
 
     /// The tool of grasp `number` of tool `at` of the simulator's list.
     fn tool(self, at: usize, number: u64) -> Option<ToolSpec> {
-        let tool = sim::tools().get(at)?;
+        let tool = catalog::tools().get(at)?;
         Some(match self {
             Self::Demo => tool.clone(),
             Self::TestSet(condition) => condition.tool(tool, number),
@@ -71,7 +72,7 @@ impl BuiltIn {
             let split = if self == Self::Demo && tool.seen { Split::Train } else { Split::Test };
             Some(PairEntry { name: format!("{}/data_{number}", tool.name), tool: Some(tool.name), split, number })
         };
-        (0..sim::tools().len()).flat_map(|at| (0..self.grasps()).filter_map(move |n| one(at, n))).collect()
+        (0..catalog::tools().len()).flat_map(|at| (0..self.grasps()).filter_map(move |n| one(at, n))).collect()
     }
 
     /// Renders a pair; `None` beyond the last.
@@ -94,8 +95,8 @@ impl BuiltIn {
 
     /// The CAD model of a tool.
     pub(super) fn mesh(self, tool: &str) -> Option<TriMesh> {
-        let pattern = sim::tools().iter().find(|t| t.name == sim::pattern_of(tool))?;
-        let spec = if pattern.name == tool { pattern.clone() } else { sim::on_a_shaft(pattern.clone()) };
+        let pattern = catalog::tools().iter().find(|t| t.name == catalog::pattern_of(tool))?;
+        let spec = if pattern.name == tool { pattern.clone() } else { catalog::on_a_shaft(pattern.clone()) };
         Some(spec.mesh())
     }
 }
@@ -113,7 +114,7 @@ mod tests {
         for set in sets {
             assert_eq!(BuiltIn::named(&set.name()), Some(set));
             let pairs = set.pairs();
-            assert_eq!(pairs.len() as u64, set.grasps() * sim::tools().len() as u64);
+            assert_eq!(pairs.len() as u64, set.grasps() * catalog::tools().len() as u64);
             let mut tools: Vec<&str> = pairs.iter().filter_map(|p| p.tool.as_deref()).collect();
             tools.dedup();
             assert!(tools.len() >= 12);

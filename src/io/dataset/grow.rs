@@ -12,15 +12,8 @@ use crate::domain::rig::PerPad;
 use crate::domain::sample::{DepthCamera, Sample};
 use crate::io::caught::caught;
 
-/// What is in the name of every file that is written beside a touch; such files are never taken for touches.
-pub const OUTPUT_MARK: &str = ".t2t.";
 /// A bubble file of the rig, in the root of a dataset: its cameras serve touches that have no bubble file.
 pub const RIG_FILE: &str = "rig.pt";
-
-/// Whether a file name is one that this program writes beside touches.
-pub fn is_output(name: &str) -> bool {
-    name.contains(OUTPUT_MARK)
-}
 
 /// A dataset after its folder was read again.
 #[derive(Debug)]

@@ -19,9 +19,10 @@ use crate::domain::dataset::{PairEntry, PairId, Problem, Split};
 use crate::domain::rig::{PerPad, Rig};
 use crate::domain::sample::DepthCamera;
 use crate::io::caught::caught;
+use crate::io::names::is_output;
 use crate::io::pt::read_dict;
 
-use super::{LoadError, Loaded, Scan, Source, SourceKind, is_output, last_integer, problem, same_name};
+use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};
 
 const BUBBLES: &str = "bubbles";
 const GELSLIMS: [&str; 2] = ["gelslims", "gelslims_no_distortion"];

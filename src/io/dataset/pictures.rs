@@ -24,7 +24,8 @@ use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::resample;
 use crate::domain::rig::{Rig, Sensor, SensorId, SensorKind, lab};
 use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample, Scale};
-use crate::domain::upright::{self, Turn};
+use crate::domain::turn::Turn;
+use crate::domain::upright;
 use crate::io::images;
 
 use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};

@@ -11,7 +11,7 @@ use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::{PadId, PerPad, SensorId, SensorKind};
 use crate::domain::sample::Scale;
-use crate::domain::upright::Turn;
+use crate::domain::turn::Turn;
 use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::engine::{EngineChoice, resolve};

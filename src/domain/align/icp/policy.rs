@@ -11,7 +11,7 @@ pub enum Target {
     /// Model points in space, with the normals of the surface.
     Surface,
     /// The triangles themselves; where searching them takes too long, points that stand for them
-    /// ([`crate::domain::tool::ToolModel::instead_of_triangles`]).
+    /// ([`super::instead_of_triangles`]).
     Mesh,
 }
 

@@ -9,6 +9,7 @@ use super::IcpConfig;
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
 
 use super::policy::{Dof, Kernel, Rejector, Residual, Solver, Target};
+use super::prepared;
 use super::samples::{Matcher, Samples};
 use crate::domain::align::closed_form::closest_rotation;
 use crate::domain::align::{ANGLE_SCALE_M, Fate};
@@ -105,7 +106,7 @@ pub(super) struct Sums {
 }
 
 enum Model<'a> {
-    Samples(&'a Samples),
+    Samples(Samples),
     Mesh(&'a MeshDistance),
 }
 
@@ -134,9 +135,9 @@ impl<'a> Problem<'a> {
         centroid: DVec3,
     ) -> Self {
         let model = match config.target {
-            Target::Silhouette => Model::Samples(tool.silhouette()),
-            Target::Surface => Model::Samples(tool.samples()),
-            Target::Mesh => tool.instead_of_triangles().map_or(Model::Mesh(&tool.distance), Model::Samples),
+            Target::Silhouette => Model::Samples(prepared::silhouette(tool)),
+            Target::Surface => Model::Samples(prepared::in_space(tool)),
+            Target::Mesh => prepared::instead_of_triangles(tool).map_or(Model::Mesh(&tool.distance), Model::Samples),
         };
         let arms: Vec<DVec3> = points.iter().map(|p| *p - centroid).collect();
         let normals = if config.residual == Residual::Generalized { normals(points, cloud) } else { Vec::new() };
@@ -158,7 +159,7 @@ impl<'a> Problem<'a> {
 
     /// Model points to compare with; any mesh has enough.
     pub(super) fn model_points(&self) -> usize {
-        match self.model {
+        match &self.model {
             Model::Samples(samples) => samples.len(),
             Model::Mesh(_) => usize::MAX,
         }
@@ -172,7 +173,7 @@ impl<'a> Problem<'a> {
         for (i, arm) in self.arms.iter().enumerate() {
             let arm = turn * *arm;
             let q = arm + state.place;
-            let (model, normal) = match self.model {
+            let (model, normal) = match &self.model {
                 Model::Samples(samples) => {
                     let (item, changed) = self.matcher.find(samples, i, q);
                     sums.changed |= changed;

@@ -260,10 +260,10 @@ fn in_strips(mesh: &TriMesh, strips: usize) -> TriMesh {
 #[test]
 fn thin_strips_are_matched_by_points_that_stand_for_them() {
     let plain = ToolModel::new(cross()).unwrap();
-    assert!(plain.instead_of_triangles().is_none());
+    assert!(instead_of_triangles(&plain).is_none());
     let strips = ToolModel::new(in_strips(&cross(), 2500)).unwrap();
     assert_eq!(strips.mesh.triangles.len(), 60_000);
-    assert!(strips.instead_of_triangles().is_some());
+    assert!(instead_of_triangles(&strips).is_some());
     let truth = PlanarPose { theta_rad: 0.21, y_m: 0.002, z_m: -0.003 };
     let points = on_both_sides(&cross_contacts(800, truth, 2e-4, 1));
     let pose = |tool| run(&RefineConfig::default(), &points, tool, Ask::default()).unwrap();
@@ -290,5 +290,5 @@ fn a_fine_mesh_is_matched_triangle_by_triangle() {
     }
     let tool = ToolModel::new(fine).unwrap();
     assert_eq!(tool.mesh.triangles.len(), 24 * 4usize.pow(5));
-    assert!(tool.instead_of_triangles().is_none());
+    assert!(instead_of_triangles(&tool).is_none());
 }

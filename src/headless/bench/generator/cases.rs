@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use crate::domain::catalog;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::{self, AngleSummary};
@@ -37,7 +38,7 @@ pub(super) struct Score {
 /// # Errors
 /// If no tool is wanted, or a CAD model cannot be used.
 pub(super) fn simulate(count: usize, seed: u64, wanted: impl Fn(bool) -> bool) -> anyhow::Result<Vec<Case>> {
-    let specs: Vec<_> = sim::tools().iter().filter(|tool| wanted(tool.seen)).collect();
+    let specs: Vec<_> = catalog::tools().iter().filter(|tool| wanted(tool.seen)).collect();
     anyhow::ensure!(!specs.is_empty(), "there are no such tools");
     let models = specs
         .iter()

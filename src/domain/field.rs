@@ -4,11 +4,9 @@
 //! the stored distances are exact: to the nearest projected edge. Inside they are exact to about a tenth of a
 //! millimeter, which is enough because registration charges nothing there.
 
-pub(super) mod batch;
-
 use glam::DVec2;
 
-use crate::domain::mesh::TriMesh;
+use super::mesh::TriMesh;
 
 /// Cell size, meters.
 pub const CELL_M: f64 = 0.25e-3;
@@ -29,7 +27,7 @@ pub enum FieldError {
     /// The bounding box cannot be a tool in meters.
     #[error(
         "the mesh is {} long, which cannot be meters{}",
-        crate::domain::units::significant(*.size),
+        super::units::significant(*.size),
         .scale.map_or(String::new(), |s| format!(": scale it by {s}"))
     )]
     Units {
@@ -54,12 +52,12 @@ pub struct FieldSample {
 /// Signed distance to the silhouette in the y-z plane of the object frame, on a regular grid, meters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DistanceField {
-    columns: usize,
-    rows: usize,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
     /// Center of cell (0, 0).
-    origin: DVec2,
+    pub(super) origin: DVec2,
     /// Row by row: y runs along a row, z over the rows.
-    values: Vec<f32>,
+    pub(super) values: Vec<f32>,
 }
 
 impl DistanceField {
@@ -88,7 +86,7 @@ impl DistanceField {
         }
         let [low, high] = bounds.ok_or(FieldError::Empty)?;
         let size = (high - low).max_element();
-        let scale = crate::domain::units::scale_to_meters(size);
+        let scale = super::units::scale_to_meters(size);
         if scale != Some(1.0) {
             return Err(FieldError::Units { size, scale });
         }

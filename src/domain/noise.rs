@@ -3,7 +3,7 @@
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
-use crate::domain::grid::Grid;
+use super::grid::Grid;
 
 /// What a stream of random numbers is for. Streams of one seed are independent of each other, so that adding a
 /// draw to one effect does not change the others.

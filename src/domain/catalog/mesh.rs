@@ -7,8 +7,11 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::tools::ToolSpec;
+use super::shape::ToolSpec;
 use crate::domain::mesh::TriMesh;
+
+/// Edge length of the grid that a tool's mesh is cut from, meters.
+const MESH_STEP_M: f64 = 0.0005;
 
 /// A triangulation of a part of the plane, with the outline distance at each vertex.
 struct Sheet {
@@ -17,13 +20,15 @@ struct Sheet {
     triangles: Vec<[u32; 3]>,
 }
 
-/// The surface of `tool`, from a grid of spacing `step` (meters).
-pub(super) fn mesh(tool: &ToolSpec, step: f64) -> TriMesh {
-    let mut sheet = grid(tool, step);
-    sheet.split(tool, -tool.bevel_width_m, step);
-    sheet.split(tool, 0.0, step);
-    sheet.keep_inside(tool);
-    sheet.extrude(tool)
+impl ToolSpec {
+    /// The surface as a watertight mesh, meters, object frame.
+    pub fn mesh(&self) -> TriMesh {
+        let mut sheet = grid(self, MESH_STEP_M);
+        sheet.split(self, -self.bevel_width_m, MESH_STEP_M);
+        sheet.split(self, 0.0, MESH_STEP_M);
+        sheet.keep_inside(self);
+        sheet.extrude(self)
+    }
 }
 
 /// The grid over the bounding box, split along alternating diagonals.

@@ -6,8 +6,8 @@
 
 use glam::DVec2;
 
-use super::{CELL_M, DistanceField};
-use crate::domain::align::ANGLE_SCALE_M;
+use super::ANGLE_SCALE_M;
+use crate::domain::field::{CELL_M, DistanceField};
 use crate::domain::frames::PlanarPose;
 
 /// Points per step: as many as keep the reads of a step in flight together.
@@ -20,7 +20,7 @@ const FLAT: f32 = 0.1;
 
 /// Points about their centroid, in cells, as separate coordinates; padded to whole steps.
 #[derive(Clone, Debug, Default)]
-pub(in crate::domain::align) struct Cloud {
+pub(super) struct Cloud {
     y: Vec<f32>,
     z: Vec<f32>,
     len: usize,
@@ -30,7 +30,7 @@ pub(in crate::domain::align) struct Cloud {
 
 impl Cloud {
     /// From points about their centroid, meters.
-    pub(in crate::domain::align) fn new(about_centroid: impl ExactSizeIterator<Item = DVec2>) -> Self {
+    pub(super) fn new(about_centroid: impl ExactSizeIterator<Item = DVec2>) -> Self {
         let len = about_centroid.len();
         let padded = len.next_multiple_of(LANES);
         let (mut y, mut z) = (Vec::with_capacity(padded), Vec::with_capacity(padded));
@@ -44,7 +44,7 @@ impl Cloud {
     }
 
     /// The same points, those far from the centroid first: they move most, so they decide soonest.
-    pub(in crate::domain::align) fn outermost_first(&self) -> Self {
+    pub(super) fn outermost_first(&self) -> Self {
         let mut order: Vec<usize> = (0..self.len).collect();
         let squared = |i: usize| self.y[i] * self.y[i] + self.z[i] * self.z[i];
         order.sort_by(|&a, &b| squared(b).total_cmp(&squared(a)));
@@ -54,17 +54,17 @@ impl Cloud {
     }
 
     /// Points that it stands for.
-    pub(in crate::domain::align) fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.len + self.resting
     }
 
     /// Points that are looked up.
-    pub(in crate::domain::align) fn asked(&self) -> usize {
+    pub(super) fn asked(&self) -> usize {
         self.len
     }
 
     /// Greatest distance of a point from the centroid, meters.
-    pub(in crate::domain::align) fn radius(&self) -> f64 {
+    pub(super) fn radius(&self) -> f64 {
         let squared = self.y.iter().zip(&self.z).map(|(y, z)| y * y + z * z).fold(0f32, f32::max);
         f64::from(squared.sqrt()) * CELL_M
     }
@@ -76,50 +76,50 @@ impl Cloud {
 
 /// `object_from_grasp` about the centroid of a cloud: `q = R(phi) (p - centroid) + place`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::domain::align) struct State {
-    pub(in crate::domain::align) phi: f64,
+pub(super) struct State {
+    pub(super) phi: f64,
     /// Where the centroid lies in the object frame, meters.
-    pub(in crate::domain::align) place: DVec2,
+    pub(super) place: DVec2,
 }
 
 impl State {
-    pub(in crate::domain::align) fn from_pose(grasp_from_object: PlanarPose, centroid: DVec2) -> Self {
+    pub(super) fn from_pose(grasp_from_object: PlanarPose, centroid: DVec2) -> Self {
         let inverse = grasp_from_object.inverse();
         Self { phi: inverse.theta_rad, place: inverse.transform_yz(centroid) }
     }
 
-    pub(in crate::domain::align) fn to_pose(self, centroid: DVec2) -> PlanarPose {
+    pub(super) fn to_pose(self, centroid: DVec2) -> PlanarPose {
         let shift = self.place - DVec2::from_angle(self.phi).rotate(centroid);
         PlanarPose { theta_rad: self.phi, y_m: shift.x, z_m: shift.y }.inverse()
     }
 
     /// The state after a step of (angle times [`ANGLE_SCALE_M`], y, z).
-    pub(in crate::domain::align) fn moved(self, step: [f64; 3]) -> Self {
+    pub(super) fn moved(self, step: [f64; 3]) -> Self {
         Self { phi: self.phi + step[0] / ANGLE_SCALE_M, place: self.place + DVec2::new(step[1], step[2]) }
     }
 
     /// Whether descents from both will end in the same place.
-    pub(in crate::domain::align) fn is_near(&self, other: &Self) -> bool {
+    pub(super) fn is_near(&self, other: &Self) -> bool {
         (self.phi - other.phi).abs() * ANGLE_SCALE_M < 3e-4 && self.place.distance(other.place) < 3e-4
     }
 }
 
 /// Sums over the points at one state.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::domain::align) struct Sums {
+pub(super) struct Sums {
     /// Upper triangle of the weighted Gauss-Newton matrix for (angle times [`ANGLE_SCALE_M`], y, z):
     /// 00 01 02 11 12 22.
-    pub(in crate::domain::align) h: [f64; 6],
+    pub(super) h: [f64; 6],
     /// Weighted slope of half the squared residuals, meters.
-    pub(in crate::domain::align) g: [f64; 3],
+    pub(super) g: [f64; 3],
     /// Geman-McClure cost, square meters.
-    pub(in crate::domain::align) cost: f64,
+    pub(super) cost: f64,
     /// Sum of the weights.
-    pub(in crate::domain::align) weight: f64,
+    pub(super) weight: f64,
     /// Points within the kernel's width of the silhouette, or on it.
-    pub(in crate::domain::align) inliers: usize,
+    pub(super) inliers: usize,
     /// Squared residuals of those, square meters.
-    pub(in crate::domain::align) inlier_squares: f64,
+    pub(super) inlier_squares: f64,
 }
 
 /// A state in the field's cell units.
@@ -139,13 +139,13 @@ impl Motion {
 }
 
 /// Moments of the slopes about the cloud's centroid, object frame.
-pub(in crate::domain::align) struct Moments {
+pub(super) struct Moments {
     /// Points that tell.
-    pub(in crate::domain::align) count: usize,
+    pub(super) count: usize,
     /// Sum of their arms about the centroid, meters.
-    pub(in crate::domain::align) arms: DVec2,
+    pub(super) arms: DVec2,
     /// Sums of the products of (slope by the angle, meters; slope by y; slope by z): 00 01 02 11 12 22.
-    pub(in crate::domain::align) products: [f64; 6],
+    pub(super) products: [f64; 6],
 }
 
 /// What was read for the points of a step: arms about the centroid (cells), distance (meters), slope (meters per cell).
@@ -162,31 +162,31 @@ struct Read {
 
 /// The size of a box of states.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::domain::align) struct Extent {
+pub(super) struct Extent {
     /// Half widths: angle (radians), y, z (meters).
-    pub(in crate::domain::align) half: [f64; 3],
+    pub(super) half: [f64; 3],
     /// Farthest way of a point in it: meters, and meters for each meter from the centroid.
-    pub(in crate::domain::align) shift: f64,
-    pub(in crate::domain::align) turn: f64,
+    pub(super) shift: f64,
+    pub(super) turn: f64,
 }
 
 impl Extent {
-    pub(in crate::domain::align) fn new(half: [f64; 3]) -> Self {
+    pub(super) fn new(half: [f64; 3]) -> Self {
         Self { half, shift: half[1].hypot(half[2]), turn: 2.0 * (0.5 * half[0]).sin() }
     }
 
     /// The farthest way of a point at most `radius` from the centroid, meters.
-    pub(in crate::domain::align) fn way(&self, radius: f64) -> f64 {
+    pub(super) fn way(&self, radius: f64) -> f64 {
         self.shift + self.turn * radius
     }
 }
 
 /// For each cell, between which values the slope of the field lies in a window around it: middle and half range by y
 /// and z, meters per cell.
-pub(in crate::domain::align) struct Slopes {
+pub(super) struct Slopes {
     cells: Vec<[f32; 4]>,
     /// How far the window reaches from anywhere in the cell, meters.
-    pub(in crate::domain::align) reach: f64,
+    pub(super) reach: f64,
 }
 
 /// Where the lanes lie on the grid.
@@ -201,7 +201,7 @@ struct Located {
 
 impl DistanceField {
     /// Cost, slope and curvature in one pass. `state` maps the cloud's centroid frame to the object frame.
-    pub(in crate::domain::align) fn sums(&self, cloud: &Cloud, state: State, kernel: f64) -> Sums {
+    pub(super) fn sums(&self, cloud: &Cloud, state: State, kernel: f64) -> Sums {
         let motion = Motion::new(self, state);
         let kernel_m = kernel as f32;
         let square = kernel_m * kernel_m;
@@ -269,7 +269,7 @@ impl DistanceField {
 
     /// The part of the cloud that may come to lie outside the silhouette while no point moves farther than `margin`
     /// (meters) from where `state` puts it. The other points rest.
-    pub(in crate::domain::align) fn restless(&self, cloud: &Cloud, state: State, margin: f64) -> Cloud {
+    pub(super) fn restless(&self, cloud: &Cloud, state: State, margin: f64) -> Cloud {
         let motion = Motion::new(self, state);
         let margin = -margin as f32;
         let mut kept = Cloud {
@@ -298,7 +298,7 @@ impl DistanceField {
     }
 
     /// Moments of the slopes of all points up to `reach` (meters) outside the silhouette.
-    pub(in crate::domain::align) fn moments(&self, cloud: &Cloud, state: State, reach: f64) -> Moments {
+    pub(super) fn moments(&self, cloud: &Cloud, state: State, reach: f64) -> Moments {
         let motion = Motion::new(self, state);
         let reach = reach as f32;
         let mut sums = [[0f32; LANES]; 9];
@@ -349,7 +349,7 @@ impl DistanceField {
     /// With `slopes`, of a window at least as wide as every way: where the field is nearly straight within the way of a
     /// point, the kernel of its distance lies above its tangent less what bends, and tangents of different points
     /// cancel. Near the best pose that is a far better bound, because there the sum has no slope.
-    pub(in crate::domain::align) fn bound(
+    pub(super) fn bound(
         &self,
         cloud: &Cloud,
         state: State,
@@ -434,7 +434,7 @@ impl DistanceField {
 
     /// The part of the cloud that may lie outside the silhouette somewhere in a box of states as in
     /// [`Self::bound`]; `into` is overwritten. The others cost nothing anywhere in it.
-    pub(in crate::domain::align) fn undecided(&self, cloud: &Cloud, state: State, extent: Extent, into: &mut Cloud) {
+    pub(super) fn undecided(&self, cloud: &Cloud, state: State, extent: Extent, into: &mut Cloud) {
         let motion = Motion::new(self, state);
         let (shift, turn) = ((extent.shift / CELL_M) as f32, extent.turn as f32);
         into.y.clear();
@@ -483,7 +483,7 @@ impl DistanceField {
     }
 
     /// [`Slopes`] for windows of one, two and four cells around each cell.
-    pub(in crate::domain::align) fn slopes(&self) -> [Slopes; 3] {
+    pub(super) fn slopes(&self) -> [Slopes; 3] {
         // Kept as greatest values of (-y, y, -z, z), so that joining windows is one maximum.
         let (columns, rows) = (self.columns, self.rows);
         // At the border of the grid nothing is known of what comes behind.

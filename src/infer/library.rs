@@ -1,0 +1,127 @@
+//! Where the library of ONNX Runtime is looked for.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde::Serialize;
+
+use crate::io::folders;
+
+/// A place that was searched without success.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Searched {
+    /// Where.
+    pub place: String,
+    /// What was wrong there.
+    pub outcome: String,
+}
+
+/// Where fetched libraries lie by default.
+pub(super) fn runtime_dir() -> Option<PathBuf> {
+    folders::program_data().map(|dir| dir.join("runtime"))
+}
+
+/// All places to look at, in order, each with the library that lies there.
+#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only the ONNX engine looks for its library"))]
+pub(super) fn candidates() -> impl Iterator<Item = (String, Option<PathBuf>)> {
+    // Each place is looked at only when the ones before it had nothing: the last one starts a program.
+    let named = std::iter::once_with(|| {
+        let path = std::env::var_os("ORT_DYLIB_PATH").filter(|v| !v.is_empty()).map(PathBuf::from);
+        match path {
+            Some(path) if path.is_dir() => (format!("ORT_DYLIB_PATH ({})", path.display()), library_in(&path)),
+            Some(path) => (format!("ORT_DYLIB_PATH ({})", path.display()), path.is_file().then_some(path)),
+            None => ("ORT_DYLIB_PATH (not set)".into(), None),
+        }
+    });
+    let beside = std::iter::once_with(|| {
+        let dir = std::env::current_exe().ok().and_then(|exe| exe.parent().map(Path::to_path_buf));
+        place("beside the program", dir)
+    });
+    let data = std::iter::once_with(|| place("the application's data folder", runtime_dir()));
+    let packages = std::iter::once_with(|| {
+        let library = python_packages().iter().find_map(|dir| library_in(&dir.join("onnxruntime/capi")));
+        ("Python's package folders".into(), library)
+    });
+    let python = std::iter::once_with(|| {
+        let library = python_onnxruntime().and_then(|dir| library_in(&dir.join("capi")));
+        ("the onnxruntime package of `python3`".into(), library)
+    });
+    named.chain(beside).chain(data).chain(packages).chain(python)
+}
+
+#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only the ONNX engine looks for its library"))]
+fn place(name: &str, dir: Option<PathBuf>) -> (String, Option<PathBuf>) {
+    match dir {
+        Some(dir) => (format!("{name} ({})", dir.display()), library_in(&dir)),
+        None => (format!("{name} (unknown)"), None),
+    }
+}
+
+/// The library in `dir`; the last by name where there are several.
+pub(super) fn library_in(dir: &Path) -> Option<PathBuf> {
+    let is_library = |name: &str| {
+        let plain = name.strip_prefix("lib").unwrap_or(name);
+        let end = plain.strip_prefix("onnxruntime");
+        end.is_some_and(|end| end.starts_with('.') && [".so", ".dylib", ".dll"].iter().any(|ext| end.contains(ext)))
+    };
+    let entries = std::fs::read_dir(dir).ok()?;
+    let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    files.filter(|path| path.file_name().and_then(|n| n.to_str()).is_some_and(is_library)).max()
+}
+
+/// Package folders of the Pythons that can be found without starting one.
+#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only the ONNX engine looks for its library"))]
+fn python_packages() -> Vec<PathBuf> {
+    let mut prefixes: Vec<PathBuf> =
+        ["VIRTUAL_ENV", "CONDA_PREFIX"].iter().filter_map(std::env::var_os).map(PathBuf::from).collect();
+    prefixes.extend(dirs::home_dir().map(|home| home.join(".local")));
+    prefixes.extend(["/usr/local", "/opt/homebrew", "/usr"].map(PathBuf::from));
+    let mut found = Vec::new();
+    for prefix in prefixes {
+        found.push(prefix.join("Lib/site-packages"));
+        let Ok(entries) = std::fs::read_dir(prefix.join("lib")) else { continue };
+        let mut pythons: Vec<PathBuf> = entries
+            .filter_map(|entry| Some(entry.ok()?.path()))
+            .filter(|path| path.file_name().and_then(|n| n.to_str()).is_some_and(|n| n.starts_with("python3")))
+            .collect();
+        pythons.sort();
+        for python in pythons.iter().rev() {
+            found.extend(["site-packages", "dist-packages"].map(|name| python.join(name)));
+        }
+    }
+    found
+}
+
+/// Asks the Python on the path, without importing the package.
+#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only the ONNX engine looks for its library"))]
+fn python_onnxruntime() -> Option<PathBuf> {
+    const QUESTION: &str = "import importlib.util as u; s = u.find_spec('onnxruntime'); \
+                            print(list(s.submodule_search_locations)[0] if s else '')";
+    let python = if cfg!(windows) { "python" } else { "python3" };
+    let output = Command::new(python).args(["-I", "-c", QUESTION]).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    let text = text.trim();
+    (output.status.success() && !text.is_empty()).then(|| PathBuf::from(text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_library_itself_is_taken() {
+        let dir = tempfile::tempdir().unwrap();
+        assert_eq!(library_in(dir.path()), None);
+        for name in ["libonnxruntime_providers_shared.so", "onnxruntime_pybind11_state.so", "libonnxruntime.txt"] {
+            std::fs::write(dir.path().join(name), b"").unwrap();
+        }
+        assert_eq!(library_in(dir.path()), None);
+        for name in ["libonnxruntime.so.1.31.1", "libonnxruntime.1.31.1.dylib", "onnxruntime.dll"] {
+            let path = dir.path().join(name);
+            std::fs::write(&path, b"").unwrap();
+            assert_eq!(library_in(dir.path()), Some(path.clone()));
+            std::fs::remove_file(path).unwrap();
+        }
+        assert_eq!(library_in(&dir.path().join("absent")), None);
+    }
+}
