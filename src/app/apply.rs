@@ -13,7 +13,7 @@ mod workbench;
 use super::command::{Command, Hover};
 use super::document::Review;
 use super::effect::Effect;
-use super::keys::{PairKey, Request};
+use super::keys::Request;
 use super::library::Place;
 use super::settings::MAX_RECENT;
 use super::state::State;
@@ -231,7 +231,7 @@ fn say_notes(state: &mut State) {
     else {
         return;
     };
-    if sample.notes.is_empty() || !state.results.noted.insert(key) {
+    if sample.notes.is_empty() || !state.results.noted.insert(Request::Sample(key)) {
         return;
     }
     let name = state.pair_name().to_owned();
@@ -271,9 +271,4 @@ fn save_all(state: &mut State, effects: &mut Vec<Effect>) {
     }
     save_settings(state, effects);
     state.log.push(Level::Info, "Labels and preferences are being written", None, None);
-}
-
-/// Whether a pair is the one on screen.
-fn is_selected(state: &State, key: PairKey) -> bool {
-    state.pair_key() == Some(key)
 }

@@ -9,11 +9,11 @@ use glam::DVec3;
 
 use super::document::{PairLabels, Review};
 use super::evaluation::EvaluateCommand;
-use super::inspect::{InspectCommand, Inspection};
-use super::jobs::generate::Keyed;
+use super::inspect::InspectCommand;
 use super::keys::{DatasetSeq, ImprintSource, PoseEngine, PredictionKey, Request, Revision, ShiftMode};
 use super::library::{Place, Sort};
-use super::results::Preview;
+use super::results::prediction::Keyed;
+use super::results::{Computed, Preview};
 use super::seeds::SeedsCommand;
 use super::services::{DataSource, Followed};
 use super::settings::{
@@ -21,25 +21,13 @@ use super::settings::{
 };
 use super::tasks::Ticket;
 use super::workbench::WorkbenchCommand;
-use crate::domain::align::basin::Basin;
-use crate::domain::ambiguity::Ambiguity;
-use crate::domain::contact::ContactMask;
 use crate::domain::dataset::PairId;
-use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::rig::PadId;
-use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
 use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::BundleInfo;
-use crate::work::cloud::Clouds;
-use crate::work::compare::Comparison;
-use crate::work::ensemble::Ensemble;
 use crate::work::error::TaskError;
 use crate::work::job::Progress;
-use crate::work::layers::LayerResult;
-use crate::work::ledger::LedgerResult;
-use crate::work::pose::PoseResult;
-use crate::work::tool::NamedTool;
 
 /// A pane of the window. What is visible decides what is computed.
 #[derive(
@@ -331,7 +319,7 @@ pub enum Command {
     /// What the runtime was asked for because it is shown.
     Demanded(Vec<Request>),
     /// A result that a pane asked for.
-    Computed(Request, Computed),
+    Computed(Computed),
     /// Predictions are there.
     Generated(Ticket, Keyed),
     /// A prediction as it looks on the way.
@@ -367,43 +355,6 @@ impl std::fmt::Debug for Opened {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Opened({}, {} reviews)", self.source.title(), self.reviews.len())
     }
-}
-
-/// A computed result; its kind is that of its [`Request`].
-#[derive(Clone, Debug)]
-pub enum Computed {
-    /// Of [`Request::Sample`].
-    Sample(Arc<Sample>),
-    /// Of [`Request::Labels`].
-    Labels(Box<PairLabels>),
-    /// Of [`Request::Tool`].
-    Tool(Arc<NamedTool>),
-    /// Of [`Request::Stored`] and [`Request::Prediction`].
-    Predictions(Keyed),
-    /// Of [`Request::Imprint`] and [`Request::Thumbnail`].
-    Depth(Arc<DepthMap>),
-    /// Of [`Request::Imprint`] where a color sensor was predicted.
-    Color(Arc<RgbGrid>),
-    /// Of [`Request::Comparison`].
-    Comparison(Arc<Comparison>),
-    /// Of [`Request::Ledger`].
-    Ledger(Arc<LedgerResult>),
-    /// Of [`Request::Ambiguity`]; `None` for an image without a finite pixel.
-    Ambiguity(Option<Ambiguity>),
-    /// Of [`Request::Ensemble`].
-    Ensemble(Arc<Ensemble>),
-    /// Of [`Request::Mask`].
-    Mask(Box<ContactMask>),
-    /// Of [`Request::Cloud`].
-    Cloud(Arc<Clouds>),
-    /// Of [`Request::Pose`] and [`Request::Run`].
-    Pose(Arc<PoseResult>),
-    /// Of [`Request::Layers`].
-    Layers(Arc<LayerResult>),
-    /// Of [`Request::Inspection`].
-    Inspection(Arc<Inspection>),
-    /// Of [`Request::Basin`].
-    Basin(Arc<Basin>),
 }
 
 /// A pair whose labels are to be written.

@@ -1,14 +1,10 @@
-//! What would be generated now, and what of it would be looked at on the way.
+//! What would be generated now.
 
-use std::sync::Arc;
-
-use super::command::Pane;
-use super::jobs::PreviewWish;
 use super::keys::{ImprintSource, PredictionKey, TouchKey};
-use super::results::Preview;
-use super::state::State;
+use super::state::{Absent, State};
 use crate::domain::rig::PadId;
-use crate::work::bundles::BundleKind;
+use crate::domain::sample::Sample;
+use crate::work::bundles::{BundleInfo, BundleKind};
 
 impl State {
     /// The recipe that the settings give a touch; `None` without a generator.
@@ -32,18 +28,48 @@ impl State {
         fingers
     }
 
-    /// The prediction on its way to one finger of the selected pair, as it looks now.
-    pub fn preview(&self, finger: PadId) -> Option<&Arc<Preview>> {
-        self.results.previews.get(&self.touch_key(finger)?).filter(|_| self.document.stroke.is_none())
+    /// The bundle that the settings name, or the first of its kind.
+    ///
+    /// # Errors
+    /// [`Absent::NoGenerator`], [`Absent::NoMaskModel`].
+    pub fn bundle(&self, kind: BundleKind) -> Result<&BundleInfo, Absent> {
+        let (name, absent) = match kind {
+            BundleKind::Generator => (self.settings.generate.bundle.as_deref(), Absent::NoGenerator),
+            BundleKind::Mask => (self.settings.mask.bundle.as_deref(), Absent::NoMaskModel),
+            BundleKind::Classifier => (None, Absent::NoClassifier),
+        };
+        let rig = self.rig();
+        let others = self.library.bundles.iter().any(|bundle| bundle.kind == kind && !bundle.fits(&rig));
+        let absent = if others { Absent::OtherSensors } else { absent };
+        self.library.bundle_named(kind, name, &rig).ok_or(absent)
     }
 
-    /// What of a prediction under way would be looked at: the predicted imprints on screen, unless a pen is on them.
-    pub fn preview_wish(&self) -> PreviewWish {
-        let shown = self.is_visible(&[Pane::Predicted]) && self.document.stroke.is_none();
-        let touches = match self.pair_key().filter(|_| shown) {
-            Some(pair) => self.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
-            None => Default::default(),
+    /// Whether something can be generated for the selected pair.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn can_generate(&self) -> Result<(), Absent> {
+        self.pair_key().ok_or(if self.library.open.is_none() {
+            Absent::NothingOpen
+        } else {
+            Absent::NothingSelected
+        })?;
+        self.bundle(BundleKind::Generator)?;
+        // While the sample loads, the job loads it itself.
+        let Some(sample) = self.sample().ready() else {
+            return Ok(());
         };
-        PreviewWish { every: self.settings.generate.preview_every, shift: self.settings.shift, touches }
+        if sample.rig.pads().any(|finger| self.has_input(sample, finger)) { Ok(()) } else { Err(Absent::NoInput) }
+    }
+
+    /// Whether a finger has a reading of the sensor that the generator starts from.
+    fn has_input(&self, sample: &Sample, finger: PadId) -> bool {
+        let ends = self.bundle(BundleKind::Generator).ok().and_then(|bundle| bundle.ends(&sample.rig)?.ok());
+        ends.is_some_and(|ends| sample.pad(finger).is_some_and(|touch| touch.reading(ends.input).is_some()))
+    }
+
+    /// Whether something can be generated for a finger of the selected pair, which is loaded.
+    pub fn can_start(&self, finger: PadId) -> bool {
+        self.sample().ready().is_some_and(|sample| self.has_input(sample, finger))
     }
 }

@@ -2,18 +2,14 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::command::Pane;
-use super::keys::{BasinKey, ImprintSource, PairKey, PoseBits, PoseEngine, Request, RunKey};
-use super::state::{Absent, Lookup, State};
+use super::keys::{ImprintSource, PairKey, PoseBits, PoseEngine};
+pub use super::results::inspection::Inspection;
+use super::state::State;
 use super::workbench::Layer;
-use crate::domain::align::basin::{Basin, Plane};
-use crate::domain::align::{AlignReport, TraceStep};
+use crate::domain::align::TraceStep;
+use crate::domain::align::basin::Plane;
 use crate::domain::frames::PlanarPose;
-use crate::domain::inspect::Counterparts;
-use crate::domain::pose::ToolModel;
-use crate::work::pose::PoseResult;
 
 /// Panes that show a recorded run or the map of starts.
 pub const INSPECT_PANES: [Pane; 2] = [Pane::TimeMachine, Pane::BasinMap];
@@ -139,92 +135,6 @@ pub enum InspectCommand {
     StopBasin,
 }
 
-/// A recorded registration with what its steps are looked at with.
-#[derive(Clone, Debug)]
-pub struct Inspection {
-    /// The recorded registration.
-    pub result: Arc<PoseResult>,
-    /// The contact points that were offered, meters, grasp frame.
-    pub points: Vec<DVec3>,
-    /// What the points are compared with.
-    pub counterparts: Counterparts,
-    /// Per start the positions of its steps in the trace.
-    runs: Vec<Vec<usize>>,
-}
-
-impl Inspection {
-    /// From a recorded registration, the contact points it was offered, and what they were compared with.
-    pub fn new(result: Arc<PoseResult>, points: Vec<DVec3>, tool: &ToolModel, engine: PoseEngine) -> Self {
-        let report = &result.report;
-        let mut runs: Vec<Vec<usize>> = vec![Vec::new(); report.runs.len()];
-        for (i, step) in report.trace.iter().enumerate() {
-            if step.run >= runs.len() {
-                runs.resize(step.run + 1, Vec::new());
-            }
-            runs[step.run].push(i);
-        }
-        Self { result, points, counterparts: Counterparts::new(tool, engine), runs }
-    }
-
-    /// The registration's report with its trace.
-    pub fn report(&self) -> &AlignReport {
-        &self.result.report
-    }
-
-    /// Starts there are.
-    pub fn num_runs(&self) -> usize {
-        self.runs.len()
-    }
-
-    /// Steps of a start, the applied start included.
-    pub fn num_steps(&self, run: usize) -> usize {
-        self.runs.get(run).map_or(0, Vec::len)
-    }
-
-    /// The steps of a start, in order.
-    pub fn steps(&self, run: usize) -> impl Iterator<Item = &TraceStep> + '_ {
-        self.runs.get(run).into_iter().flatten().filter_map(|&i| self.report().trace.get(i))
-    }
-
-    /// A step of a start; beyond the end its last.
-    pub fn step(&self, run: usize, at: usize) -> Option<&TraceStep> {
-        let steps = self.runs.get(run)?;
-        self.report().trace.get(*steps.get(at.min(steps.len().checked_sub(1)?))?)
-    }
-
-    /// The pose that a start was asked to begin at, `grasp_from_object`.
-    pub fn requested(&self, run: usize) -> Option<PlanarPose> {
-        self.report().runs.get(run).map(|r| r.start)
-    }
-
-    /// The pose it began at, `grasp_from_object`: not always the one asked for.
-    pub fn applied(&self, run: usize) -> Option<PlanarPose> {
-        self.steps(run).next().map(|s| s.grasp_from_object)
-    }
-
-    /// What happens after a step, in words: the reason to stop at the last one.
-    pub fn what_next(&self, run: usize, at: usize) -> String {
-        let (Some(here), last) = (self.step(run, at), self.num_steps(run).saturating_sub(1)) else {
-            return "no step was recorded".into();
-        };
-        if at >= last {
-            return self.report().runs.get(run).map_or_else(|| self.report().stop.to_string(), |r| r.stop.to_string());
-        }
-        match self.step(run, at + 1) {
-            Some(next) if next.kernel_m != here.kernel_m => {
-                format!("this kernel is done; the next is {:.2} mm wide", next.kernel_m * 1e3)
-            }
-            Some(next) if next.points != here.points => format!("goes on with {} points", next.points),
-            _ => "still moving".into(),
-        }
-    }
-
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        self.points.len() * 24 + self.report().trace.len() * 8 + (100 << 10)
-    }
-}
-
 /// The step that is looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct Inspected<'a> {
@@ -246,63 +156,6 @@ impl Inspected<'_> {
 }
 
 impl State {
-    /// The recipe of the recorded run that is looked at; `Ok(None)` while something it is made from is missing.
-    ///
-    /// # Errors
-    /// Why there can be none.
-    pub fn inspection_key(&self) -> Result<Option<RunKey>, Absent> {
-        let pose = self.pose_key(self.inspect.source)?;
-        Ok(pose.map(|pose| RunKey { pose, start: self.inspect.start }))
-    }
-
-    /// The recorded run that is looked at.
-    pub fn inspection(&self) -> Lookup<'_, Arc<Inspection>> {
-        let before = || {
-            let key = self.results.latest_inspections.get(&(self.pair_key()?, self.inspect.source))?;
-            self.results.inspections.get(key)
-        };
-        if let failed @ Lookup::Failed(_) = self.tool() {
-            return failed.without();
-        }
-        match self.inspection_key() {
-            Err(absent) => Lookup::Absent(absent),
-            Ok(key) => match key.as_ref().and_then(|key| self.results.inspections.get(key)) {
-                Some(inspection) => Lookup::Ready(inspection),
-                None => {
-                    let run = key.clone().map(Request::Run).filter(|run| self.tasks.failed.contains_key(run));
-                    self.missing_but(run.or_else(|| key.map(Request::Inspection)), before())
-                }
-            },
-        }
-    }
-
-    /// The recipe of the basin map; `Ok(None)` while something it is made from is missing.
-    ///
-    /// # Errors
-    /// Why there can be none.
-    pub fn basin_key(&self) -> Result<Option<BasinKey>, Absent> {
-        let pose = self.pose_key(self.inspect.source)?;
-        Ok(pose.map(|pose| BasinKey { pose, plane: self.inspect.plane }))
-    }
-
-    /// The basin map.
-    pub fn basin(&self) -> Lookup<'_, Basin> {
-        let before = || {
-            let key = self.results.latest_basins.get(&(self.pair_key()?, self.inspect.source))?;
-            self.results.basins.get(key).map(|a| &**a).filter(|b| b.config.plane == self.inspect.plane)
-        };
-        if let failed @ Lookup::Failed(_) = self.tool() {
-            return failed.without();
-        }
-        match self.basin_key() {
-            Err(absent) => Lookup::Absent(absent),
-            Ok(key) => match key.as_ref().and_then(|key| self.results.basins.get(key)) {
-                Some(basin) => Lookup::Ready(basin),
-                None => self.missing_but(key.map(Request::Basin), before()),
-            },
-        }
-    }
-
     /// The step that is looked at, of the run shown (also of the one before, while the next is computed).
     pub fn inspected(&self) -> Option<Inspected<'_>> {
         let inspection = self.inspection().shown()?;

@@ -10,10 +10,11 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::apply::apply;
 use super::command::{Command, UiRequest};
-use super::jobs::{Lane, PreviewWish};
+use super::jobs::Lane;
 use super::keys::{DatasetSeq, Request, TouchKey};
 use super::library::Place;
 use super::results::Preview;
+use super::results::preview::PreviewWish;
 use super::services::SharedServices;
 use super::state::State;
 use super::tasks::Ticket;
@@ -133,7 +134,7 @@ impl Runtime {
             self.run(state, Command::Demanded(wanted), &mut ui);
         }
         let services = &self.services;
-        self.lanes.demand(&state.tasks.demanded, |request| super::jobs::prepare::prepare(state, services, request));
+        self.lanes.demand(&state.tasks.demanded, |request| request.job(state, services));
         ui
     }
 

@@ -1,12 +1,13 @@
 //! Several seeds of one touch: which, what is there of them, and what is missing.
 
 use super::command::Pane;
-use super::keys::{CloudKey, EnsembleKey, ImprintKey, MaskKey, MaskVersion, PoseKey, PredictionKey, Request};
-use super::state::{Absent, Lookup, State};
+use super::keys::{CloudKey, ImprintKey, MaskKey, MaskVersion, MetersKey, PoseKey, PredictionKey, Request};
+use super::results::prediction::SeedKey;
+use super::state::{Absent, State};
+use super::wanted::Wanted;
 use crate::domain::ensemble::seeds;
 use crate::domain::grid::DepthMap;
 use crate::domain::rig::{PadId, PerPad};
-use crate::work::ensemble::Ensemble;
 use crate::work::pose::PoseResult;
 
 /// Fewest and most seeds of an ensemble.
@@ -66,33 +67,7 @@ impl State {
 
     /// The imprint of one seed in meters, if it is there.
     pub fn seed_imprint(&self, recipe: &PredictionKey) -> Option<&DepthMap> {
-        self.results.imprints.get(&(recipe.clone(), self.settings.shift)).map(|imprint| &**imprint)
-    }
-
-    /// The ensemble of what is there of one finger; `None` before the first seed.
-    fn ensemble_key(&self, finger: PadId) -> Option<EnsembleKey> {
-        let there = |r: &PredictionKey| self.results.predictions.contains(r) && self.seed_imprint(r).is_some();
-        let recipes: Vec<PredictionKey> = self.seed_recipes(finger).ok()?.into_iter().filter(there).collect();
-        (!recipes.is_empty()).then_some(EnsembleKey { recipes, shift: self.settings.shift })
-    }
-
-    /// Mean and spreads of the seeds that are there; the ensemble before while the next is computed.
-    pub fn ensemble(&self, finger: PadId) -> Lookup<'_, Ensemble> {
-        let Some(key) = self.ensemble_key(finger) else { return Lookup::Absent(Absent::NoPrediction) };
-        let before = || {
-            let mut key = key.clone();
-            while key.recipes.len() > 1 {
-                key.recipes.pop();
-                if let Some(found) = self.results.ensembles.get(&key) {
-                    return Some(&**found);
-                }
-            }
-            None
-        };
-        match self.results.ensembles.get(&key) {
-            Some(ensemble) => Lookup::Ready(ensemble),
-            None => self.missing_but(Some(Request::Ensemble(key.clone())), before()),
-        }
+        self.results.imprints.get(&MetersKey(recipe.clone(), self.settings.shift)).map(|imprint| &**imprint)
     }
 
     /// The fingers whose seeds make a pose: both, or only the active one, as in generating.
@@ -104,7 +79,7 @@ impl State {
     }
 
     /// The cloud of one seed with the automatic masks; `Err` holds what is missing for it.
-    fn seed_cloud(&self, at: usize) -> Result<CloudKey, Vec<Request>> {
+    fn seed_cloud(&self, at: usize) -> Result<CloudKey, Vec<MaskKey>> {
         let mut parts = PerPad::default();
         let mut missing = Vec::new();
         for finger in self.seed_fingers() {
@@ -119,7 +94,7 @@ impl State {
             let imprint = ImprintKey::Predicted(recipe.clone(), self.settings.shift);
             let key = MaskKey { imprint: imprint.clone(), recipe: mask.clone() };
             if !self.results.masks.contains(&key) {
-                missing.push(Request::Mask(key));
+                missing.push(key);
             }
             parts[finger] = Some((imprint, Some(MaskVersion::Auto(mask))));
         }
@@ -147,57 +122,51 @@ impl State {
         (!self.seed_fingers().iter().any(camera)).then_some(Absent::NoCamera)
     }
 
-    /// What the pane of the seeds shows and is not there, most urgent first.
-    pub(super) fn wanted_seeds(&self) -> Vec<Request> {
-        let mut list = Vec::new();
-        if !self.selection.panes.contains(&Pane::Seeds) || self.sample().ready().is_none() {
-            return list;
-        }
-        let posed = self.seed_pose_absent().is_none();
-        if let (true, Ok(name), Some(open)) = (posed, self.tool_name(), &self.library.open)
-            && !self.results.tools.contains(&name.to_owned())
-        {
-            list.push(Request::Tool(open.seq, name.into()));
-        }
-        let mut fingers = self.seed_fingers();
-        if !fingers.contains(&self.selection.finger) {
-            fingers.push(self.selection.finger);
-        }
-        let mut fresh = Vec::new();
-        for at in 0..self.seeds.count {
-            for finger in &fingers {
-                let Ok(recipes) = self.seed_recipes(*finger) else { continue };
-                let Some(recipe) = recipes.get(at) else { continue };
-                if !self.results.predictions.contains(recipe) {
-                    if self.seeds.running {
-                        fresh.push(Request::Seed(recipe.clone()));
-                    }
-                } else if self.seed_imprint(recipe).is_none() {
-                    list.push(Request::Imprint(recipe.clone(), self.settings.shift));
-                }
-            }
-            match self.seed_cloud(at) {
-                _ if !posed => {}
-                Err(missing) => list.extend(missing),
-                Ok(cloud) if !self.results.clouds.contains(&cloud) => list.push(Request::Cloud(cloud)),
-                Ok(_) => {
-                    let key = self.seed_pose_key(at).filter(|key| !self.results.poses.contains(key));
-                    list.extend(key.map(Request::Pose));
-                }
-            }
-        }
-        if let Some(key) = self.ensemble_key(self.selection.finger)
-            && !self.results.ensembles.contains(&key)
-        {
-            list.push(Request::Ensemble(key));
-        }
-        // What is there is evaluated before the next is made.
-        list.extend(fresh);
-        list
-    }
-
     /// Seeds that are still to come.
     pub fn seeds_to_come(&self) -> usize {
         self.tasks.demanded.iter().filter(|r| matches!(r, Request::Seed(_))).count()
+    }
+}
+
+impl Wanted<'_> {
+    /// What the pane of the seeds shows and is not there, most urgent first.
+    pub(super) fn seeds(&mut self) {
+        let state = self.state;
+        if !state.is_visible(&[Pane::Seeds]) || state.sample().ready().is_none() {
+            return;
+        }
+        let posed = state.seed_pose_absent().is_none();
+        if posed {
+            self.tool();
+        }
+        let mut fingers = state.seed_fingers();
+        if !fingers.contains(&state.selection.finger) {
+            fingers.push(state.selection.finger);
+        }
+        let mut fresh = Vec::new();
+        for at in 0..state.seeds.count {
+            for finger in &fingers {
+                let Ok(recipes) = state.seed_recipes(*finger) else { continue };
+                let Some(recipe) = recipes.get(at) else { continue };
+                if state.results.predictions.contains(recipe) {
+                    self.ask(MetersKey(recipe.clone(), state.settings.shift));
+                } else if state.seeds.running {
+                    fresh.push(SeedKey(recipe.clone()));
+                }
+            }
+            match state.seed_cloud(at) {
+                _ if !posed => {}
+                Err(missing) => missing.into_iter().for_each(|mask| self.ask(mask)),
+                Ok(cloud) if !state.results.clouds.contains(&cloud) => self.ask(cloud),
+                Ok(_) => state.seed_pose_key(at).into_iter().for_each(|pose| self.ask(pose)),
+            }
+        }
+        if let Some(key) = state.ensemble_key(state.selection.finger) {
+            self.ask(key);
+        }
+        // What is there is evaluated before the next is made.
+        for key in fresh {
+            self.ask_unless(false, key);
+        }
     }
 }

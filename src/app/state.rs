@@ -114,6 +114,16 @@ impl State {
     pub fn touch_key(&self, finger: PadId) -> Option<TouchKey> {
         Some(self.pair_key()?.finger(finger))
     }
+
+    /// Whether a pair is the one on screen.
+    pub(super) fn is_selected(&self, key: PairKey) -> bool {
+        self.pair_key() == Some(key)
+    }
+
+    /// Whether one of these panes is on screen.
+    pub(super) fn is_visible(&self, panes: &[Pane]) -> bool {
+        panes.iter().any(|pane| self.selection.panes.contains(pane))
+    }
 }
 
 /// Something a pane shows, or why it cannot.
@@ -172,6 +182,32 @@ impl<'a, T: ?Sized> Lookup<'a, T> {
             Self::Stale(value) => f(value).map_or(Lookup::Absent(absent), Lookup::Stale),
             _ => self.without(),
         }
+    }
+}
+
+impl<'a, T: ?Sized> Lookup<'a, T> {
+    /// Part of a value.
+    pub fn map<U: ?Sized>(self, f: impl FnOnce(&'a T) -> &'a U) -> Lookup<'a, U> {
+        match self {
+            Self::Ready(value) => Lookup::Ready(f(value)),
+            Self::Stale(value) => Lookup::Stale(f(value)),
+            _ => self.without(),
+        }
+    }
+
+    /// The failure of what it is made from, where it is not there itself.
+    pub(super) fn or_failed(self, err: Option<&'a TaskError>) -> Self {
+        match (self, err) {
+            (Self::Stale(_) | Self::Waiting, Some(err)) => Self::Failed(err),
+            _ => self,
+        }
+    }
+}
+
+impl<'a, T> Lookup<'a, Arc<T>> {
+    /// The value itself.
+    pub fn value(self) -> Lookup<'a, T> {
+        self.map(|value| &**value)
     }
 }
 

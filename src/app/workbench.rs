@@ -6,13 +6,11 @@ use glam::DVec3;
 use strum::EnumIter;
 
 use super::command::Pane;
-use super::keys::{ImprintSource, PairKey, PoseKey, Request, RunKey};
-use super::state::{Lookup, State};
+use super::keys::{ImprintSource, PairKey, RunKey};
+use super::state::State;
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::{AcceptedPose, HandAxis, HandCost, HandPose, PoseDifference};
-use crate::domain::rig::{PadId, PerPad, Rig};
-use crate::work::layers::LayerResult;
-use crate::work::pose::PoseResult;
+use crate::domain::rig::{PadId, Rig};
 
 /// What colors the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
@@ -215,13 +213,6 @@ impl PoseOf {
     pub fn all(rig: &Rig) -> Vec<Self> {
         rig.pads().map(Self::Finger).chain([Self::Joint]).collect()
     }
-
-    fn finger(self) -> Option<PadId> {
-        match self {
-            Self::Finger(finger) => Some(finger),
-            Self::Joint => None,
-        }
-    }
 }
 
 impl State {
@@ -252,30 +243,6 @@ impl State {
         accepted.or_else(|| Some(self.pose(source).shown()?.grasp_from_object.into())).unwrap_or_default()
     }
 
-    /// The recorded registration from the engine's own starts; `Ok(None)` while its inputs are not there.
-    pub fn run_key(&self, source: ImprintSource) -> Option<RunKey> {
-        Some(RunKey { pose: self.pose_key(source).ok()??, start: None })
-    }
-
-    /// What the layers show of an imprint.
-    pub fn layers(&self, source: ImprintSource) -> Lookup<'_, LayerResult> {
-        match self.pose_key(source) {
-            Err(absent) => Lookup::Absent(absent),
-            Ok(None) => Lookup::Waiting,
-            Ok(Some(key)) => match self.results.layers.get(&key) {
-                Some(layers) => Lookup::Ready(layers),
-                None => {
-                    let run = Request::Run(RunKey { pose: key.clone(), start: None });
-                    let failed = |request: &Request| self.tasks.failed.get(request);
-                    match failed(&run).or_else(|| failed(&Request::Layers(key))) {
-                        Some(err) => Lookup::Failed(err),
-                        None => Lookup::Waiting,
-                    }
-                }
-            },
-        }
-    }
-
     /// Whether something on screen shows the layers of an imprint.
     pub fn shows_layers(&self, source: ImprintSource) -> bool {
         let scene = match source {
@@ -287,42 +254,6 @@ impl State {
             && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
                 || bench.picked.is_some_and(|picked| picked.source == source));
         in_scene || (self.selection.panes.contains(&Pane::Layers) && bench.side == source)
-    }
-
-    /// The recipe of the pose from one finger or both; `Ok(None)` while something is not there yet.
-    ///
-    /// # Errors
-    /// Why there can be none.
-    pub fn pose_key_of(&self, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, super::state::Absent> {
-        let Some(mut key) = self.pose_key(source)? else { return Ok(None) };
-        if let Some(finger) = of.finger() {
-            let part = key.cloud.parts[finger].take();
-            if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
-                return Err(super::state::Absent::NoFinger);
-            }
-            key.cloud.parts = PerPad::default();
-            key.cloud.parts[finger] = part;
-        }
-        Ok(Some(key))
-    }
-
-    /// The pose from one finger or both.
-    pub fn pose_of(&self, source: ImprintSource, of: PoseOf) -> Lookup<'_, PoseResult> {
-        match self.pose_key_of(source, of) {
-            Err(absent) => Lookup::Absent(absent),
-            Ok(None) => Lookup::Waiting,
-            Ok(Some(key)) => match self.results.poses.get(&key) {
-                Some(pose) => Lookup::Ready(pose),
-                None => {
-                    let failed = |request: &Request| self.tasks.failed.get(request);
-                    let cloud = Request::Cloud(key.cloud.clone());
-                    match failed(&Request::Pose(key)).or_else(|| failed(&cloud)) {
-                        Some(err) => Lookup::Failed(err),
-                        None => Lookup::Waiting,
-                    }
-                }
-            },
-        }
     }
 
     /// How far the registered poses of measurement and prediction are apart, where both are there.

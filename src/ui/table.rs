@@ -10,7 +10,7 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::document::Review;
-use crate::app::keys::ImprintSource;
+use crate::app::keys::{ComparisonKey, ImprintSource};
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
 
@@ -96,7 +96,9 @@ fn rows(cx: &Cx<'_>) -> Vec<Row> {
             continue;
         }
         // A finger that was not on screen was not compared.
-        let Some(c) = state.results.comparisons.get(&(recipe.clone(), state.settings.shift)) else { continue };
+        let Some(c) = state.results.comparisons.get(&ComparisonKey(recipe.clone(), state.settings.shift)) else {
+            continue;
+        };
         let image = [c.psnr_db, c.ssim, Some(c.mae_m * 1e3)];
         with_prediction.insert(touch.pair);
         out.extend(row(touch.pair.pair, Some(touch.finger), image));

@@ -15,7 +15,7 @@ use touch2touch::infer::bundle::{Origin, SensorPair};
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
-use touch2touch::app::jobs::Onlooker;
+use touch2touch::app::results::preview::Onlooker;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::job::{JobCx, PreviewPicture};
 use touch2touch::work::prediction::Prediction;

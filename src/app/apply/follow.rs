@@ -3,6 +3,7 @@
 use super::super::effect::Effect;
 use super::super::keys::Request;
 use super::super::library::Follow;
+use super::super::results::Results;
 use super::super::services::Followed;
 use super::super::state::State;
 use super::super::tasks::Ticket;
@@ -45,13 +46,13 @@ pub(super) fn arrived(state: &mut State, followed: Followed, current: bool, effe
     open.tools = open.index().tools();
     let mut key = open.key(followed.pair);
     let results = &mut state.results;
-    results.thumbnails.retain(|pair| *pair != key);
+    results.thumbnails.retain(|pair| pair.0 != key);
     if results.samples.contains(&key) && !followed.completed {
         // A file that was written again: under a new number nothing of the old is shown.
         state.library.last_seq.0 += 1;
         open.seq = state.library.last_seq;
         key = open.key(followed.pair);
-        results.clear();
+        *results = Results::default();
         effects.push(Effect::Follow(Some((open.seq, open.source.clone()))));
     }
     state.tasks.failed.clear();

@@ -8,9 +8,8 @@ use std::thread::JoinHandle;
 use strum::IntoEnumIterator as _;
 
 use super::super::command::Command;
-use super::super::jobs::Lane;
-use super::super::jobs::prepare::{Body, RequestJob};
-use super::super::keys::Request;
+use super::super::jobs::{self, Body, Lane};
+use super::super::results::{Computed, Request};
 use super::{JobId, Wake, lock};
 use crate::io::caught::caught;
 use crate::work::error::TaskError;
@@ -121,7 +120,11 @@ impl Lanes {
     }
 
     /// Makes `wanted`, in this order, what waits: what is not wanted any more is dropped, or told to stop if it runs.
-    pub(super) fn demand(&mut self, wanted: &[Request], mut prepare: impl FnMut(&Request) -> Option<RequestJob>) {
+    pub(super) fn demand(
+        &mut self,
+        wanted: &[Request],
+        mut prepare: impl FnMut(&Request) -> Option<jobs::Job<Computed>>,
+    ) {
         let started: BTreeSet<Request> = self
             .lanes
             .iter()
@@ -140,13 +143,13 @@ impl Lanes {
         }
         let mut fresh: Vec<VecDeque<Job>> = self.lanes.iter().map(|_| VecDeque::new()).collect();
         for request in wanted.iter().filter(|r| !started.contains(r)) {
-            let Some(RequestJob { lane, what, body }) = prepare(request) else { continue };
-            let (done, failed) = (request.clone(), request.clone());
+            let Some(jobs::Job { lane, what, body }) = prepare(request) else { continue };
+            let failed = request.clone();
             fresh[lane as usize].push_back(Job {
                 id: JobId::Request(request.clone()),
                 what,
                 cx: JobCx::unwatched(),
-                body: Box::new(move |cx| Ok(Command::Computed(done, body(cx)?))),
+                body: Box::new(move |cx| Ok(Command::Computed(body(cx)?))),
                 failed: Box::new(move |err| Command::RequestFailed(failed, err)),
             });
         }

@@ -1,0 +1,51 @@
+//! What a GelSlim image leaves open.
+
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{DatasetSeq, TouchKey};
+use super::super::services::SharedServices;
+use super::super::state::State;
+use super::super::wanted::Wanted;
+use super::Computes;
+use super::imprint::gone;
+use crate::domain::ambiguity::{Ambiguity, ambiguity};
+use crate::domain::rig::PadId;
+
+/// What the GelSlim image of a touch leaves open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct AmbiguityKey(pub TouchKey);
+
+impl Computes for AmbiguityKey {
+    /// `None` for an image without a finite pixel.
+    type Value = Option<Ambiguity>;
+
+    fn dataset(&self) -> Option<DatasetSeq> {
+        Some(self.0.pair.dataset)
+    }
+
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Self::Value>> {
+        let (sample, finger) = (state.results.samples.get(&self.0.pair)?.clone(), self.0.finger);
+        Some(Job::new(Lane::Compute, "What the GelSlim image leaves open", move |_| {
+            let gelslim = sample.pad(finger).and_then(|t| t.color());
+            Ok(ambiguity(&gelslim.ok_or_else(gone)?.difference))
+        }))
+    }
+
+    fn bytes(found: &Self::Value) -> usize {
+        size_of_val(found)
+    }
+}
+
+impl State {
+    /// What the GelSlim image of one finger leaves open, once it is known.
+    pub fn ambiguity(&self, finger: PadId) -> Option<Ambiguity> {
+        **self.results.ambiguities.get(&AmbiguityKey(self.touch_key(finger)?))?
+    }
+}
+
+impl Wanted<'_> {
+    pub(crate) fn ambiguity(&mut self, finger: PadId, touch: TouchKey) {
+        if self.state.gelslim(finger).ready().is_some() {
+            self.ask(AmbiguityKey(touch));
+        }
+    }
+}

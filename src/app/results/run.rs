@@ -1,0 +1,45 @@
+//! Registrations with everything recorded: every step, and what became of every point.
+
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{DatasetSeq, ImprintSource, PoseBits};
+use super::super::services::SharedServices;
+use super::super::state::State;
+use super::Computes;
+use super::pose::{PoseKey, Registered};
+use crate::work::pose::{PoseResult, run};
+
+/// A registration with everything recorded: every step, and what became of every point.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct RunKey {
+    /// What is registered, and how.
+    pub pose: PoseKey,
+    /// Where it starts (`grasp_from_object`); `None` = where the engine starts by itself.
+    pub start: Option<PoseBits>,
+}
+
+impl Computes for RunKey {
+    type Value = PoseResult;
+
+    fn dataset(&self) -> Option<DatasetSeq> {
+        self.pose.dataset()
+    }
+
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
+        let Registered { clouds, tool, truth } = self.pose.find(state)?;
+        let (engine, start) = (self.pose.engine, self.start.map(PoseBits::get));
+        Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
+            run(&clouds, &tool.model, engine, truth, start, true)
+        }))
+    }
+
+    fn bytes(found: &PoseResult) -> usize {
+        found.bytes()
+    }
+}
+
+impl State {
+    /// The recorded registration from the engine's own starts; `None` while its inputs are not there.
+    pub fn run_key(&self, source: ImprintSource) -> Option<RunKey> {
+        Some(RunKey { pose: self.pose_key(source).ok()??, start: None })
+    }
+}
