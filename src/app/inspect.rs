@@ -1,101 +1,14 @@
-//! The time machine and the basin map: what of a registration is looked at, and how views find it.
+//! The room of the time machine and the basin map: moving about in what was recorded.
 
-use std::sync::Arc;
+pub mod state;
 
-use super::command::Pane;
-use super::keys::{ImprintSource, PairKey, PoseBits, PoseEngine};
-pub use super::results::inspection::Inspection;
+pub use state::*;
+
+use super::keys::{ImprintSource, Request};
 use super::state::State;
-use super::workbench::Layer;
-use crate::domain::align::TraceStep;
 use crate::domain::align::basin::Plane;
 use crate::domain::frames::PlanarPose;
-
-/// Panes that show a recorded run or the map of starts.
-pub const INSPECT_PANES: [Pane; 2] = [Pane::TimeMachine, Pane::BasinMap];
-
-/// What of a registration is looked at. Not kept between runs of the program.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Inspect {
-    /// The imprint whose registration it is.
-    pub source: ImprintSource,
-    /// The start of the run, `grasp_from_object`; `None` = the registration's own starts.
-    pub start: Option<PoseBits>,
-    /// Which start of the report; `None` = the winner.
-    pub run: Option<usize>,
-    /// Which step of the run; `None` = its last.
-    pub at: Option<usize>,
-    /// Whether the steps go by by themselves.
-    pub playing: bool,
-    /// Steps kept for comparison.
-    pub pins: [Option<Pin>; 2],
-    /// Whether correspondences are drawn in the 3D view.
-    pub lines: bool,
-    /// The plane of the basin map.
-    pub plane: Plane,
-    /// What colors the basin map.
-    pub color: BasinColor,
-}
-
-impl Default for Inspect {
-    fn default() -> Self {
-        Self {
-            source: ImprintSource::Measured,
-            start: None,
-            run: None,
-            at: None,
-            playing: false,
-            pins: [None, None],
-            lines: true,
-            plane: Plane::default(),
-            color: BasinColor::default(),
-        }
-    }
-}
-
-/// What colors a basin map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
-pub enum BasinColor {
-    /// Square root of the cost at the end.
-    #[default]
-    Cost,
-    /// Angle between end and truth.
-    Error,
-    /// Which place the run ended at.
-    Winner,
-}
-
-impl BasinColor {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cost => "Cost",
-            Self::Error => "Angle error",
-            Self::Winner => "End",
-        }
-    }
-}
-
-/// A step kept for comparison.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pin {
-    /// The pair.
-    pub pair: PairKey,
-    /// The imprint.
-    pub source: ImprintSource,
-    /// The registration.
-    pub engine: PoseEngine,
-    /// The start it belongs to.
-    pub run: usize,
-    /// Its position in the run.
-    pub at: usize,
-    /// The pose, `grasp_from_object`.
-    pub grasp_from_object: PlanarPose,
-    /// Cost per point there, square meters.
-    pub cost_m2: f64,
-    /// Width of the kernel that the cost is of, meters; infinite without one.
-    pub kernel_m: f64,
-}
+use crate::work::error::TaskError;
 
 /// What a person does with the time machine and the basin map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -135,54 +48,104 @@ pub enum InspectCommand {
     StopBasin,
 }
 
-/// The step that is looked at.
-#[derive(Clone, Copy, Debug)]
-pub struct Inspected<'a> {
-    /// The recorded registration.
-    pub inspection: &'a Arc<Inspection>,
-    /// The start.
-    pub run: usize,
-    /// Position of the step in its run.
-    pub at: usize,
-    /// The step.
-    pub step: &'a TraceStep,
-}
-
-impl Inspected<'_> {
-    /// Whether it is the last step of its run.
-    pub fn is_last(&self) -> bool {
-        self.at + 1 >= self.inspection.num_steps(self.run)
+pub(super) fn step(state: &mut State, command: InspectCommand) {
+    match command {
+        InspectCommand::Source(source) => {
+            if state.inspect.source != source {
+                state.inspect.source = source;
+                rewind(state);
+            }
+        }
+        InspectCommand::Start(start) => {
+            let start = start.filter(|s| s.is_finite()).map(Into::into);
+            rewind(state);
+            // A run that was loaded is watched from where it began.
+            state.inspect.at = start.is_some().then_some(0);
+            state.inspect.start = start;
+        }
+        InspectCommand::Run(run) => {
+            state.inspect.run = Some(run);
+            state.inspect.at = None;
+            state.inspect.playing = false;
+        }
+        InspectCommand::Go { run, at } => {
+            state.inspect.run = Some(run);
+            state.inspect.playing = false;
+            go(state, at);
+        }
+        InspectCommand::By(by) => {
+            let Some(here) = state.inspected().map(|s| s.at) else { return };
+            let to = (here as i64).saturating_add(by).max(0) as usize;
+            go(state, to);
+            if state.inspect.at.is_none() || by < 0 {
+                state.inspect.playing = false;
+            }
+        }
+        InspectCommand::Begin => {
+            state.inspect.playing = false;
+            go(state, 0);
+        }
+        InspectCommand::End => {
+            state.inspect.playing = false;
+            state.inspect.at = None;
+        }
+        InspectCommand::Play(play) => {
+            let Some((last, steps)) = state.inspected().map(|s| (s.is_last(), s.inspection.num_steps(s.run))) else {
+                return;
+            };
+            state.inspect.playing = play && steps > 1;
+            if state.inspect.playing && last {
+                state.inspect.at = Some(0);
+            }
+        }
+        InspectCommand::Pin => pin(state),
+        InspectCommand::Unpin(which) => {
+            if let Some(pin) = state.inspect.pins.get_mut(which) {
+                *pin = None;
+            }
+        }
+        InspectCommand::Lines(lines) => state.inspect.lines = lines,
+        InspectCommand::Plane(plane) => state.inspect.plane = plane,
+        InspectCommand::Color(color) => state.inspect.color = color,
+        InspectCommand::StopBasin => {
+            // What failed is not wanted any more, until somebody asks for it again; the runtime stops it.
+            if let Ok(Some(key)) = state.basin_key()
+                && !state.results.basins.contains(&key)
+            {
+                state.tasks.failed.insert(Request::Basin(key), TaskError::cancelled("Basin map"));
+            }
+        }
     }
 }
 
-impl State {
-    /// The step that is looked at, of the run shown (also of the one before, while the next is computed).
-    pub fn inspected(&self) -> Option<Inspected<'_>> {
-        let inspection = self.inspection().shown()?;
-        let last_run = inspection.num_runs().checked_sub(1)?;
-        let run = self.inspect.run.unwrap_or(inspection.report().winner).min(last_run);
-        let last = inspection.num_steps(run).checked_sub(1)?;
-        let at = self.inspect.at.unwrap_or(last).min(last);
-        Some(Inspected { inspection, run, at, step: inspection.step(run, at)? })
-    }
+/// Shows a step of the run shown; at its end the end is meant, however many steps another run has.
+fn go(state: &mut State, at: usize) {
+    let Some(steps) = state.inspected().map(|s| s.inspection.num_steps(s.run)) else { return };
+    state.inspect.at = (at + 1 < steps).then_some(at);
+}
 
-    /// Whether something on screen shows a step of an imprint's registration.
-    pub fn shows_steps(&self, source: ImprintSource) -> bool {
-        let scene = match source {
-            ImprintSource::Measured => Pane::SceneMeasured,
-            ImprintSource::Predicted => Pane::ScenePredicted,
-        };
-        let lines = self.workbench.layer == Layer::Correspondences && self.selection.panes.contains(&scene);
-        self.inspect.source == source && (lines || self.selection.panes.contains(&Pane::TimeMachine))
-    }
+/// Back to the end of the winner of the registration's own starts: another pair or imprint is looked at.
+pub(super) fn rewind(state: &mut State) {
+    let inspect = &mut state.inspect;
+    (inspect.start, inspect.run, inspect.at, inspect.playing) = (None, None, None, false);
+}
 
-    /// The step that the 3D view of a side shows instead of the registered pose.
-    pub fn inspected_in(&self, source: ImprintSource) -> Option<Inspected<'_>> {
-        if self.shows_steps(source) { self.inspected() } else { None }
-    }
-
-    /// The kept steps of the selected pair.
-    pub fn pins(&self) -> [Option<Pin>; 2] {
-        self.inspect.pins.map(|pin| pin.filter(|p| Some(p.pair) == self.pair_key()))
-    }
+fn pin(state: &mut State) {
+    let (Some(shown), Some(pair)) = (state.inspected(), state.pair_key()) else { return };
+    let new = Pin {
+        pair,
+        source: state.inspect.source,
+        engine: state.settings.pose_engine,
+        run: shown.run,
+        at: shown.at,
+        grasp_from_object: shown.step.grasp_from_object,
+        cost_m2: shown.step.cost_m2,
+        kernel_m: shown.step.kernel_m,
+    };
+    let [first, second] = state.pins();
+    state.inspect.pins = match (first, second) {
+        (None, second) => [Some(new), second],
+        (Some(first), None) => [Some(first), Some(new)],
+        (Some(_), Some(second)) => [Some(second), Some(new)],
+    };
 }

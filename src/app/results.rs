@@ -7,10 +7,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::jobs::Job;
+use super::jobs::{Job, Lane};
 use super::keys::{DatasetSeq, ImprintSource, PairKey, TouchKey};
 use super::services::SharedServices;
 use super::state::{Absent, Lookup, State};
+use super::wanted::Wanted;
 use crate::work::error::TaskError;
 
 pub mod ambiguity;
@@ -40,9 +41,6 @@ pub use preview::Preview;
 pub trait Computes: Clone + Ord + Send + 'static {
     /// The result.
     type Value: Send + Sync + 'static;
-
-    /// The opening of the data set that it is about; the result of an earlier one is dropped.
-    fn dataset(&self) -> Option<DatasetSeq>;
 
     /// The job, with its inputs gathered; `None` if one is not there (any more).
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Self::Value>>;
@@ -157,17 +155,8 @@ macro_rules! results {
         }
 
         impl Request {
-            /// The opening of the data set that it is about.
-            pub fn dataset(&self) -> Option<DatasetSeq> {
-                match self { $( Self::$variant(key) => key.dataset(), )* }
-            }
-
             /// Its job; `None` if an input is not there (any more).
             pub(super) fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Computed>> {
-                let open = state.library.open.as_ref()?;
-                if self.dataset().is_some_and(|seq| seq != open.seq) {
-                    return None;
-                }
                 match self { $( Self::$variant(key) => {
                     let done = key.clone();
                     Some(key.job(state, services)?.map(move |value| Computed::$variant(done, Arc::new(value))))

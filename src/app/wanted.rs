@@ -2,12 +2,12 @@
 //!
 //! Each result says in its own file when it is asked for; here stands what is more urgent than what.
 
-use super::command::Pane;
-use super::inspect::INSPECT_PANES;
+use super::inspect::state::INSPECT_PANES;
 use super::keys::ImprintSource;
 use super::results::labels::LabelsKey;
 use super::results::{Cached, Request};
 use super::state::State;
+use super::view::state::Pane;
 
 /// Neighbors loaded ahead on each side of the selection.
 pub const PREFETCH: usize = 4;

@@ -1,12 +1,7 @@
 //! What a GelSlim image leaves open.
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, TouchKey};
-use super::super::services::SharedServices;
-use super::super::state::State;
-use super::super::wanted::Wanted;
-use super::Computes;
 use super::imprint::gone;
+use super::{Computes, Job, Lane, SharedServices, State, TouchKey, Wanted};
 use crate::domain::ambiguity::{Ambiguity, ambiguity};
 use crate::domain::rig::PadId;
 
@@ -17,10 +12,6 @@ pub struct AmbiguityKey(pub TouchKey);
 impl Computes for AmbiguityKey {
     /// `None` for an image without a finite pixel.
     type Value = Option<Ambiguity>;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        Some(self.0.pair.dataset)
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Self::Value>> {
         let (sample, finger) = (state.results.samples.get(&self.0.pair)?.clone(), self.0.finger);

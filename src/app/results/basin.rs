@@ -2,14 +2,9 @@
 
 use std::sync::Arc;
 
-use super::super::command::Pane;
-use super::super::jobs::{Job, Lane};
-use super::super::keys::DatasetSeq;
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::super::wanted::Wanted;
-use super::Computes;
+use super::super::view::state::Pane;
 use super::pose::{PoseKey, Registered};
+use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, Wanted};
 use crate::domain::align::basin::{Basin, Plane};
 use crate::work::pose::basin;
 
@@ -24,10 +19,6 @@ pub struct BasinKey {
 
 impl Computes for BasinKey {
     type Value = Basin;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.pose.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Basin>> {
         let Registered { clouds, tool, .. } = self.pose.find(state)?;

@@ -2,14 +2,10 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, ImprintSource, PairKey};
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::super::wanted::Wanted;
+use super::Latest;
 use super::imprint::{Imprint, ImprintKey};
 use super::mask::MaskVersion;
-use super::{Computes, Latest};
+use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State, Wanted};
 use crate::domain::grid::Mask;
 use crate::domain::rig::PerPad;
 use crate::work::cloud::{Clouds, clouds};
@@ -35,10 +31,6 @@ impl CloudKey {
 
 impl Computes for CloudKey {
     type Value = Clouds;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        Some(self.place()?.0.dataset)
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Clouds>> {
         let mut parts: PerPad<(Imprint, Option<Arc<Mask>>)> = PerPad::default();

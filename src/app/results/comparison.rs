@@ -1,13 +1,9 @@
 //! A prediction against the measurement.
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, ImprintSource, ShiftMode, TouchKey};
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::super::wanted::Wanted;
-use super::Computes;
+use super::super::keys::ShiftMode;
 use super::imprint::{Imprint, MetersKey};
 use super::prediction::PredictionKey;
+use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
 use crate::domain::rig::PadId;
 use crate::work::compare::{Comparison, compare_parts};
 
@@ -17,10 +13,6 @@ pub struct ComparisonKey(pub PredictionKey, pub ShiftMode);
 
 impl Computes for ComparisonKey {
     type Value = Comparison;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.0.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Comparison>> {
         let touch = self.0.touch;

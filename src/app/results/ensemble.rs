@@ -1,12 +1,9 @@
 //! Mean and spreads of several predictions of one touch.
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, ShiftMode};
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::Computes;
+use super::super::keys::ShiftMode;
 use super::imprint::MetersKey;
 use super::prediction::PredictionKey;
+use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State};
 use crate::domain::rig::PadId;
 use crate::work::ensemble::{Ensemble, ensemble};
 
@@ -21,10 +18,6 @@ pub struct EnsembleKey {
 
 impl Computes for EnsembleKey {
     type Value = Ensemble;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.recipes.first()?.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Ensemble>> {
         let (results, shift) = (&state.results, self.shift);

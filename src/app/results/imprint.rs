@@ -2,13 +2,9 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, ImprintSource, ShiftMode, TouchKey};
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::super::wanted::Wanted;
-use super::Computes;
+use super::super::keys::ShiftMode;
 use super::prediction::PredictionKey;
+use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::rig::{PadId, SensorKind};
 use crate::domain::sample::Sample;
@@ -21,10 +17,6 @@ pub struct MetersKey(pub PredictionKey, pub ShiftMode);
 
 impl Computes for MetersKey {
     type Value = DepthMap;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.0.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
         let Self(recipe, shift) = self;
@@ -48,10 +40,6 @@ pub struct ColorKey(pub PredictionKey);
 
 impl Computes for ColorKey {
     type Value = RgbGrid;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.0.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<RgbGrid>> {
         let prediction = state.results.predictions.get(&self.0)?.clone();

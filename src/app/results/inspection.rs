@@ -4,14 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, PoseEngine};
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::super::wanted::Wanted;
-use super::Computes;
+use super::super::keys::PoseEngine;
 use super::pose::Registered;
 use super::run::RunKey;
+use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, Wanted};
 use crate::domain::align::{AlignReport, TraceStep};
 use crate::domain::frames::PlanarPose;
 use crate::domain::inspect::Counterparts;
@@ -24,10 +20,6 @@ pub struct InspectionKey(pub RunKey);
 
 impl Computes for InspectionKey {
     type Value = Inspection;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.0.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Inspection>> {
         let (Registered { clouds, tool, .. }, engine) = (self.0.pose.find(state)?, self.0.pose.engine);

@@ -2,12 +2,8 @@
 
 use std::sync::Arc;
 
-use super::super::document::{PairLabels, Stored};
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, PairKey};
-use super::super::services::SharedServices;
-use super::super::state::State;
-use super::Computes;
+use super::super::labels::state::{PairLabels, Stored};
+use super::{Computes, Job, Lane, PairKey, SharedServices, State};
 use crate::work::error::TaskError;
 
 /// The labels stored for a pair.
@@ -22,10 +18,6 @@ impl LabelsKey {
 
 impl Computes for LabelsKey {
     type Value = PairLabels;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        Some(self.0.dataset)
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PairLabels>> {
         let (source, name) = (state.library.open.as_ref()?.source.clone(), self.name(state)?);

@@ -2,14 +2,9 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, ImprintSource};
-use super::super::services::SharedServices;
-use super::super::state::{Lookup, State};
-use super::super::wanted::Wanted;
-use super::Computes;
 use super::pose::PoseKey;
 use super::run::RunKey;
+use super::{Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
 use crate::domain::grid::Mask;
 use crate::domain::rig::PerPad;
 use crate::work::layers::{LayerResult, layers};
@@ -26,10 +21,6 @@ impl LayersKey {
 
 impl Computes for LayersKey {
     type Value = LayerResult;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.0.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<LayerResult>> {
         let clouds = state.results.clouds.get(&self.0.cloud)?.clone();

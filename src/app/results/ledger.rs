@@ -1,12 +1,8 @@
 //! The depth chain of a prediction, stage by stage.
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, ShiftMode, TouchKey};
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::super::wanted::Wanted;
-use super::Computes;
+use super::super::keys::ShiftMode;
 use super::prediction::PredictionKey;
+use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
 use crate::domain::rig::PadId;
 use crate::work::ledger::{LedgerResult, of_prediction};
 
@@ -16,10 +12,6 @@ pub struct LedgerKey(pub PredictionKey, pub ShiftMode);
 
 impl Computes for LedgerKey {
     type Value = LedgerResult;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.0.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<LedgerResult>> {
         let Self(recipe, shift) = self.clone();

@@ -2,17 +2,14 @@
 
 use std::sync::Arc;
 
-use super::super::document::HandMask;
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, ImprintSource, MaskRecipe, Revision};
-use super::super::services::SharedServices;
-use super::super::settings::MaskSource;
-use super::super::state::{Absent, Lookup, State};
-use super::super::tasks::Level;
-use super::super::wanted::Wanted;
+use super::super::keys::{MaskRecipe, Revision};
+use super::super::labels::state::HandMask;
+use super::super::settings::state::MaskSource;
+use super::super::tasks::state::Level;
+use super::Request;
 use super::imprint::ImprintKey;
 use super::tool::ToolKey;
-use super::{Computes, Request};
+use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
 use crate::domain::contact::{ContactMask, MaskBasis};
 use crate::domain::grid::Mask;
 use crate::domain::rig::PadId;
@@ -72,10 +69,6 @@ impl From<ContactMask> for AutomaticMask {
 
 impl Computes for MaskKey {
     type Value = AutomaticMask;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        Some(self.imprint.touch().pair.dataset)
-    }
 
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<AutomaticMask>> {
         let imprint = self.imprint.find(state)?;

@@ -2,15 +2,11 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, ImprintSource, PoseEngine};
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::super::wanted::Wanted;
-use super::super::workbench::PoseOf;
-use super::Computes;
+use super::super::keys::PoseEngine;
+use super::super::workbench::state::PoseOf;
 use super::cloud::CloudKey;
 use super::tool::ToolKey;
+use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
 use crate::domain::frames::PlanarPose;
 use crate::domain::rig::PerPad;
 use crate::work::cloud::Clouds;
@@ -51,10 +47,6 @@ impl PoseKey {
 
 impl Computes for PoseKey {
     type Value = PoseResult;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.cloud.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
         let (Registered { clouds, tool, truth }, engine) = (self.find(state)?, self.engine);

@@ -4,13 +4,10 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{Bits, DatasetSeq, Sampler, Spacing, TouchKey};
-use super::super::services::{DataSource, Services, SharedServices};
-use super::super::state::State;
-use super::super::wanted::Wanted;
-use super::Computes;
+use super::super::keys::{Bits, Sampler, Spacing};
+use super::super::services::{DataSource, Services};
 use super::preview::Onlooker;
+use super::{Computes, Job, Lane, SharedServices, State, TouchKey, Wanted};
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::RgbGrid;
 use crate::domain::rig::{PadId, SensorId};
@@ -77,10 +74,6 @@ impl PredictionKey {
 impl Computes for PredictionKey {
     type Value = Prediction;
 
-    fn dataset(&self) -> Option<DatasetSeq> {
-        Some(self.touch.pair.dataset)
-    }
-
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
         let (services, recipe) = (services.clone(), self.clone());
         let source = state.library.open.as_ref()?.source.clone();
@@ -116,10 +109,6 @@ pub struct SeedKey(pub PredictionKey);
 impl Computes for SeedKey {
     type Value = Prediction;
 
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.0.dataset()
-    }
-
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
         self.0.job(state, services)
     }
@@ -139,10 +128,6 @@ pub struct StoredKey(pub TouchKey);
 
 impl Computes for StoredKey {
     type Value = Keyed;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        Some(self.0.pair.dataset)
-    }
 
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Keyed>> {
         let (services, touch) = (services.clone(), self.0);
@@ -176,7 +161,7 @@ impl Computes for StoredKey {
 impl State {
     /// Keeps a prediction of the open data set, and shows it.
     pub(crate) fn keep_prediction(&mut self, recipe: PredictionKey, made: Arc<Prediction>) {
-        if self.library.open.as_ref().map(|open| open.seq) == recipe.dataset() {
+        if self.library.open.as_ref().is_some_and(|open| open.seq == recipe.touch.pair.dataset) {
             super::Computed::Prediction(recipe, made).keep(self);
         }
     }

@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::super::command::Pane;
-use super::super::keys::{ShiftMode, TouchKey};
-use super::super::state::State;
+use super::super::keys::ShiftMode;
+use super::super::view::state::Pane;
 use super::prediction::PredictionKey;
+use super::{State, TouchKey};
 use crate::domain::rig::PadId;
 use crate::work::job::{PreviewPicture, Previews};
 

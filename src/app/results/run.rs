@@ -1,11 +1,8 @@
 //! Registrations with everything recorded: every step, and what became of every point.
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, ImprintSource, PoseBits};
-use super::super::services::SharedServices;
-use super::super::state::State;
-use super::Computes;
+use super::super::keys::PoseBits;
 use super::pose::{PoseKey, Registered};
+use super::{Computes, ImprintSource, Job, Lane, SharedServices, State};
 use crate::work::pose::{PoseResult, run};
 
 /// A registration with everything recorded: every step, and what became of every point.
@@ -19,10 +16,6 @@ pub struct RunKey {
 
 impl Computes for RunKey {
     type Value = PoseResult;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        self.pose.dataset()
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
         let Registered { clouds, tool, truth } = self.pose.find(state)?;

@@ -1,20 +1,12 @@
 //! The tensors of a pair.
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, PairKey};
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::Computes;
+use super::{Absent, Computes, Job, Lane, Lookup, PairKey, SharedServices, State};
 use crate::domain::rig::PadId;
 use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use crate::work::error::TaskError;
 
 impl Computes for PairKey {
     type Value = Sample;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        Some(self.dataset)
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Sample>> {
         let (source, pair) = (state.library.open.as_ref()?.source.clone(), self.pair);

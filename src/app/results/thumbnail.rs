@@ -1,12 +1,7 @@
 //! The small pictures of the list.
 
-use super::super::command::Pane;
-use super::super::jobs::{Job, Lane};
-use super::super::keys::{DatasetSeq, PairKey};
-use super::super::services::SharedServices;
-use super::super::state::State;
-use super::super::wanted::Wanted;
-use super::Computes;
+use super::super::view::state::Pane;
+use super::{Computes, Job, Lane, PairKey, SharedServices, State, Wanted};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::DepthMap;
 use crate::work::imprint;
@@ -17,10 +12,6 @@ pub struct ThumbnailKey(pub PairKey);
 
 impl Computes for ThumbnailKey {
     type Value = DepthMap;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        Some(self.0.dataset)
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
         let (source, pair) = (state.library.open.as_ref()?.source.clone(), self.0.pair);

@@ -2,12 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::jobs::{Job, Lane};
-use super::super::keys::DatasetSeq;
-use super::super::services::SharedServices;
-use super::super::state::{Absent, Lookup, State};
-use super::super::wanted::Wanted;
-use super::Computes;
+use super::{Absent, Computes, DatasetSeq, Job, Lane, Lookup, SharedServices, State, Wanted};
 use crate::work::error::TaskError;
 use crate::work::tool::{NamedTool, named_tool};
 
@@ -22,10 +17,6 @@ pub struct ToolKey {
 
 impl Computes for ToolKey {
     type Value = NamedTool;
-
-    fn dataset(&self) -> Option<DatasetSeq> {
-        Some(self.dataset)
-    }
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<NamedTool>> {
         let (source, name) = (state.library.open.as_ref()?.source.clone(), self.name.clone());

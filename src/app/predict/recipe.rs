@@ -1,7 +1,7 @@
 //! What would be generated now.
 
-use super::keys::{ImprintSource, PredictionKey, TouchKey};
-use super::state::{Absent, State};
+use super::super::keys::{ImprintSource, PredictionKey, TouchKey};
+use super::super::state::{Absent, State};
 use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::work::bundles::{BundleInfo, BundleKind};
