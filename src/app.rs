@@ -1,25 +1,31 @@
 //! The application model: state, commands, jobs. No window.
 //!
 //! * [`state::State`] holds everything the studio shows; views get `&State`.
-//! * [`command::Command`] is what can happen to it; [`apply::apply`] is the only writer and is pure:
+//! * [`command::Command`] is what can happen to it, by room; [`apply::apply`] is the only writer and is pure:
 //!   work and files come out as [`effect::Effect`]s.
+//! * A room is a feature ([`library`], [`follow`], [`view`], [`predict`], [`seeds`], [`labels`], [`inspect`],
+//!   [`workbench`], [`evaluate`], [`settings`], [`tasks`]): its file has its commands and what they do, `state.rs` in its
+//!   folder what it keeps and how views find it.
+//! * [`results`] is the table of what is computed: each kind with its recipe, its job and its look-up in one file.
 //! * [`state::State::wanted`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
 //!   its lanes (files, computing, models) and answers with commands.
 //! * [`action::Action`] is the table of what a person can trigger: menus, palette and shortcut sheet are made from it.
 //! * [`services`] joins the model to files and models; the command line calls the same functions.
 
 pub mod action;
+pub mod answers;
 pub mod apply;
 pub mod command;
-pub mod document;
 pub mod effect;
-pub mod evaluation;
-mod generating;
+pub mod evaluate;
+pub mod follow;
 pub mod history;
 pub mod inspect;
 pub mod jobs;
 pub mod keys;
+pub mod labels;
 pub mod library;
+pub mod predict;
 pub mod results;
 pub mod runtime;
 pub mod seeds;
@@ -27,5 +33,6 @@ pub mod services;
 pub mod settings;
 pub mod state;
 pub mod tasks;
+pub mod view;
 pub mod wanted;
 pub mod workbench;

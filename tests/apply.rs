@@ -12,9 +12,11 @@ use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{Command, Pane, UiRequest};
+use touch2touch::app::command::{
+    Answer, Command, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
+};
 use touch2touch::app::jobs::Lane;
-use touch2touch::app::keys::{ImprintSource, Request, ShiftMode};
+use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::tasks::Level;
@@ -26,7 +28,7 @@ use double::{Bench, IMPRINT_SIZE};
 const RIGHT: PadId = lab::RIGHT;
 
 fn panes(list: &[Pane]) -> Command {
-    Command::ShowPanes(list.iter().copied().collect::<BTreeSet<_>>())
+    Command::View(ViewCommand::ShowPanes(list.iter().copied().collect::<BTreeSet<_>>()))
 }
 
 #[test]
@@ -40,7 +42,7 @@ fn from_opening_to_the_figures() {
     assert!(bench.state.tasks.is_idle());
     assert_eq!(bench.state.imprint(ImprintSource::Measured, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
     assert!(matches!(bench.state.imprint(ImprintSource::Predicted, RIGHT), Lookup::Absent(Absent::NoPrediction)));
-    bench.send(Command::Generate);
+    bench.send(PredictCommand::Generate);
     let task = bench.state.tasks.running.values().next().unwrap();
     assert_eq!(
         (bench.state.tasks.running.len(), task.recipes.len()),
@@ -56,17 +58,17 @@ fn from_opening_to_the_figures() {
     assert!(comparison.psnr_db.is_some_and(f64::is_finite) && comparison.mae_m > 0.0);
     // The same recipe again is there already.
     let runs = bench.services.generated();
-    bench.send(Command::Generate);
+    bench.send(PredictCommand::Generate);
     assert!(bench.state.tasks.running.is_empty());
     assert_eq!(bench.services.generated(), runs);
     // Another range mapping needs no model.
-    bench.send(Command::SetShift(ShiftMode::Raw));
+    bench.send(SettingsCommand::SetShift(ShiftMode::Raw));
     bench.settle();
     assert!(bench.state.comparison(RIGHT).ready().is_some());
     assert_eq!(bench.services.generated(), runs);
     // A bundle without statistics has no paper shift: the pane says so, the log does not repeat it.
     let errors = bench.errors();
-    bench.send(Command::SetShift(ShiftMode::PaperShift));
+    bench.send(SettingsCommand::SetShift(ShiftMode::PaperShift));
     bench.settle();
     assert!(matches!(bench.state.imprint(ImprintSource::Predicted, RIGHT), Lookup::Failed(_)));
     assert_eq!(bench.errors(), errors);
@@ -85,7 +87,7 @@ fn what_is_not_on_screen_is_not_computed() {
     assert_eq!(loaded, 5, "the pair shown and four neighbors on the one side that has any");
     assert!(bench.state.results.masks.is_empty() && bench.state.results.clouds.is_empty());
     bench.send(panes(&[Pane::Browser]));
-    bench.send(Command::ShowRows(0..3));
+    bench.send(LibraryCommand::ShowRows(0..3));
     bench.settle();
     assert_eq!(bench.state.results.thumbnails.len(), 3);
     bench.send(panes(&[Pane::Measured]));
@@ -99,18 +101,18 @@ fn a_late_result_lands_under_its_own_key() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
-    bench.send(Command::Generate);
+    bench.send(PredictCommand::Generate);
     let first = bench.state.pair_key().unwrap();
-    bench.send(Command::Step(1));
+    bench.send(LibraryCommand::Step(1));
     bench.settle();
     assert!(bench.state.chosen(RIGHT).is_none(), "the pair now shown has no prediction");
     assert!(bench.state.results.chosen.contains_key(&first.finger(RIGHT)));
-    bench.send(Command::Step(-1));
+    bench.send(LibraryCommand::Step(-1));
     bench.settle();
     assert!(bench.state.imprint(ImprintSource::Predicted, RIGHT).ready().is_some());
     // Of a data set that is not open any more nothing is kept.
-    bench.send(Command::GenerateNewSeed);
-    bench.send(Command::Reload);
+    bench.send(PredictCommand::GenerateNewSeed);
+    bench.send(LibraryCommand::Reload);
     bench.settle();
     assert!(bench.state.results.predictions.is_empty() && bench.state.tasks.running.is_empty());
     assert_eq!(bench.state.pair_name(), "tool_a/data_0");
@@ -119,13 +121,13 @@ fn a_late_result_lands_under_its_own_key() {
 #[test]
 fn only_the_last_opening_counts() {
     let mut bench = Bench::open();
-    bench.send(Command::Open(Place::Path("slow".into())));
-    bench.send(Command::Open(Place::Path("missing".into())));
-    bench.send(Command::Open(Place::Demo));
+    bench.send(LibraryCommand::Open(Place::Path("slow".into())));
+    bench.send(LibraryCommand::Open(Place::Path("missing".into())));
+    bench.send(LibraryCommand::Open(Place::Demo));
     bench.settle();
     assert_eq!(bench.state.library.open.as_ref().unwrap().place, Place::Demo);
     assert_eq!((bench.state.library.opening.clone(), bench.errors()), (None, 0));
-    bench.send(Command::Open(Place::Path("missing".into())));
+    bench.send(LibraryCommand::Open(Place::Path("missing".into())));
     bench.settle();
     assert!(bench.state.library.failure.is_some());
     assert_eq!(bench.errors(), 1);
@@ -138,14 +140,14 @@ fn jobs_stop_when_told() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
-    bench.send(Command::Generate);
-    bench.send(Command::CancelAll);
+    bench.send(PredictCommand::Generate);
+    bench.send(TasksCommand::CancelAll);
     bench.tick();
     assert!(bench.state.tasks.running.is_empty(), "waiting jobs end without their turn");
     assert_eq!(bench.services.generated(), 0);
     // One that runs sees the flag at its next step.
     bench.services.cancel_itself_at_step(2);
-    bench.send(Command::Generate);
+    bench.send(PredictCommand::Generate);
     bench.settle();
     assert!(bench.state.tasks.running.is_empty() && bench.state.results.predictions.is_empty());
     assert_eq!(bench.errors(), 0, "being told to stop is no error");
@@ -157,10 +159,10 @@ fn progress_is_the_latest() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
-    bench.send(Command::Generate);
+    bench.send(PredictCommand::Generate);
     let (ticket, _) = bench.state.tasks.running.iter().next().unwrap();
     let ticket = *ticket;
-    bench.send(Command::Progressed(ticket, touch2touch::work::job::Progress { done: 3, total: 4, text: "x".into() }));
+    bench.send(Answer::Progressed(ticket, touch2touch::work::job::Progress { done: 3, total: 4, text: "x".into() }));
     assert_eq!(bench.state.tasks.running[&ticket].progress.fraction(), Some(0.75));
     bench.settle();
     assert!(bench.state.tasks.running.is_empty());
@@ -174,7 +176,7 @@ fn a_failure_is_said_once_and_not_tried_again_by_itself() {
     bench.settle();
     assert_eq!(bench.errors(), 0, "pair 1 was only loaded ahead");
     let loads = bench.services.source.loads();
-    bench.send(Command::Select(PairId(1)));
+    bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
     assert_eq!(bench.errors(), 1);
     assert!(matches!(bench.state.imprint(ImprintSource::Measured, RIGHT), Lookup::Failed(_)));
@@ -182,7 +184,7 @@ fn a_failure_is_said_once_and_not_tried_again_by_itself() {
     assert_eq!((bench.errors(), bench.services.source.loads_of(1)), (1, 1));
     assert!(bench.services.source.loads() > loads, "the neighbors are loaded all the same");
     bench.services.source.heal();
-    bench.send(Command::Retry);
+    bench.send(TasksCommand::Retry);
     bench.settle();
     assert!(bench.state.imprint(ImprintSource::Measured, RIGHT).ready().is_some());
 }
@@ -195,10 +197,10 @@ fn a_panic_in_a_job_is_caught_and_the_lane_goes_on() {
     bench.send(panes(&[Pane::Measured]));
     bench.settle();
     assert_eq!(bench.errors(), 1);
-    bench.send(Command::Select(PairId(1)));
+    bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
     assert!(bench.state.imprint(ImprintSource::Measured, RIGHT).ready().is_some());
-    bench.send(Command::Generate);
+    bench.send(PredictCommand::Generate);
     bench.settle();
     assert!(bench.state.tasks.running.is_empty());
     let last = bench.state.log.entries.back().unwrap();
@@ -212,7 +214,7 @@ fn the_newest_request_replaces_a_waiting_one() {
     bench.send(panes(&[Pane::Measured]));
     // Scrubbing: nothing runs meanwhile.
     for _ in 0..11 {
-        bench.send(Command::Step(1));
+        bench.send(LibraryCommand::Step(1));
     }
     let last = bench.state.pair_key().unwrap();
     assert_eq!(last.pair, PairId(11));
@@ -239,27 +241,27 @@ fn a_request_that_runs_is_not_started_twice() {
 #[test]
 fn the_list_filters_and_sorts() {
     let mut bench = Bench::open();
-    bench.send(Command::SetFilter("TOOL_B 1".into()));
+    bench.send(LibraryCommand::SetFilter("TOOL_B 1".into()));
     let names: Vec<&str> =
         bench.state.library.order.iter().map(|id| bench.state.library.entry(*id).unwrap().name.as_str()).collect();
     assert_eq!(names, ["tool_b/data_1"]);
     // What is selected was filtered away: the first step goes to the first of the list, and stays there.
-    bench.send(Command::Step(1));
-    bench.send(Command::Step(1));
+    bench.send(LibraryCommand::Step(1));
+    bench.send(LibraryCommand::Step(1));
     assert_eq!(bench.state.pair_name(), "tool_b/data_1");
-    bench.send(Command::SetFilter("nothing like it".into()));
-    bench.send(Command::First);
-    bench.send(Command::Step(i64::MIN));
-    bench.send(Command::NextUnfinished);
+    bench.send(LibraryCommand::SetFilter("nothing like it".into()));
+    bench.send(LibraryCommand::First);
+    bench.send(LibraryCommand::Step(i64::MIN));
+    bench.send(LibraryCommand::NextUnfinished);
     assert!(bench.state.library.order.is_empty());
-    bench.send(Command::SetFilter(String::new()));
-    bench.send(Command::SetToolFilter(Some("tool_b".into())));
+    bench.send(LibraryCommand::SetFilter(String::new()));
+    bench.send(LibraryCommand::SetToolFilter(Some("tool_b".into())));
     for sort in Sort::iter() {
-        bench.send(Command::SetSort(sort));
+        bench.send(LibraryCommand::SetSort(sort));
         assert_eq!(bench.state.library.order.len(), 6);
     }
-    bench.send(Command::Last);
-    bench.send(Command::Step(i64::MAX));
+    bench.send(LibraryCommand::Last);
+    bench.send(LibraryCommand::Step(i64::MAX));
     assert_eq!(bench.state.pair_name(), "tool_b/data_5");
 }
 
@@ -268,13 +270,17 @@ fn preferences_are_kept_in_range_and_saved() {
     let mut bench = Bench::open();
     bench.settle();
     let saved = bench.services.settings_saved();
-    bench.send(Command::SetBrushRadius(f32::NAN));
-    bench.send(Command::SetBrushRadius(1e9));
+    bench.send(SettingsCommand::SetBrushRadius(f32::NAN));
+    bench.send(SettingsCommand::SetBrushRadius(1e9));
     assert_eq!(bench.state.settings.mask.radius_px, 40.0);
-    bench.send(Command::SetMaskOpacity(-3.0));
+    bench.send(SettingsCommand::SetMaskOpacity(-3.0));
     assert_eq!(bench.state.settings.mask_opacity, 0.0);
     let range = bench.state.settings.range;
-    bench.send(Command::SetRange(touch2touch::app::settings::ColorRange { min_m: 1.0, max_m: f32::NAN, ..range }));
+    bench.send(SettingsCommand::SetRange(touch2touch::app::settings::ColorRange {
+        min_m: 1.0,
+        max_m: f32::NAN,
+        ..range
+    }));
     assert_eq!(bench.state.settings.range, range);
     bench.settle();
     assert_eq!(bench.services.settings_saved(), saved + 1, "changes that wait for the disk become one");
@@ -286,14 +292,14 @@ fn the_color_range_stays_until_it_is_told_otherwise() {
     bench.send(panes(&[Pane::Measured]));
     bench.settle();
     let range = bench.state.settings.range;
-    bench.send(Command::Step(3));
+    bench.send(LibraryCommand::Step(3));
     bench.settle();
     assert_eq!(bench.state.settings.range, range);
-    bench.send(Command::RangeFromShown);
+    bench.send(SettingsCommand::RangeFromShown);
     assert_ne!(bench.state.settings.range, range);
     let fitted = bench.state.settings.range;
-    bench.send(Command::SetRange(touch2touch::app::settings::ColorRange { locked: false, ..fitted }));
-    bench.send(Command::Step(1));
+    bench.send(SettingsCommand::SetRange(touch2touch::app::settings::ColorRange { locked: false, ..fitted }));
+    bench.send(LibraryCommand::Step(1));
     bench.settle();
     assert_ne!(bench.state.settings.range.max_m, fitted.max_m, "unlocked, it follows the pair");
 }
@@ -301,8 +307,7 @@ fn the_color_range_stays_until_it_is_told_otherwise() {
 #[test]
 fn what_only_the_window_can_do_is_handed_out_once() {
     let mut bench = Bench::open();
-    let mut out = bench.runtime.tick(&mut bench.state, vec![Command::Ui(UiRequest::Fit)]);
+    let mut out = bench.runtime.tick(&mut bench.state, vec![Command::View(ViewCommand::Ui(UiRequest::Fit))]);
     assert_eq!(out.pop(), Some(UiRequest::Fit));
     assert!(bench.runtime.tick(&mut bench.state, Vec::new()).is_empty());
-    assert!(Request::Sample(bench.state.pair_key().unwrap()).dataset().is_some());
 }

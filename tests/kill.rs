@@ -17,9 +17,9 @@ use std::time::Duration;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use touch2touch::app::command::{Command, Opened, Pane};
-use touch2touch::app::document::{PairLabels, Review};
+use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Opened, Pane, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::labels::{PairLabels, Review};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::{LiveSource, open_source};
@@ -134,23 +134,34 @@ impl Services for Files {
 /// The script of a seed: what a person does, one gesture an act.
 fn script(seed: u64) -> Vec<Vec<Command>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let mut acts = vec![vec![Command::Select(PairId(rng.random_range(0..PAIRS)))]];
+    let mut acts = vec![vec![Command::Library(LibraryCommand::Select(PairId(rng.random_range(0..PAIRS))))]];
     while acts.len() < ACTS {
         let finger = if rng.random() { lab::RIGHT } else { lab::LEFT };
         acts.push(match rng.random_range(0..20) {
             0..11 => {
                 let mut at = || [rng.random_range(0.0..175.0f32), rng.random_range(0.0..140.0f32)];
                 let (at_px, to) = (at(), at());
-                let begin =
-                    Command::BeginStroke { finger, source: ImprintSource::Measured, at_px, erase: rng.random() };
-                vec![Command::SelectFinger(finger), begin, Command::StrokeTo(to), Command::EndStroke]
+                let begin = Command::Labels(LabelsCommand::BeginStroke {
+                    finger,
+                    source: ImprintSource::Measured,
+                    at_px,
+                    erase: rng.random(),
+                });
+                vec![
+                    Command::View(ViewCommand::SelectFinger(finger)),
+                    begin,
+                    Command::Labels(LabelsCommand::StrokeTo(to)),
+                    Command::Labels(LabelsCommand::EndStroke),
+                ]
             }
-            11 => vec![Command::SelectFinger(finger), Command::FillHoles],
-            12 => vec![Command::SelectFinger(finger), Command::ResetMask],
-            13 | 14 => vec![Command::Undo],
-            15 => vec![Command::Redo],
-            16 => vec![Command::SetReview([Review::Done, Review::Flagged, Review::Skip][rng.random_range(0..3)])],
-            _ => vec![Command::Select(PairId(rng.random_range(0..PAIRS)))],
+            11 => vec![Command::View(ViewCommand::SelectFinger(finger)), Command::Labels(LabelsCommand::FillHoles)],
+            12 => vec![Command::View(ViewCommand::SelectFinger(finger)), Command::Labels(LabelsCommand::ResetMask)],
+            13 | 14 => vec![Command::Labels(LabelsCommand::Undo)],
+            15 => vec![Command::Labels(LabelsCommand::Redo)],
+            16 => vec![Command::Labels(LabelsCommand::SetReview(
+                [Review::Done, Review::Flagged, Review::Skip][rng.random_range(0..3)],
+            ))],
+            _ => vec![Command::Library(LibraryCommand::Select(PairId(rng.random_range(0..PAIRS))))],
         });
     }
     acts
@@ -161,7 +172,10 @@ fn start(mut runtime: Runtime, folder: &Path) -> (Runtime, State) {
     let mut state = State::default();
     runtime.start(&mut state, Some(Place::Path(folder.to_owned())));
     let panes = [Pane::Measured, Pane::Masks].into_iter().collect();
-    runtime.tick(&mut state, vec![Command::ShowPanes(panes), Command::ShowBothFingers(true)]);
+    runtime.tick(
+        &mut state,
+        vec![Command::View(ViewCommand::ShowPanes(panes)), Command::View(ViewCommand::ShowBothFingers(true))],
+    );
     (runtime, state)
 }
 

@@ -5,7 +5,7 @@ use std::process::{Command as Process, Output};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
-use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::command::{Command, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
@@ -58,14 +58,14 @@ fn studio(place: Place, named: &str, home: &Path, mut done: impl FnMut(&State) -
     let mut state = State::default();
     runtime.start(&mut state, Some(place));
     let panes = [Pane::Predicted, Pane::Measured, Pane::GelDifference, Pane::Error, Pane::Metrics];
-    runtime.tick(&mut state, vec![Command::ShowPanes(panes.into_iter().collect())]);
+    runtime.tick(&mut state, vec![Command::View(ViewCommand::ShowPanes(panes.into_iter().collect()))]);
     let begin = std::time::Instant::now();
     let mut asked = false;
     while !done(&state) {
         assert!(begin.elapsed().as_secs() < 120, "{:?}", state.log.entries);
         let ready = !asked && state.sample().ready().is_some() && !state.library.bundles.is_empty();
         asked |= ready;
-        runtime.tick(&mut state, if ready { vec![Command::Generate] } else { Vec::new() });
+        runtime.tick(&mut state, if ready { vec![Command::Predict(PredictCommand::Generate)] } else { Vec::new() });
         std::thread::sleep(std::time::Duration::from_millis(2));
     }
     state

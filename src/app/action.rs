@@ -2,16 +2,17 @@
 
 use strum::{EnumIter, IntoEnumIterator};
 
-use super::command::{CameraPreset, Command, Pane, UiRequest};
-use super::document::Review;
-use super::evaluation::EvaluateCommand;
-use super::inspect::{InspectCommand, Inspected};
+use super::command::{
+    CameraPreset, Command, EvaluateCommand, FollowCommand, InspectCommand, LabelsCommand, LibraryCommand, Pane,
+    PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand, WorkbenchCommand,
+};
+use super::inspect::state::Inspected;
 use super::keys::{ImprintSource, PoseEngine, Request, ShiftMode};
-use super::library::Place;
-use super::seeds::SeedsCommand;
-use super::settings::{ColorRange, MaskTool, Theme, Workspace};
-use super::state::State;
-use super::workbench::{Layer, SceneTool, WorkbenchCommand};
+use super::labels::state::Review;
+use super::library::state::Place;
+use super::settings::state::{ColorRange, MaskTool, Theme, Workspace};
+use super::state::{Absent, State};
+use super::workbench::state::{Layer, SceneTool};
 use crate::domain::hand::HandAxis;
 
 /// A key, by what is printed on it.
@@ -377,59 +378,58 @@ impl Action {
         let editable = state.document.is_editable(state.pair_name());
         let settings = &state.settings;
         let fingers = state.fingers();
-        let when = |condition: bool, command: Command| condition.then_some(command);
-        let ui = |request: UiRequest| Some(Command::Ui(request));
+        let ui = |request: UiRequest| does(ViewCommand::Ui(request));
         match self {
             Self::OpenFolder => ui(UiRequest::PickFolder),
-            Self::OpenDemo => Some(Command::Open(Place::Demo)),
-            Self::Reload => when(open, Command::Reload),
+            Self::OpenDemo => does(LibraryCommand::Open(Place::Demo)),
+            Self::Reload => when(open, LibraryCommand::Reload),
             Self::Follow => {
                 let folder = state.library.open.as_ref().is_some_and(|open| open.source.root().is_some());
-                when(folder, Command::SetFollow(state.library.follow.is_none()))
+                when(folder, FollowCommand::Set(state.library.follow.is_none()))
             }
-            Self::Save => Some(Command::Save),
-            Self::ExportMasks => when(open, Command::Ui(UiRequest::PickExportFolder)),
+            Self::Save => does(LabelsCommand::Save),
+            Self::ExportMasks => when(open, ViewCommand::Ui(UiRequest::PickExportFolder)),
 
-            Self::PreviousSample => when(listed, Command::Step(-1)),
-            Self::NextSample => when(listed, Command::Step(1)),
-            Self::TenBack => when(listed, Command::Step(-10)),
-            Self::TenForward => when(listed, Command::Step(10)),
-            Self::FirstSample => when(listed, Command::First),
-            Self::LastSample => when(listed, Command::Last),
-            Self::NextUnfinished => when(listed, Command::NextUnfinished),
-            Self::OtherFinger => Some(Command::SelectFinger(state.other_finger())),
-            Self::BothFingers => Some(Command::ShowBothFingers(!state.selection.both_fingers)),
+            Self::PreviousSample => when(listed, LibraryCommand::Step(-1)),
+            Self::NextSample => when(listed, LibraryCommand::Step(1)),
+            Self::TenBack => when(listed, LibraryCommand::Step(-10)),
+            Self::TenForward => when(listed, LibraryCommand::Step(10)),
+            Self::FirstSample => when(listed, LibraryCommand::First),
+            Self::LastSample => when(listed, LibraryCommand::Last),
+            Self::NextUnfinished => when(listed, LibraryCommand::NextUnfinished),
+            Self::OtherFinger => does(ViewCommand::SelectFinger(state.other_finger())),
+            Self::BothFingers => does(ViewCommand::ShowBothFingers(!state.selection.both_fingers)),
             Self::FindSample => {
-                when(state.selection.panes.contains(&Pane::Browser), Command::Ui(UiRequest::FocusFilter))
+                when(state.selection.panes.contains(&Pane::Browser), ViewCommand::Ui(UiRequest::FocusFilter))
             }
 
-            Self::Generate => when(state.can_generate().is_ok(), Command::Generate),
-            Self::GenerateNewSeed => when(state.can_generate().is_ok(), Command::GenerateNewSeed),
+            Self::Generate => when(state.can_generate().is_ok(), PredictCommand::Generate),
+            Self::GenerateNewSeed => when(state.can_generate().is_ok(), PredictCommand::GenerateNewSeed),
             Self::EvaluateDataset => {
                 let ready = state.evaluation_setup().is_some() && state.evaluating().is_none();
-                when(ready, Command::Evaluate(EvaluateCommand::Start))
+                when(ready, EvaluateCommand::Start)
             }
-            Self::ExportTable => when(state.table.result.is_some(), Command::Ui(UiRequest::PickTableFolder)),
+            Self::ExportTable => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder)),
             Self::RunSeeds => {
                 let possible = state.can_generate().is_ok() && state.selection.panes.contains(&Pane::Seeds);
-                when(possible, Command::Seeds(SeedsCommand::Run(!state.seeds.running)))
+                when(possible, SeedsCommand::Run(!state.seeds.running))
             }
             Self::LockSeed => {
                 let mut generate = settings.generate.clone();
                 generate.seed_locked = !generate.seed_locked;
-                Some(Command::SetGenerate(generate))
+                does(SettingsCommand::SetGenerate(generate))
             }
             Self::CancelJobs => {
                 if state.document.stroke.is_some() {
-                    Some(Command::CancelStroke)
+                    does(LabelsCommand::CancelStroke)
                 } else if let Some(command) = escape(state) {
-                    Some(Command::Workbench(command))
+                    does(command)
                 } else if state.tasks.demanded.iter().any(|r| matches!(r, Request::Basin(_))) {
-                    Some(Command::Inspect(InspectCommand::StopBasin))
+                    does(InspectCommand::StopBasin)
                 } else if state.seeds_to_come() > 0 {
-                    Some(Command::Seeds(SeedsCommand::Run(false)))
+                    does(SeedsCommand::Run(false))
                 } else {
-                    when(!state.tasks.running.is_empty(), Command::CancelAll)
+                    when(!state.tasks.running.is_empty(), TasksCommand::CancelAll)
                 }
             }
             Self::NextShift => {
@@ -439,50 +439,50 @@ impl Action {
                     (ShiftMode::ExactInverse, Some(refit)) => Some(ShiftMode::Refit(refit)),
                     (shift, _) => next_of::<ShiftMode>(&shift),
                 };
-                next.map(Command::SetShift)
+                next.and_then(|shift| does(SettingsCommand::SetShift(shift)))
             }
-            Self::Refit => when(state.can_generate().is_ok(), Command::Refit),
+            Self::Refit => when(state.can_generate().is_ok(), PredictCommand::Refit),
 
-            Self::Brush => Some(Command::SetMaskTool(MaskTool::Brush)),
-            Self::Eraser => Some(Command::SetMaskTool(MaskTool::Eraser)),
-            Self::PanTool => Some(Command::SetMaskTool(MaskTool::Pan)),
-            Self::LastTool => Some(Command::LastMaskTool),
-            Self::BrushSmaller => Some(Command::SetBrushRadius(settings.mask.radius_px / BRUSH_STEP)),
-            Self::BrushLarger => Some(Command::SetBrushRadius(settings.mask.radius_px * BRUSH_STEP)),
-            Self::FillHoles => when(editable, Command::FillHoles),
-            Self::LargestIsland => when(editable, Command::LargestIsland),
-            Self::AdoptAutomatic => when(editable, Command::AdoptAutomatic),
+            Self::Brush => does(SettingsCommand::SetMaskTool(MaskTool::Brush)),
+            Self::Eraser => does(SettingsCommand::SetMaskTool(MaskTool::Eraser)),
+            Self::PanTool => does(SettingsCommand::SetMaskTool(MaskTool::Pan)),
+            Self::LastTool => does(SettingsCommand::LastMaskTool),
+            Self::BrushSmaller => does(SettingsCommand::SetBrushRadius(settings.mask.radius_px / BRUSH_STEP)),
+            Self::BrushLarger => does(SettingsCommand::SetBrushRadius(settings.mask.radius_px * BRUSH_STEP)),
+            Self::FillHoles => when(editable, LabelsCommand::FillHoles),
+            Self::LargestIsland => when(editable, LabelsCommand::LargestIsland),
+            Self::AdoptAutomatic => when(editable, LabelsCommand::AdoptAutomatic),
             Self::ResetMask => {
                 let corrected = state.document.hand_mask(state.pair_name(), state.selection.finger).is_some();
-                when(editable && corrected, Command::ResetMask)
+                when(editable && corrected, LabelsCommand::ResetMask)
             }
-            Self::Undo => when(state.history.next_undo(state.pair_name(), &fingers).is_some(), Command::Undo),
-            Self::Redo => when(state.history.next_redo(state.pair_name(), &fingers).is_some(), Command::Redo),
-            Self::MaskVisible => Some(Command::SetMaskVisible(!settings.mask_visible)),
-            Self::MaskOutline => Some(Command::SetMaskOutline(!settings.mask_outline)),
-            Self::MaskFainter => Some(Command::SetMaskOpacity(settings.mask_opacity - OPACITY_STEP)),
-            Self::MaskStronger => Some(Command::SetMaskOpacity(settings.mask_opacity + OPACITY_STEP)),
-            Self::DoneAndNext => when(editable, Command::DoneAndNext),
-            Self::Flag => when(editable, Command::SetReview(Review::Flagged)),
-            Self::Skip => when(editable, Command::SetReview(Review::Skip)),
-            Self::MarkTodo => when(editable, Command::SetReview(Review::Todo)),
+            Self::Undo => when(state.history.next_undo(state.pair_name(), &fingers).is_some(), LabelsCommand::Undo),
+            Self::Redo => when(state.history.next_redo(state.pair_name(), &fingers).is_some(), LabelsCommand::Redo),
+            Self::MaskVisible => does(SettingsCommand::SetMaskVisible(!settings.mask_visible)),
+            Self::MaskOutline => does(SettingsCommand::SetMaskOutline(!settings.mask_outline)),
+            Self::MaskFainter => does(SettingsCommand::SetMaskOpacity(settings.mask_opacity - OPACITY_STEP)),
+            Self::MaskStronger => does(SettingsCommand::SetMaskOpacity(settings.mask_opacity + OPACITY_STEP)),
+            Self::DoneAndNext => when(editable, LibraryCommand::DoneAndNext),
+            Self::Flag => when(editable, LabelsCommand::SetReview(Review::Flagged)),
+            Self::Skip => when(editable, LabelsCommand::SetReview(Review::Skip)),
+            Self::MarkTodo => when(editable, LabelsCommand::SetReview(Review::Todo)),
 
-            Self::RunPose => when(selected, Command::Retry),
+            Self::RunPose => when(selected, TasksCommand::Retry),
             Self::AcceptMeasuredPose => accept(state, ImprintSource::Measured),
             Self::AcceptPredictedPose => accept(state, ImprintSource::Predicted),
             Self::PoseTool => toggle(state, SceneTool::Pose),
             Self::MeasureDistance => toggle(state, SceneTool::Distance),
             Self::MeasureAngle => toggle(state, SceneTool::Angle),
-            Self::SixDof => bench(true, WorkbenchCommand::SetSixDof(!state.workbench.six_dof)),
+            Self::SixDof => does(WorkbenchCommand::SetSixDof(!state.workbench.six_dof)),
             Self::NudgeLeft => nudge(state, HandAxis::Y, -1.0),
             Self::NudgeRight => nudge(state, HandAxis::Y, 1.0),
             Self::NudgeUp => nudge(state, HandAxis::Z, -1.0),
             Self::NudgeDown => nudge(state, HandAxis::Z, 1.0),
             Self::TurnLeft => nudge(state, HandAxis::Theta, -1.0),
             Self::TurnRight => nudge(state, HandAxis::Theta, 1.0),
-            Self::IcpFromHere => bench(in_hand(state), WorkbenchCommand::StartIcp),
-            Self::AcceptHand => bench(editable && state.workbench.hand.is_some(), WorkbenchCommand::AcceptHand),
-            Self::RevertHand => bench(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand),
+            Self::IcpFromHere => when(in_hand(state), WorkbenchCommand::StartIcp),
+            Self::AcceptHand => when(editable && state.workbench.hand.is_some(), WorkbenchCommand::AcceptHand),
+            Self::RevertHand => when(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand),
             Self::StepBack => inspect(state, |s| s.at > 0, InspectCommand::By(-1)),
             Self::StepForward => inspect(state, |s| !s.is_last(), InspectCommand::By(1)),
             Self::FirstStep => inspect(state, |s| s.at > 0, InspectCommand::Begin),
@@ -491,46 +491,68 @@ impl Action {
                 inspect(state, |s| s.inspection.num_steps(s.run) > 1, InspectCommand::Play(!state.inspect.playing))
             }
             Self::PinStep => inspect(state, |_| true, InspectCommand::Pin),
-            Self::OwnStarts => when(state.inspect.start.is_some(), Command::Inspect(InspectCommand::Start(None))),
+            Self::OwnStarts => when(state.inspect.start.is_some(), InspectCommand::Start(None)),
             Self::Correspondences => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines)),
-            Self::NextPoseEngine => next_of::<PoseEngine>(&settings.pose_engine).map(Command::SetPoseEngine),
+            Self::NextPoseEngine => {
+                next_of::<PoseEngine>(&settings.pose_engine).and_then(|next| does(SettingsCommand::SetPoseEngine(next)))
+            }
 
-            Self::LockRange => Some(Command::SetRange(ColorRange { locked: !settings.range.locked, ..settings.range })),
-            Self::RangeOnce => when(selected, Command::RangeFromShown),
-            Self::ResetRange => Some(Command::SetRange(ColorRange::default())),
+            Self::LockRange => {
+                does(SettingsCommand::SetRange(ColorRange { locked: !settings.range.locked, ..settings.range }))
+            }
+            Self::RangeOnce => when(selected, SettingsCommand::RangeFromShown),
+            Self::ResetRange => does(SettingsCommand::SetRange(ColorRange::default())),
             Self::Fit => ui(UiRequest::Fit),
             Self::CameraLeft => ui(UiRequest::Camera(CameraPreset::Left)),
             Self::CameraRight => ui(UiRequest::Camera(CameraPreset::Right)),
             Self::CameraFront => ui(UiRequest::Camera(CameraPreset::Front)),
             Self::CameraTop => ui(UiRequest::Camera(CameraPreset::Top)),
             Self::NextLayer => {
-                next_of::<Layer>(&state.workbench.layer).and_then(|l| bench(true, WorkbenchCommand::SetLayer(l)))
+                next_of::<Layer>(&state.workbench.layer).and_then(|l| does(WorkbenchCommand::SetLayer(l)))
             }
-            Self::AnimateWeakest => bench(true, WorkbenchCommand::SetAnimateWeakest(!state.workbench.animate_weakest)),
-            Self::BothClouds => bench(true, WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds)),
-            Self::LinkCameras => Some(Command::SetCamerasLinked(!settings.cameras_linked)),
-            Self::Footprint => Some(Command::SetFootprintVisible(!settings.footprint_visible)),
-            Self::SwitchTheme => next_of::<Theme>(&settings.theme).map(Command::SetTheme),
+            Self::AnimateWeakest => does(WorkbenchCommand::SetAnimateWeakest(!state.workbench.animate_weakest)),
+            Self::BothClouds => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds)),
+            Self::LinkCameras => does(SettingsCommand::SetCamerasLinked(!settings.cameras_linked)),
+            Self::Footprint => does(SettingsCommand::SetFootprintVisible(!settings.footprint_visible)),
+            Self::SwitchTheme => {
+                next_of::<Theme>(&settings.theme).and_then(|next| does(SettingsCommand::SetTheme(next)))
+            }
             Self::DepthChain => ui(UiRequest::ShowPane(Pane::Ledger)),
-            Self::InspectWorkspace => Some(Command::SetWorkspace(Workspace::Inspect)),
-            Self::AlignWorkspace => Some(Command::SetWorkspace(Workspace::Align)),
-            Self::LabelWorkspace => Some(Command::SetWorkspace(Workspace::Label)),
-            Self::EvaluateWorkspace => Some(Command::SetWorkspace(Workspace::Evaluate)),
+            Self::InspectWorkspace => does(SettingsCommand::SetWorkspace(Workspace::Inspect)),
+            Self::AlignWorkspace => does(SettingsCommand::SetWorkspace(Workspace::Align)),
+            Self::LabelWorkspace => does(SettingsCommand::SetWorkspace(Workspace::Label)),
+            Self::EvaluateWorkspace => does(SettingsCommand::SetWorkspace(Workspace::Evaluate)),
             Self::ResetWorkspace => ui(UiRequest::ResetWorkspace),
             Self::MaximizePane => ui(UiRequest::ToggleMaximized),
             Self::Fullscreen => ui(UiRequest::ToggleFullscreen),
             Self::Screenshot => ui(UiRequest::Screenshot),
-            Self::CopyHovered => when(state.selection.hover.is_some(), Command::Ui(UiRequest::CopyHovered)),
+            Self::CopyHovered => when(state.selection.hover.is_some(), ViewCommand::Ui(UiRequest::CopyHovered)),
 
-            Self::Palette => Some(Command::SetPalette(!state.selection.palette)),
-            Self::ShortcutSheet => Some(Command::SetShortcutSheet(!state.selection.shortcut_sheet)),
-            Self::ResetSettings => Some(Command::ResetSettings),
+            Self::Palette => does(ViewCommand::SetPalette(!state.selection.palette)),
+            Self::ShortcutSheet => does(ViewCommand::SetShortcutSheet(!state.selection.shortcut_sheet)),
+            Self::ResetSettings => does(SettingsCommand::ResetSettings),
         }
     }
 }
 
-fn bench(possible: bool, command: WorkbenchCommand) -> Option<Command> {
-    possible.then_some(Command::Workbench(command))
+impl Absent {
+    /// The action that brings it, if one does.
+    pub fn action(self) -> Option<Action> {
+        match self {
+            Self::NothingOpen => Some(Action::OpenDemo),
+            Self::NothingSelected => Some(Action::FirstSample),
+            Self::NoPrediction => Some(Action::Generate),
+            _ => None,
+        }
+    }
+}
+
+fn does(command: impl Into<Command>) -> Option<Command> {
+    Some(command.into())
+}
+
+fn when(possible: bool, command: impl Into<Command>) -> Option<Command> {
+    possible.then(|| command.into())
 }
 
 /// Whether the pose tool is in hand and there is a tool to be moved.
@@ -541,11 +563,11 @@ fn in_hand(state: &State) -> bool {
 /// Takes a tool of the 3D panes, or puts it away.
 fn toggle(state: &State, tool: SceneTool) -> Option<Command> {
     let next = if state.workbench.tool == tool { SceneTool::Look } else { tool };
-    bench(state.entry().is_some(), WorkbenchCommand::SetTool(next))
+    when(state.entry().is_some(), WorkbenchCommand::SetTool(next))
 }
 
 fn nudge(state: &State, axis: HandAxis, steps: f64) -> Option<Command> {
-    bench(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
+    when(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
 }
 
 /// What Escape gives up in the 3D panes: the pose in hand, then a measurement, then the point read.
@@ -565,7 +587,7 @@ fn escape(state: &State) -> Option<WorkbenchCommand> {
 /// A command of the time machine, where it is on screen and shows a step for which it can do something.
 fn inspect(state: &State, useful: impl Fn(Inspected<'_>) -> bool, command: InspectCommand) -> Option<Command> {
     let shown = state.selection.panes.contains(&Pane::TimeMachine).then(|| state.inspected())??;
-    useful(shown).then_some(Command::Inspect(command))
+    when(useful(shown), command)
 }
 
 /// Accepts the pose shown, or withdraws it if it is the accepted one.
@@ -573,7 +595,7 @@ fn accept(state: &State, source: ImprintSource) -> Option<Command> {
     let shown = state.pose(source).ready()?.grasp_from_object;
     let accepted = state.document.pair(state.pair_name()).and_then(|labels| labels.accepted(source));
     let editable = state.document.is_editable(state.pair_name());
-    editable.then_some(Command::AcceptPose(source, accepted != Some(shown.into())))
+    when(editable, LabelsCommand::AcceptPose(source, accepted != Some(shown.into())))
 }
 
 #[cfg(test)]

@@ -4,16 +4,29 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::command::{LabelsToSave, UiRequest};
-use super::document::PairLabels;
-use super::keys::{DatasetSeq, PredictionKey};
-use super::library::Place;
+use super::keys::{DatasetSeq, PredictionKey, Revision};
+use super::labels::state::PairLabels;
+use super::library::state::Place;
 use super::services::DataSource;
-use super::settings::Settings;
-use super::tasks::Ticket;
+use super::settings::state::Settings;
+use super::tasks::state::Ticket;
+use super::view::state::UiRequest;
 use crate::domain::sample::Sample;
 use crate::work::bundles::BundleInfo;
 use crate::work::evaluate::{Evaluation, Setup};
+
+/// A pair whose labels are to be written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelsToSave {
+    /// The opening of the data set it is of.
+    pub seq: DatasetSeq,
+    /// Its name.
+    pub name: String,
+    /// The number of this request.
+    pub revision: Revision,
+    /// What to write.
+    pub labels: PairLabels,
+}
 
 /// Work that leaves the state.
 #[derive(Clone)]

@@ -1,7 +1,7 @@
 //! Undo: reversible changes of the document, one entry per gesture, within a budget of bytes.
 
-use super::document::{Document, HandMask, Review};
 use super::keys::ImprintSource;
+use super::labels::state::{Document, HandMask, Review};
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::Patch;
 use crate::domain::rig::PadId;

@@ -1,197 +1,253 @@
-//! The open data set, and the list of pairs as the browser shows it.
+//! The room of the open data set and its list.
 
-use std::collections::BTreeMap;
+pub mod state;
+
+pub use state::*;
+
 use std::ops::Range;
-use std::path::PathBuf;
-use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
-use strum::EnumIter;
-
-use super::document::Review;
-use super::keys::{DatasetSeq, PairKey};
-use super::services::DataSource;
-use crate::domain::dataset::{Index, PairEntry, PairId};
-use crate::domain::rig::Rig;
+use super::effect::Effect;
+use super::keys::DatasetSeq;
+use super::labels::state::{Document, Review};
+use super::results::{Request, Results};
+use super::services::Opened;
+use super::settings::state::MAX_RECENT;
+use super::state::State;
+use super::tasks::state::Level;
+use super::{inspect, labels, settings, tasks};
+use crate::domain::dataset::PairId;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
 
-/// What can be opened.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Place {
-    /// The built-in simulated data.
-    Demo,
-    /// A folder, or a file in one.
-    Path(PathBuf),
+/// What can happen to the data set and its list.
+#[derive(Clone, Debug)]
+pub enum LibraryCommand {
+    /// Opens a place; what is open stays until the new one is read.
+    Open(Place),
+    /// Opens the same place again.
+    Reload,
+    /// Removes a place from the recent ones.
+    ForgetRecent(Place),
+    /// Narrows the list.
+    SetFilter(String),
+    /// Narrows the list to one tool.
+    SetToolFilter(Option<String>),
+    /// Sorts the list.
+    SetSort(Sort),
+    /// The rows of the list that are on screen.
+    ShowRows(Range<usize>),
+    /// Shows a pair.
+    Select(PairId),
+    /// Moves in the list; stops at its ends.
+    Step(i64),
+    /// Shows the first of the list.
+    First,
+    /// Shows the last of the list.
+    Last,
+    /// Shows the next of the list whose review is not finished, going round.
+    NextUnfinished,
+    /// Marks the selected pair as done and shows the next unfinished one.
+    DoneAndNext,
 }
 
-impl std::fmt::Display for Place {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Demo => write!(f, "the demo"),
-            Self::Path(path) => write!(f, "{}", path.display()),
+pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec<Effect>) {
+    match command {
+        LibraryCommand::Open(place) => open(state, place, effects),
+        LibraryCommand::Reload => {
+            if let Some(place) = state.library.open.as_ref().map(|open| open.place.clone()) {
+                open(state, place, effects);
+            }
+        }
+        LibraryCommand::ForgetRecent(place) => {
+            state.settings.recent.retain(|p| *p != place);
+            settings::save(state, effects);
+        }
+        LibraryCommand::SetFilter(filter) => {
+            state.library.filter = filter;
+            state.reorder();
+        }
+        LibraryCommand::SetToolFilter(tool) => {
+            state.library.tool = tool;
+            state.reorder();
+        }
+        LibraryCommand::SetSort(sort) => {
+            state.library.sort = sort;
+            state.reorder();
+        }
+        LibraryCommand::ShowRows(rows) => state.library.rows = rows,
+        LibraryCommand::Select(pair) => select(state, pair, effects),
+        LibraryCommand::Step(by) => step_by(state, by, effects),
+        LibraryCommand::First => select_row(state, 0, effects),
+        LibraryCommand::Last => select_row(state, usize::MAX, effects),
+        LibraryCommand::NextUnfinished => select_next_unfinished(state, effects),
+        LibraryCommand::DoneAndNext => {
+            labels::set_review(state, Review::Done, effects);
+            // Before the list is sorted anew, so that "next" is what the person sees as next.
+            select_next_unfinished(state, effects);
+            state.reorder();
         }
     }
 }
 
-/// The order of the browser's list.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum Sort {
-    /// By position in the data set.
-    #[default]
-    Natural,
-    /// By name, as text.
-    Name,
-    /// By tool, then position.
-    Tool,
-    /// Unfinished first, then position.
-    Review,
+fn open(state: &mut State, place: Place, effects: &mut Vec<Effect>) {
+    labels::end_stroke(state, effects);
+    state.library.last_seq.0 += 1;
+    let seq = state.library.last_seq;
+    let ticket = state.tasks.start(format!("Open {place}"), Vec::new());
+    if let Some(task) = state.tasks.running.get_mut(&ticket) {
+        task.opening = Some(seq);
+    }
+    state.library.opening = Some(place.clone());
+    state.library.failure = None;
+    effects.push(Effect::Open { ticket, seq, place });
 }
 
-impl Sort {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Natural => "Natural",
-            Self::Name => "Name",
-            Self::Tool => "Tool",
-            Self::Review => "Review state",
+/// Puts a place first among the recent ones.
+fn remember(state: &mut State, place: &Place, effects: &mut Vec<Effect>) {
+    let recent = &mut state.settings.recent;
+    recent.retain(|p| p != place);
+    recent.insert(0, place.clone());
+    recent.truncate(MAX_RECENT);
+    settings::save(state, effects);
+}
+
+fn select_row(state: &mut State, row: usize, effects: &mut Vec<Effect>) {
+    let last = state.library.order.len().wrapping_sub(1);
+    if let Some(pair) = state.library.order.get(row.min(last)).copied() {
+        select(state, pair, effects);
+    }
+}
+
+fn step_by(state: &mut State, by: i64, effects: &mut Vec<Effect>) {
+    let row = state.selection.pair.and_then(|pair| state.library.row_of(pair));
+    match row {
+        Some(row) => {
+            let row = (row as i64).saturating_add(by).max(0) as usize;
+            select_row(state, row, effects);
+        }
+        // What is selected was filtered away: start where the list starts.
+        None => select_row(state, 0, effects),
+    }
+}
+
+fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
+    let order = &state.library.order;
+    let start = state.selection.pair.and_then(|pair| state.library.row_of(pair)).map_or(0, |row| row + 1);
+    let unfinished = |pair: &&PairId| {
+        Some(**pair) != state.selection.pair
+            && state.library.entry(**pair).is_some_and(|e| !state.document.review(&e.name).is_finished())
+    };
+    let next = order[start.min(order.len())..].iter().chain(order).find(unfinished).copied();
+    match next {
+        Some(pair) => select(state, pair, effects),
+        None => state.log.info("Every pair of the list is done or skipped"),
+    }
+}
+
+pub(super) fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>) {
+    if state.library.entry(pair).is_none() || state.selection.pair == Some(pair) {
+        return;
+    }
+    labels::end_stroke(state, effects);
+    state.selection.pair = Some(pair);
+    state.selection.hover_point = None;
+    state.workbench.leave_pair();
+    inspect::rewind(state);
+    // What failed while it was only loaded ahead was not reported then.
+    if let Some(key) = state.pair_key()
+        && let Some(err) = state.tasks.failed.get(&Request::Sample(key))
+    {
+        state.log.error(err);
+    }
+    say_notes(state);
+    settings::follow_range(state);
+}
+
+/// What is odd about the files of the selected pair, once it is loaded; each pair once.
+pub(super) fn say_notes(state: &mut State) {
+    let Some((key, sample)) = state.pair_key().and_then(|key| Some((key, state.results.samples.get(&key)?.clone())))
+    else {
+        return;
+    };
+    if sample.notes.is_empty() || !state.results.noted.insert(Request::Sample(key)) {
+        return;
+    }
+    let name = state.pair_name().to_owned();
+    for note in &sample.notes {
+        let detail = format!("{} ({})", note.what, note.file.display());
+        state.log.push(Level::Warning, format!("{name} is odd"), Some(detail), Some(note.hint.clone()));
+    }
+}
+
+/// Shows a data set that was opened; whether it was read again.
+pub(super) fn show(
+    state: &mut State,
+    seq: DatasetSeq,
+    place: Place,
+    opened: Opened,
+    effects: &mut Vec<Effect>,
+) -> bool {
+    labels::end_stroke(state, effects);
+    // Predictions under way are of the data set before.
+    tasks::cancel_all(state, effects);
+    let before = state.entry().map(|entry| entry.name.clone());
+    let same_place = state.library.open.as_ref().is_some_and(|open| open.place == place);
+    state.results = Results::default();
+    state.table.result = None;
+    state.table.running = None;
+    state.history.clear();
+    state.tasks.failed.clear();
+    state.document =
+        Document { reviews: opened.reviews, last_revision: state.document.last_revision, ..Document::default() };
+    state.library.opening = None;
+    let tools = opened.source.index().tools();
+    state.library.open = Some(OpenDataset { seq, place: place.clone(), source: opened.source.clone(), tools });
+    if !same_place {
+        state.library.filter.clear();
+        state.library.tool = None;
+        state.library.rows = 0..0;
+    }
+    state.reorder();
+    let kept = before.filter(|_| same_place).and_then(|name| {
+        let at = opened.source.index().pairs.iter().position(|entry| entry.name == name)?;
+        u32::try_from(at).ok().map(PairId)
+    });
+    state.selection.pair = kept.or_else(|| state.library.order.first().copied());
+    state.selection.hover = None;
+    state.selection.hover_point = None;
+    state.workbench.leave_pair();
+    inspect::rewind(state);
+    state.inspect.pins = [None, None];
+    let (pairs, problems) = (opened.source.index().pairs.len(), opened.source.problems().len());
+    let (level, hint) = match problems {
+        0 => (Level::Info, None),
+        _ => (Level::Warning, Some("The list of problems says which files, and what to do.".to_owned())),
+    };
+    let text = match problems {
+        0 => format!("{}: {pairs} pairs", opened.source.title()),
+        n => format!("{}: {pairs} pairs, {n} problem{}", opened.source.title(), if n == 1 { "" } else { "s" }),
+    };
+    state.log.push(level, text, None, hint);
+    remember(state, &place, effects);
+    same_place
+}
+
+/// Takes the bundles that were found.
+pub(super) fn found(state: &mut State, bundles: Vec<BundleInfo>, problems: Vec<TaskError>) {
+    for problem in &problems {
+        state.log.error(problem);
+    }
+    let lacks = |kind| bundles.iter().all(|bundle| bundle.kind != kind);
+    for (kind, text) in [
+        (BundleKind::Generator, "No generator was found: nothing can be predicted"),
+        (BundleKind::Mask, "No mask model was found: the mask source \"UNet\" is not available"),
+    ] {
+        if lacks(kind) {
+            let hint = "Put its folder into assets/models beside the program, or name a folder with bundles in \
+                        TOUCH2TOUCH_MODELS.";
+            state.log.push(Level::Warning, text, None, Some(hint.into()));
         }
     }
-}
-
-/// An open data set.
-#[derive(Clone)]
-pub struct OpenDataset {
-    /// This opening.
-    pub seq: DatasetSeq,
-    /// What was opened.
-    pub place: Place,
-    /// The data.
-    pub source: Arc<dyn DataSource>,
-    /// The tools, sorted, each once.
-    pub tools: Vec<String>,
-}
-
-impl std::fmt::Debug for OpenDataset {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "OpenDataset({:?}, {}, {} pairs)", self.seq, self.place, self.index().pairs.len())
-    }
-}
-
-impl OpenDataset {
-    /// All pairs.
-    pub fn index(&self) -> &Index {
-        self.source.index()
-    }
-
-    /// The key of `pair` in this opening.
-    pub fn key(&self, pair: PairId) -> PairKey {
-        PairKey { dataset: self.seq, pair }
-    }
-}
-
-/// A folder that is followed.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Follow {
-    /// Touches that arrived.
-    pub arrived: usize,
-    /// Files among them that could not be read.
-    pub broken: usize,
-    /// The name of the newest.
-    pub newest: Option<String>,
-}
-
-/// The open data set and its list.
-#[derive(Clone, Debug, Default)]
-pub struct Library {
-    /// What is open.
-    pub open: Option<OpenDataset>,
-    /// What is being opened.
-    pub opening: Option<Place>,
-    /// Why the last opening failed, until the next one.
-    pub failure: Option<TaskError>,
-    /// The number of the last opening.
-    pub last_seq: DatasetSeq,
-    /// What was seen of the folder while it is followed; `None` while it is not.
-    pub follow: Option<Follow>,
-    /// Shows only pairs whose name or tool contains every word (any case). `tool:`, `is:` narrow a word.
-    pub filter: String,
-    /// Shows only this tool.
-    pub tool: Option<String>,
-    /// The order.
-    pub sort: Sort,
-    /// The pairs that pass the filter, in order.
-    pub order: Vec<PairId>,
-    /// The rows of `order` that the browser shows: thumbnails are made for these.
-    pub rows: Range<usize>,
-    /// The bundles found.
-    pub bundles: Vec<BundleInfo>,
-    /// What is wrong with bundles that were refused.
-    pub bundle_problems: Vec<TaskError>,
-}
-
-impl Library {
-    /// The index of what is open; empty when nothing is.
-    pub fn pairs(&self) -> &[PairEntry] {
-        self.open.as_ref().map_or(&[], |open| &open.index().pairs)
-    }
-
-    /// The entry of `pair`.
-    pub fn entry(&self, pair: PairId) -> Option<&PairEntry> {
-        self.pairs().get(pair.0 as usize)
-    }
-
-    /// The row of `pair` in the list, if it passes the filter.
-    pub fn row_of(&self, pair: PairId) -> Option<usize> {
-        self.order.iter().position(|p| *p == pair)
-    }
-
-    /// The bundle with this identity.
-    pub fn bundle(&self, id: &str) -> Option<&BundleInfo> {
-        self.bundles.iter().find(|b| &*b.id == id)
-    }
-
-    /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind.
-    pub fn bundle_named(&self, kind: BundleKind, name: Option<&str>, rig: &Rig) -> Option<&BundleInfo> {
-        let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind && b.fits(rig));
-        let first = of_kind.clone().next();
-        match name {
-            Some(name) => of_kind.find(|b| b.name == name).or(first),
-            None => first,
-        }
-    }
-
-    /// Recomputes `order` from filter, tool and sort. `reviews` holds the states that are not "todo", by name.
-    pub(super) fn reorder(&mut self, reviews: &BTreeMap<String, Review>) {
-        let words: Vec<String> = self.filter.split_whitespace().map(str::to_lowercase).collect();
-        let review = |entry: &PairEntry| reviews.get(&entry.name).copied().unwrap_or_default();
-        let passes = |entry: &PairEntry| {
-            let name = entry.name.to_lowercase();
-            let tool = entry.tool.as_deref().unwrap_or("").to_lowercase();
-            self.tool.as_ref().is_none_or(|t| entry.tool.as_ref() == Some(t))
-                && words.iter().all(|word| {
-                    if let Some(t) = word.strip_prefix("tool:") {
-                        tool.contains(t)
-                    } else if let Some(state) = word.strip_prefix("is:") {
-                        review(entry).name().replace(' ', "-").starts_with(state)
-                    } else {
-                        name.contains(word.as_str()) || tool.contains(word.as_str())
-                    }
-                })
-        };
-        let pairs = self.pairs();
-        let mut order: Vec<PairId> =
-            (0u32..).zip(pairs).filter(|(_, entry)| passes(entry)).map(|(id, _)| PairId(id)).collect();
-        let entry = |id: &PairId| &pairs[id.0 as usize];
-        match self.sort {
-            Sort::Natural => {}
-            Sort::Name => order.sort_by(|a, b| entry(a).name.cmp(&entry(b).name)),
-            Sort::Tool => order.sort_by(|a, b| entry(a).tool.cmp(&entry(b).tool)),
-            Sort::Review => order.sort_by_key(|id| review(entry(id))),
-        }
-        self.order = order;
-    }
+    state.library.bundles = bundles;
+    state.library.bundle_problems = problems;
 }

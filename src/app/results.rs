@@ -1,272 +1,244 @@
-//! Results, each under the recipe that made it, within a budget of bytes.
+//! Results, each under the recipe that made it.
+//!
+//! **The table** at the end of this file has one row for each kind of result; what can be asked for ([`Request`]), what
+//! comes back ([`Computed`]) and what is kept ([`Results`]) follow from it. A row names the recipe, a type of its own,
+//! which says how the result is computed ([`Computes`]) in a file of this folder, beside the look-up that views call.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::inspect::Inspection;
-use super::keys::{
-    BasinKey, CloudKey, EnsembleKey, ImprintSource, MaskKey, PairKey, PoseKey, PredictionKey, RunKey, ShiftMode,
-    TouchKey,
-};
-use crate::domain::align::basin::Basin;
-use crate::domain::ambiguity::Ambiguity;
-use crate::domain::contact::MaskBasis;
-use crate::domain::grid::{DepthMap, Mask, RgbGrid};
-use crate::domain::sample::Sample;
-use crate::work::cloud::Clouds;
-use crate::work::compare::Comparison;
-use crate::work::ensemble::Ensemble;
-use crate::work::job::PreviewPicture;
-use crate::work::layers::LayerResult;
-use crate::work::ledger::LedgerResult;
-use crate::work::pose::PoseResult;
-use crate::work::prediction::Prediction;
-use crate::work::tool::NamedTool;
+use super::jobs::{Job, Lane};
+use super::keys::{DatasetSeq, ImprintSource, PairKey, TouchKey};
+use super::services::SharedServices;
+use super::state::{Absent, Lookup, State};
+use super::wanted::Wanted;
+use crate::work::error::TaskError;
 
-/// Values by recipe; the least recently used go first when the budget is exceeded.
-///
-/// Reading marks a value as used through a shared reference, so views can do it.
-#[derive(Debug)]
-pub struct Cache<K, V> {
-    entries: BTreeMap<K, Entry<V>>,
-    bytes: usize,
-    budget: usize,
-    clock: AtomicU64,
+pub mod ambiguity;
+pub mod basin;
+pub mod cache;
+pub mod cloud;
+pub mod comparison;
+pub mod ensemble;
+pub mod imprint;
+pub mod inspection;
+pub mod labels;
+pub mod layers;
+pub mod ledger;
+pub mod mask;
+pub mod pose;
+pub mod prediction;
+pub mod preview;
+pub mod run;
+pub mod sample;
+pub mod thumbnail;
+pub mod tool;
+
+pub use cache::Cache;
+pub use preview::Preview;
+
+/// A recipe that says how its result is computed. Equal recipes have equal results: it is the key of the result.
+pub trait Computes: Clone + Ord + Send + 'static {
+    /// The result.
+    type Value: Send + Sync + 'static;
+
+    /// The job, with its inputs gathered; `None` if one is not there (any more).
+    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Self::Value>>;
+
+    /// Bytes that a result holds.
+    fn bytes(_value: &Self::Value) -> usize {
+        0
+    }
+
+    /// What follows from a result besides its being kept in its cache.
+    fn arrived(&self, _state: &mut State, _value: &Arc<Self::Value>) {}
+
+    /// What follows from a failure; whether the log says it although a pane shows it in place of the result.
+    fn failed(&self, _state: &mut State, _err: &TaskError) -> bool {
+        false
+    }
 }
 
-#[derive(Debug)]
-struct Entry<V> {
-    value: Arc<V>,
-    bytes: usize,
-    used: AtomicU64,
+/// A recipe whose result is kept in a cache of its own.
+pub trait Cached: Computes + Into<Request> {
+    /// The cache.
+    fn cache(results: &Results) -> &Cache<Self, Self::Value>;
 }
 
-impl<K: Ord + Clone, V> Cache<K, V> {
-    /// An empty cache that holds at most `budget` bytes (one value larger than that is kept until the next).
-    pub fn new(budget: usize) -> Self {
-        Self { entries: BTreeMap::new(), bytes: 0, budget, clock: AtomicU64::new(0) }
+impl State {
+    /// The result of a recipe, or what stands in its place.
+    pub(crate) fn look<K: Cached>(&self, key: K) -> Lookup<'_, Arc<K::Value>> {
+        self.look_or(Ok(Some(key)), || None)
     }
 
-    /// The value of `key`, now the most recently used.
-    pub fn get(&self, key: &K) -> Option<&Arc<V>> {
-        let entry = self.entries.get(key)?;
-        entry.used.store(self.tick(), Ordering::Relaxed);
-        Some(&entry.value)
-    }
-
-    /// Whether `key` has a value.
-    pub fn contains(&self, key: &K) -> bool {
-        self.entries.contains_key(key)
-    }
-
-    /// Stores a value that holds `bytes`, and drops old ones until the budget is kept.
-    pub fn insert(&mut self, key: K, value: Arc<V>, bytes: usize) {
-        let used = AtomicU64::new(self.tick());
-        if let Some(old) = self.entries.insert(key, Entry { value, bytes, used }) {
-            self.bytes -= old.bytes;
+    /// The result of a recipe that may be unknown still, or not be possible; meanwhile the one before.
+    pub(crate) fn look_or<'a, K: Cached>(
+        &'a self,
+        key: Result<Option<K>, Absent>,
+        before: impl FnOnce() -> Option<&'a Arc<K::Value>>,
+    ) -> Lookup<'a, Arc<K::Value>> {
+        let key = match key {
+            Ok(key) => key,
+            Err(absent) => return Lookup::Absent(absent),
+        };
+        if let Some(value) = key.as_ref().and_then(|key| K::cache(&self.results).get(key)) {
+            return Lookup::Ready(value);
         }
-        self.bytes += bytes;
-        while self.bytes > self.budget && self.entries.len() > 1 {
-            let oldest =
-                self.entries.iter().min_by_key(|(_, e)| e.used.load(Ordering::Relaxed)).map(|(k, _)| k.clone());
-            let Some(entry) = oldest.and_then(|key| self.entries.remove(&key)) else {
-                break;
-            };
-            self.bytes -= entry.bytes;
+        match (key.and_then(|key| self.failure(key)), before()) {
+            (Some(err), _) => Lookup::Failed(err),
+            (None, Some(before)) => Lookup::Stale(before),
+            (None, None) => Lookup::Waiting,
         }
     }
 
-    /// Drops what does not fulfil `keep`.
-    pub fn retain(&mut self, mut keep: impl FnMut(&K) -> bool) {
-        self.entries.retain(|key, entry| {
-            let kept = keep(key);
-            if !kept {
-                self.bytes -= entry.bytes;
-            }
-            kept
-        });
-    }
-
-    /// Drops everything.
-    pub fn clear(&mut self) {
-        self.entries.clear();
-        self.bytes = 0;
-    }
-
-    /// Values held.
-    pub fn len(&self) -> usize {
-        self.entries.len()
-    }
-
-    /// Whether nothing is held.
-    pub fn is_empty(&self) -> bool {
-        self.entries.is_empty()
-    }
-
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        self.bytes
-    }
-
-    fn tick(&self) -> u64 {
-        self.clock.fetch_add(1, Ordering::Relaxed)
+    /// Why a result could not be computed, if that was tried.
+    pub(crate) fn failure(&self, request: impl Into<Request>) -> Option<&TaskError> {
+        self.tasks.failed.get(&request.into())
     }
 }
 
-/// A prediction as it looks on the way.
-#[derive(Clone, Debug)]
-pub struct Preview {
-    /// What is being made.
-    pub recipe: PredictionKey,
-    /// How it looks.
-    pub picture: PreviewPicture,
-}
-
-/// All caches.
-#[derive(Debug)]
-pub struct Results {
-    /// Loaded pairs.
-    pub samples: Cache<PairKey, Sample>,
-    /// Small pictures of the measured imprint (right finger, else left).
-    pub thumbnails: Cache<PairKey, DepthMap>,
-    /// Raw predictions.
-    pub predictions: Cache<PredictionKey, Prediction>,
-    /// Predictions in meters, as large as the bubble image.
-    pub imprints: Cache<(PredictionKey, ShiftMode), DepthMap>,
-    /// Predictions of a color sensor: differences, 0..255 scale.
-    pub colors: Cache<PredictionKey, RgbGrid>,
-    /// Several predictions of one touch.
-    pub ensembles: Cache<EnsembleKey, Ensemble>,
-    /// Predictions against measurements.
-    pub comparisons: Cache<(PredictionKey, ShiftMode), Comparison>,
-    /// Depth chains.
-    pub ledgers: Cache<(PredictionKey, ShiftMode), LedgerResult>,
-    /// What GelSlim images leave open.
-    pub ambiguities: Cache<TouchKey, Option<Ambiguity>>,
-    /// Automatic masks.
-    pub masks: Cache<MaskKey, Mask>,
-    /// Of the masks that are not made of what their recipe names, what they are made of.
-    pub mask_bases: BTreeMap<MaskKey, MaskBasis>,
-    /// Pairs whose notes of loading were said.
-    pub noted: BTreeSet<PairKey>,
-    /// Clouds.
-    pub clouds: Cache<CloudKey, Clouds>,
-    /// Poses.
-    pub poses: Cache<PoseKey, PoseResult>,
-    /// Recorded registrations.
-    pub runs: Cache<RunKey, PoseResult>,
-    /// Their layers.
-    pub layers: Cache<PoseKey, LayerResult>,
-    /// Their steps.
-    pub inspections: Cache<RunKey, Inspection>,
-    /// Basin maps.
-    pub basins: Cache<BasinKey, Basin>,
-    /// Tools.
-    pub tools: Cache<String, NamedTool>,
-    /// What is on its way to each touch.
-    pub previews: BTreeMap<TouchKey, Arc<Preview>>,
-    /// Touches whose predictions from before were looked for on the disk.
-    pub looked_up: BTreeSet<TouchKey>,
-    /// The prediction shown for each touch: the last one generated, or the one chosen.
-    pub chosen: BTreeMap<TouchKey, PredictionKey>,
-    /// All predictions made for each touch, oldest first.
-    pub made: BTreeMap<TouchKey, Vec<PredictionKey>>,
-    /// The last cloud and pose of a pair and imprint: shown dimmed while the next is computed.
-    pub latest: BTreeMap<(PairKey, ImprintSource), (Option<CloudKey>, Option<PoseKey>)>,
-    /// The last recorded registration, for the same purpose.
-    pub latest_inspections: BTreeMap<(PairKey, ImprintSource), RunKey>,
-    /// The last basin map, for the same purpose.
-    pub latest_basins: BTreeMap<(PairKey, ImprintSource), BasinKey>,
+/// The recipes of what was shown last of a pair and imprint: shown dimmed while the next is computed.
+#[derive(Clone, Debug, Default)]
+pub struct Latest {
+    /// The cloud.
+    pub cloud: Option<cloud::CloudKey>,
+    /// Its pose.
+    pub pose: Option<pose::PoseKey>,
+    /// The recorded registration.
+    pub inspection: Option<inspection::InspectionKey>,
+    /// The basin map.
+    pub basin: Option<basin::BasinKey>,
 }
 
 const MIB: usize = 1 << 20;
 
-impl Default for Results {
-    fn default() -> Self {
-        Self {
-            // A lab pair holds about 10 MB (two GelSlim images and their difference, per finger): ~38 pairs.
-            samples: Cache::new(384 * MIB),
-            thumbnails: Cache::new(32 * MIB),
-            predictions: Cache::new(256 * MIB),
-            imprints: Cache::new(64 * MIB),
-            colors: Cache::new(32 * MIB),
-            ensembles: Cache::new(32 * MIB),
-            comparisons: Cache::new(32 * MIB),
-            ledgers: Cache::new(24 * MIB),
-            ambiguities: Cache::new(MIB),
-            masks: Cache::new(32 * MIB),
-            mask_bases: BTreeMap::new(),
-            noted: BTreeSet::new(),
-            clouds: Cache::new(128 * MIB),
-            poses: Cache::new(32 * MIB),
-            runs: Cache::new(32 * MIB),
-            layers: Cache::new(16 * MIB),
-            inspections: Cache::new(64 * MIB),
-            basins: Cache::new(32 * MIB),
-            tools: Cache::new(128 * MIB),
-            previews: BTreeMap::new(),
-            looked_up: BTreeSet::new(),
-            chosen: BTreeMap::new(),
-            made: BTreeMap::new(),
-            latest: BTreeMap::new(),
-            latest_inspections: BTreeMap::new(),
-            latest_basins: BTreeMap::new(),
+macro_rules! results {
+    ($( #[doc = $doc:literal] $variant:ident($key:ty) $(in $cache:ident, $budget:expr)?; )*) => {
+        /// A result that is computed because a visible pane shows it. Ordered, hashable: it is its own key.
+        #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub enum Request { $( #[doc = $doc] $variant($key), )* }
+
+        /// A computed result with its recipe.
+        #[derive(Clone, Debug)]
+        pub enum Computed { $( #[doc = $doc] $variant($key, Arc<<$key as Computes>::Value>), )* }
+
+        /// All caches, and what follows from their contents.
+        #[derive(Debug)]
+        pub struct Results {
+            $( $( #[doc = $doc] pub $cache: Cache<$key, <$key as Computes>::Value>, )? )*
+            /// Results of which the log said what is odd about them.
+            pub noted: BTreeSet<Request>,
+            /// What is on its way to each touch.
+            pub previews: BTreeMap<TouchKey, Arc<Preview>>,
+            /// Touches whose predictions from before were looked for on the disk.
+            pub looked_up: BTreeSet<TouchKey>,
+            /// The prediction shown for each touch: the last one generated, or the one chosen.
+            pub chosen: BTreeMap<TouchKey, prediction::PredictionKey>,
+            /// All predictions made for each touch, oldest first.
+            pub made: BTreeMap<TouchKey, Vec<prediction::PredictionKey>>,
+            /// What was shown last of each pair and imprint.
+            pub latest: BTreeMap<(PairKey, ImprintSource), Latest>,
         }
-    }
+
+        impl Default for Results {
+            fn default() -> Self {
+                Self {
+                    $( $( $cache: Cache::new($budget), )? )*
+                    noted: BTreeSet::new(),
+                    previews: BTreeMap::new(),
+                    looked_up: BTreeSet::new(),
+                    chosen: BTreeMap::new(),
+                    made: BTreeMap::new(),
+                    latest: BTreeMap::new(),
+                }
+            }
+        }
+
+        impl Request {
+            /// Its job; `None` if an input is not there (any more).
+            pub(super) fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Computed>> {
+                match self { $( Self::$variant(key) => {
+                    let done = key.clone();
+                    Some(key.job(state, services)?.map(move |value| Computed::$variant(done, Arc::new(value))))
+                } )* }
+            }
+
+            /// What follows from its failure; whether the log says it.
+            pub(super) fn failed(&self, state: &mut State, err: &TaskError) -> bool {
+                match self { $( Self::$variant(key) => key.failed(state, err), )* }
+            }
+        }
+
+        impl Computed {
+            /// What was asked for.
+            pub fn request(&self) -> Request {
+                match self { $( Self::$variant(key, _) => Request::$variant(key.clone()), )* }
+            }
+
+            /// Keeps it under its recipe, with what follows from it.
+            pub(super) fn keep(self, state: &mut State) {
+                match self { $( Self::$variant(key, value) => {
+                    $( state.results.$cache.insert(key.clone(), value.clone(), <$key>::bytes(&value)); )?
+                    key.arrived(state, &value);
+                } )* }
+            }
+        }
+
+        $(
+            impl From<$key> for Request {
+                fn from(key: $key) -> Self {
+                    Self::$variant(key)
+                }
+            }
+
+            $( impl Cached for $key {
+                fn cache(results: &Results) -> &Cache<Self, Self::Value> {
+                    &results.$cache
+                }
+            } )?
+        )*
+    };
 }
 
-impl Results {
-    /// Drops everything: another data set is open.
-    pub(super) fn clear(&mut self) {
-        self.samples.clear();
-        self.thumbnails.clear();
-        self.predictions.clear();
-        self.imprints.clear();
-        self.colors.clear();
-        self.ensembles.clear();
-        self.comparisons.clear();
-        self.ledgers.clear();
-        self.ambiguities.clear();
-        self.masks.clear();
-        self.mask_bases.clear();
-        self.noted.clear();
-        self.clouds.clear();
-        self.poses.clear();
-        self.runs.clear();
-        self.layers.clear();
-        self.inspections.clear();
-        self.basins.clear();
-        self.tools.clear();
-        self.previews.clear();
-        self.looked_up.clear();
-        self.chosen.clear();
-        self.made.clear();
-        self.latest.clear();
-        self.latest_inspections.clear();
-        self.latest_basins.clear();
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_least_recently_used_go_first() {
-        let mut cache: Cache<u32, u32> = Cache::new(30);
-        for k in 0..3 {
-            cache.insert(k, Arc::new(k), 10);
-        }
-        assert!(cache.get(&0).is_some());
-        cache.insert(3, Arc::new(3), 10);
-        assert!(cache.contains(&0) && !cache.contains(&1) && cache.contains(&2) && cache.contains(&3));
-        assert_eq!(cache.bytes(), 30);
-        cache.insert(3, Arc::new(4), 5);
-        assert_eq!(cache.bytes(), 25);
-        cache.insert(9, Arc::new(9), 100);
-        assert_eq!((cache.len(), cache.bytes()), (1, 100));
-        cache.retain(|_| false);
-        assert_eq!((cache.len(), cache.bytes()), (0, 0));
-    }
+results! {
+    /// The tensors of a pair: about 10 MB of a lab pair (two GelSlim images and their difference, per finger).
+    Sample(PairKey) in samples, 384 * MIB;
+    /// The labels stored for a pair: they go to the document.
+    Labels(labels::LabelsKey);
+    /// The CAD model of a tool and what the registration derives from it.
+    Tool(tool::ToolKey) in tools, 128 * MIB;
+    /// The predictions of a touch that lie on the disk from before.
+    Stored(prediction::StoredKey);
+    /// Raw predictions. One is asked for because a pane needs it beside that of the other finger.
+    Prediction(prediction::PredictionKey) in predictions, 256 * MIB;
+    /// A prediction with one of several seeds: kept with the others.
+    Seed(prediction::SeedKey);
+    /// Several predictions of one touch.
+    Ensemble(ensemble::EnsembleKey) in ensembles, 32 * MIB;
+    /// A prediction in meters, as large as the bubble image.
+    Imprint(imprint::MetersKey) in imprints, 64 * MIB;
+    /// A prediction of a color sensor: differences, 0..255 scale.
+    Color(imprint::ColorKey) in colors, 32 * MIB;
+    /// A prediction against the measurement.
+    Comparison(comparison::ComparisonKey) in comparisons, 32 * MIB;
+    /// The depth chain of a prediction, stage by stage.
+    Ledger(ledger::LedgerKey) in ledgers, 24 * MIB;
+    /// What a GelSlim image leaves open.
+    Ambiguity(ambiguity::AmbiguityKey) in ambiguities, MIB;
+    /// An automatic mask.
+    Mask(mask::MaskKey) in masks, 32 * MIB;
+    /// A cloud.
+    Cloud(cloud::CloudKey) in clouds, 128 * MIB;
+    /// A pose.
+    Pose(pose::PoseKey) in poses, 32 * MIB;
+    /// A registration with everything recorded.
+    Run(run::RunKey) in runs, 32 * MIB;
+    /// Reasons, residuals and distances of a recorded registration from the engine's own starts.
+    Layers(layers::LayersKey) in layers, 16 * MIB;
+    /// The steps of a recorded registration, made ready to be looked through.
+    Inspection(inspection::InspectionKey) in inspections, 64 * MIB;
+    /// Where starts lead.
+    Basin(basin::BasinKey) in basins, 32 * MIB;
+    /// A small picture of a pair's measured imprint (right finger, else left).
+    Thumbnail(thumbnail::ThumbnailKey) in thumbnails, 32 * MIB;
 }

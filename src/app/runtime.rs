@@ -8,15 +8,18 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
+use super::answers::Answer;
 use super::apply::apply;
-use super::command::{Command, UiRequest};
-use super::jobs::{Lane, PreviewWish};
+use super::command::{Command, LibraryCommand};
+use super::jobs::Lane;
 use super::keys::{DatasetSeq, Request, TouchKey};
-use super::library::Place;
+use super::library::state::Place;
 use super::results::Preview;
+use super::results::preview::PreviewWish;
 use super::services::SharedServices;
 use super::state::State;
-use super::tasks::Ticket;
+use super::tasks::state::Ticket;
+use super::view::state::UiRequest;
 use crate::work::job::{Cancel, Progress};
 use lanes::{Event, Lanes};
 
@@ -95,7 +98,10 @@ impl Runtime {
     pub fn start(&mut self, state: &mut State, place: Option<Place>) -> Vec<UiRequest> {
         let (settings, problem) = self.services.load_settings();
         let place = place.or_else(|| settings.recent.first().cloned()).unwrap_or(Place::Demo);
-        self.tick(state, vec![Command::SettingsLoaded(Box::new(settings), problem), Command::Open(place)])
+        self.tick(
+            state,
+            vec![Answer::SettingsLoaded(Box::new(settings), problem).into(), LibraryCommand::Open(place).into()],
+        )
     }
 
     /// One round: answers of jobs, then `commands`, then what has to be done about them, then what is to be shown.
@@ -104,22 +110,22 @@ impl Runtime {
     pub fn tick(&mut self, state: &mut State, commands: Vec<Command>) -> Vec<UiRequest> {
         let mut ui = Vec::new();
         self.poll_follower();
-        while let Ok(Event { id, command }) = self.events.try_recv() {
+        while let Ok(Event { id, answer }) = self.events.try_recv() {
             if let JobId::Task(ticket) = &id {
                 self.cancels.remove(ticket);
                 lock(&self.progress).remove(ticket);
             }
-            self.run(state, command, &mut ui);
+            self.run(state, answer, &mut ui);
             // Only now: until its result is in the state, a request counts as running and is not started again.
             self.lanes.forget(&id);
         }
         let progress = std::mem::take(&mut *lock(&self.progress));
         for (ticket, progress) in progress {
-            self.run(state, Command::Progressed(ticket, progress), &mut ui);
+            self.run(state, Answer::Progressed(ticket, progress), &mut ui);
         }
         let previews = std::mem::take(&mut *lock(&self.previews));
         for (ticket, preview) in previews.into_values() {
-            self.run(state, Command::Previewed(ticket, preview), &mut ui);
+            self.run(state, Answer::Previewed(ticket, preview), &mut ui);
         }
         for command in commands {
             self.run(state, command, &mut ui);
@@ -130,10 +136,12 @@ impl Runtime {
         }
         let wanted = state.wanted();
         if wanted != state.tasks.demanded {
-            self.run(state, Command::Demanded(wanted), &mut ui);
+            self.run(state, Answer::Demanded(wanted), &mut ui);
         }
         let services = &self.services;
-        self.lanes.demand(&state.tasks.demanded, |request| super::jobs::prepare::prepare(state, services, request));
+        self.lanes.demand(&state.tasks.demanded, |request| {
+            Some((state.library.open.as_ref()?.seq, request.job(state, services)?))
+        });
         ui
     }
 
@@ -157,7 +165,8 @@ impl Runtime {
         self.lanes.waiting(lane)
     }
 
-    fn run(&mut self, state: &mut State, command: Command, ui: &mut Vec<UiRequest>) {
+    fn run(&mut self, state: &mut State, command: impl Into<Command>, ui: &mut Vec<UiRequest>) {
+        let command = command.into();
         log::trace!("{command:?}");
         for effect in apply(state, command) {
             self.perform(effect, ui);

@@ -8,11 +8,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::command::Opened;
-use super::document::PairLabels;
 use super::keys::{PredictionKey, TouchKey};
-use super::library::Place;
-use super::settings::Settings;
+use super::labels::state::{PairLabels, Review};
+use super::library::state::Place;
+use super::settings::state::Settings;
 use crate::domain::contact::ContactMask;
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
@@ -112,6 +111,21 @@ pub struct Followed {
 impl std::fmt::Debug for Followed {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Followed({:?}, whole: {})", self.pair, self.sample.is_ok())
+    }
+}
+
+/// What opening a data set yields.
+#[derive(Clone)]
+pub struct Opened {
+    /// The data.
+    pub source: Arc<dyn DataSource>,
+    /// Review states stored with it that are not "todo", by pair name.
+    pub reviews: BTreeMap<String, Review>,
+}
+
+impl std::fmt::Debug for Opened {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Opened({}, {} reviews)", self.source.title(), self.reviews.len())
     }
 }
 

@@ -1,24 +1,20 @@
 //! [`State`]: everything the studio shows. Changed by [`super::apply::apply`] only.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use glam::DVec3;
-
-use super::action::Action;
-use super::command::{Hover, Pane};
-use super::document::Document;
-use super::evaluation::TableState;
+use super::evaluate::state::TableState;
 use super::history::History;
-use super::inspect::Inspect;
+use super::inspect::state::Inspect;
 use super::keys::{PairKey, TouchKey};
-use super::library::Library;
+use super::labels::state::Document;
+use super::library::state::Library;
 use super::results::Results;
-use super::seeds::Seeds;
-use super::settings::Settings;
-use super::tasks::{Log, Tasks};
-use super::workbench::Workbench;
-use crate::domain::dataset::{PairEntry, PairId};
+use super::seeds::state::Seeds;
+use super::settings::state::Settings;
+use super::tasks::state::{Log, Tasks};
+use super::view::state::{Pane, Selection};
+use super::workbench::state::Workbench;
+use crate::domain::dataset::PairEntry;
 use crate::domain::rig::{PadId, Rig, Text};
 use crate::work::error::TaskError;
 
@@ -49,27 +45,6 @@ pub struct State {
     pub tasks: Tasks,
     /// What happened.
     pub log: Log,
-}
-
-/// What is looked at.
-#[derive(Clone, Debug, Default)]
-pub struct Selection {
-    /// The pair.
-    pub pair: Option<PairId>,
-    /// The active finger.
-    pub finger: PadId,
-    /// Whether both fingers are shown, or only the active one.
-    pub both_fingers: bool,
-    /// The pixel under the pointer: the cross-hair of all images.
-    pub hover: Option<Hover>,
-    /// The point under the pointer in 3D, meters, grasp frame.
-    pub hover_point: Option<DVec3>,
-    /// The panes on screen.
-    pub panes: BTreeSet<Pane>,
-    /// Whether the command palette is open.
-    pub palette: bool,
-    /// Whether the shortcut sheet is open.
-    pub shortcut_sheet: bool,
 }
 
 impl State {
@@ -113,6 +88,16 @@ impl State {
     /// One finger of the selected pair.
     pub fn touch_key(&self, finger: PadId) -> Option<TouchKey> {
         Some(self.pair_key()?.finger(finger))
+    }
+
+    /// Whether a pair is the one on screen.
+    pub(super) fn is_selected(&self, key: PairKey) -> bool {
+        self.pair_key() == Some(key)
+    }
+
+    /// Whether one of these panes is on screen.
+    pub(super) fn is_visible(&self, panes: &[Pane]) -> bool {
+        panes.iter().any(|pane| self.selection.panes.contains(pane))
     }
 }
 
@@ -172,6 +157,32 @@ impl<'a, T: ?Sized> Lookup<'a, T> {
             Self::Stale(value) => f(value).map_or(Lookup::Absent(absent), Lookup::Stale),
             _ => self.without(),
         }
+    }
+}
+
+impl<'a, T: ?Sized> Lookup<'a, T> {
+    /// Part of a value.
+    pub fn map<U: ?Sized>(self, f: impl FnOnce(&'a T) -> &'a U) -> Lookup<'a, U> {
+        match self {
+            Self::Ready(value) => Lookup::Ready(f(value)),
+            Self::Stale(value) => Lookup::Stale(f(value)),
+            _ => self.without(),
+        }
+    }
+
+    /// The failure of what it is made from, where it is not there itself.
+    pub(super) fn or_failed(self, err: Option<&'a TaskError>) -> Self {
+        match (self, err) {
+            (Self::Stale(_) | Self::Waiting, Some(err)) => Self::Failed(err),
+            _ => self,
+        }
+    }
+}
+
+impl<'a, T> Lookup<'a, Arc<T>> {
+    /// The value itself.
+    pub fn value(self) -> Lookup<'a, T> {
+        self.map(|value| &**value)
     }
 }
 
@@ -238,16 +249,6 @@ impl Absent {
             Self::NoGenerator => "No generator was found.",
             Self::NoClassifier => "No tool classifier was found.",
             Self::NoContact => "The mask has too few contact points for a pose.",
-        }
-    }
-
-    /// The action that brings it, if one does.
-    pub fn action(self) -> Option<Action> {
-        match self {
-            Self::NothingOpen => Some(Action::OpenDemo),
-            Self::NothingSelected => Some(Action::FirstSample),
-            Self::NoPrediction => Some(Action::Generate),
-            _ => None,
         }
     }
 }

@@ -1,143 +1,61 @@
-//! Running jobs as the status bar shows them, and the log.
+//! The room of running jobs and the log.
 
-use std::collections::{BTreeMap, VecDeque};
+pub mod state;
 
-use super::keys::{DatasetSeq, PredictionKey, Request};
-use crate::work::error::{TaskError, TaskErrorKind};
-use crate::work::job::Progress;
+pub use state::*;
 
-/// The name of a running job.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Ticket(pub u64);
+use super::effect::Effect;
+use super::state::State;
+use crate::work::error::TaskError;
 
-/// A job that a person started.
+/// What can happen to jobs and log.
 #[derive(Clone, Debug)]
-pub struct Task {
-    /// Its name on screen, e.g. `Generate data_4 right`.
-    pub title: String,
-    /// How far it is.
-    pub progress: Progress,
-    /// The predictions it makes, if it makes any: one per finger.
-    pub recipes: Vec<PredictionKey>,
-    /// The data set it opens, if it opens one.
-    pub opening: Option<DatasetSeq>,
-    /// Whether it was told to stop and has not stopped yet.
-    pub cancelling: bool,
+pub enum TasksCommand {
+    /// Tells a job to stop.
+    Cancel(Ticket),
+    /// Tells every job to stop.
+    CancelAll,
+    /// Tries again what could not be computed.
+    Retry,
+    /// Log entries up to a number were seen.
+    LogSeen(u64),
+    /// Adds an error of the window's own.
+    Report(TaskError),
+    /// Adds a notice of the window's own.
+    Notice(String),
 }
 
-/// Running jobs, and what the panes wait for.
-#[derive(Clone, Debug, Default)]
-pub struct Tasks {
-    /// Jobs that a person started, by ticket.
-    pub running: BTreeMap<Ticket, Task>,
-    /// What the visible panes wait for: the list last handed to the runtime.
-    pub demanded: Vec<Request>,
-    /// Results that could not be computed, and why: they are not tried again until something changes.
-    pub failed: BTreeMap<Request, TaskError>,
-    pub(super) last_ticket: u64,
-}
-
-impl Tasks {
-    /// The task that generates `recipe`.
-    pub fn generating(&self, recipe: &PredictionKey) -> Option<(Ticket, &Task)> {
-        self.running.iter().find(|(_, task)| task.recipes.contains(recipe)).map(|(t, task)| (*t, task))
-    }
-
-    /// A task that makes predictions.
-    pub fn any_generating(&self) -> Option<(Ticket, &Task)> {
-        self.running.iter().find(|(_, task)| !task.recipes.is_empty()).map(|(t, task)| (*t, task))
-    }
-
-    /// Whether nothing runs and nothing waits.
-    pub fn is_idle(&self) -> bool {
-        self.running.is_empty() && self.demanded.is_empty()
-    }
-
-    pub(super) fn start(&mut self, title: String, recipes: Vec<PredictionKey>) -> Ticket {
-        self.last_ticket += 1;
-        let ticket = Ticket(self.last_ticket);
-        self.running
-            .insert(ticket, Task { title, progress: Progress::default(), recipes, opening: None, cancelling: false });
-        ticket
-    }
-}
-
-/// How much a person should care.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Level {
-    /// Something was done.
-    Info,
-    /// Something needs care.
-    Warning,
-    /// Something did not work.
-    Error,
-}
-
-/// One line of the log.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
-    /// Counts up from 1: a toast is shown once per number.
-    pub number: u64,
-    /// How much a person should care.
-    pub level: Level,
-    /// What happened.
-    pub text: String,
-    /// Why, and other detail.
-    pub detail: Option<String>,
-    /// What to do.
-    pub hint: Option<String>,
-    /// How often the same line came in a row.
-    pub count: u32,
-}
-
-/// What happened, newest last.
-#[derive(Clone, Debug, Default)]
-pub struct Log {
-    /// The entries; old ones are dropped.
-    pub entries: VecDeque<Entry>,
-    /// Entries up to this number were seen: their toast was closed.
-    pub seen: u64,
-    last: u64,
-}
-
-/// Entries kept.
-const MAX_ENTRIES: usize = 500;
-
-impl Log {
-    /// Adds a line; the same line again only counts up.
-    pub fn push(&mut self, level: Level, text: impl Into<String>, detail: Option<String>, hint: Option<String>) {
-        let text = text.into();
-        if let Some(last) = self.entries.back_mut()
-            && last.level == level
-            && last.text == text
-            && last.detail == detail
-        {
-            last.count += 1;
-            return;
+pub(super) fn step(state: &mut State, command: TasksCommand, effects: &mut Vec<Effect>) {
+    match command {
+        TasksCommand::Cancel(ticket) => {
+            if let Some(task) = state.tasks.running.get_mut(&ticket) {
+                task.cancelling = true;
+                effects.push(Effect::Cancel(ticket));
+            }
         }
-        self.last += 1;
-        self.entries.push_back(Entry { number: self.last, level, text, detail, hint, count: 1 });
-        if self.entries.len() > MAX_ENTRIES {
-            self.entries.pop_front();
+        TasksCommand::CancelAll => cancel_all(state, effects),
+        TasksCommand::Retry => state.tasks.failed.clear(),
+        TasksCommand::LogSeen(number) => state.log.seen = state.log.seen.max(number),
+        TasksCommand::Report(err) => state.log.error(&err),
+        TasksCommand::Notice(text) => state.log.info(text),
+    }
+}
+
+/// Tells every job to stop.
+pub(super) fn cancel_all(state: &mut State, effects: &mut Vec<Effect>) {
+    for (ticket, task) in &mut state.tasks.running {
+        task.cancelling = true;
+        effects.push(Effect::Cancel(*ticket));
+    }
+}
+
+/// Ends a task; what it showed on the way is not shown any more.
+pub(super) fn forget(state: &mut State, ticket: Ticket) -> Option<Task> {
+    let task = state.tasks.running.remove(&ticket)?;
+    for recipe in &task.recipes {
+        if state.results.previews.get(&recipe.touch).is_some_and(|preview| preview.recipe == *recipe) {
+            state.results.previews.remove(&recipe.touch);
         }
     }
-
-    /// Adds a notice.
-    pub fn info(&mut self, text: impl Into<String>) {
-        self.push(Level::Info, text, None, None);
-    }
-
-    /// Adds a failure. Being told to stop is only a notice.
-    pub fn error(&mut self, err: &TaskError) {
-        let (level, text, detail) = match err.kind {
-            TaskErrorKind::Cancelled => (Level::Info, format!("{}: cancelled", err.what), None),
-            TaskErrorKind::Failed | TaskErrorKind::Panicked => (Level::Error, err.what.clone(), Some(err.why.clone())),
-        };
-        self.push(level, text, detail, err.hint.clone());
-    }
-
-    /// Entries whose toast was not closed yet.
-    pub fn unseen(&self) -> impl Iterator<Item = &Entry> {
-        self.entries.iter().filter(|entry| entry.number > self.seen)
-    }
+    Some(task)
 }

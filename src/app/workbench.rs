@@ -1,164 +1,21 @@
-//! The workbench: what the 3D panes show besides cloud and model, and what a hand does in them.
-//!
-//! Everything here lasts as long as the window. What a person decides with it (an accepted pose) is the document's.
+//! The room of the workbench: layers, poses by hand, measuring.
+
+pub mod state;
+
+pub use state::*;
 
 use glam::DVec3;
-use strum::EnumIter;
 
-use super::command::Pane;
-use super::keys::{ImprintSource, PairKey, PoseKey, Request, RunKey};
-use super::state::{Lookup, State};
-use crate::domain::frames::PlanarPose;
-use crate::domain::hand::{AcceptedPose, HandAxis, HandCost, HandPose, PoseDifference};
-use crate::domain::rig::{PadId, PerPad, Rig};
-use crate::work::layers::LayerResult;
-use crate::work::pose::PoseResult;
+use super::effect::Effect;
+use super::inspect::InspectCommand;
+use super::keys::{ImprintSource, Request, RunKey};
+use super::state::State;
+use super::{inspect, labels};
+use crate::domain::hand::{self, AcceptedPose, HandAxis, HandCost, HandPose};
+use crate::work::error::TaskError;
 
-/// What colors the contact points in 3D.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
-pub enum Layer {
-    /// One color.
-    #[default]
-    None,
-    /// How far each is from the model.
-    Residuals,
-    /// What became of each.
-    Reasons,
-    /// Lines to the model.
-    Correspondences,
-}
-
-impl Layer {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "None",
-            Self::Residuals => "Residuals",
-            Self::Reasons => "Reasons",
-            Self::Correspondences => "Lines",
-        }
-    }
-
-    /// What it shows, for the tooltip.
-    pub fn tooltip(self) -> &'static str {
-        match self {
-            Self::None => "Contact points in one color",
-            Self::Residuals => "Contact points colored by their distance to the model, in millimeters",
-            Self::Reasons => "Contact points colored by what became of them in the registration",
-            Self::Correspondences => "Lines from contact points to the model",
-        }
-    }
-}
-
-/// What a click in a 3D pane does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
-pub enum SceneTool {
-    /// Reads a point.
-    #[default]
-    Look,
-    /// Moves the tool.
-    Pose,
-    /// Measures between two points.
-    Distance,
-    /// Measures at the second of three points.
-    Angle,
-}
-
-impl SceneTool {
-    /// Points that make a measurement.
-    pub fn marks(self) -> usize {
-        match self {
-            Self::Look | Self::Pose => 0,
-            Self::Distance => 2,
-            Self::Angle => 3,
-        }
-    }
-}
-
-/// A point that was clicked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Picked {
-    /// Of which imprint.
-    pub source: ImprintSource,
-    /// Of which finger.
-    pub finger: PadId,
-    /// Its raw bubble pixel.
-    pub pixel: [u16; 2],
-}
-
-/// A pose being set by hand.
-#[derive(Clone, Debug, PartialEq)]
-pub struct HandTry {
-    /// The pair.
-    pub pair: PairKey,
-    /// The imprint it is set for.
-    pub source: ImprintSource,
-    /// The pose, `grasp_from_object`.
-    pub pose: HandPose,
-    /// Where it began.
-    pub began: HandPose,
-    /// What it costs; `None` while cloud or model are not there.
-    pub cost: Option<HandCost>,
-    /// What it cost where it began.
-    pub began_cost: Option<HandCost>,
-    /// The registration from here that is being computed.
-    pub icp: Option<RunKey>,
-    /// The registration that put it where it is, if one did and nothing moved it since.
-    pub from_icp: Option<RunKey>,
-}
-
-/// What the 3D panes do and show besides.
-#[derive(Clone, Debug)]
-pub struct Workbench {
-    /// What colors the contact points.
-    pub layer: Layer,
-    /// Whether the tool is moved along its weakest direction.
-    pub animate_weakest: bool,
-    /// Whether each 3D pane shows the clouds of both imprints.
-    pub both_clouds: bool,
-    /// What a click does.
-    pub tool: SceneTool,
-    /// Whether the tool can leave the plane.
-    pub six_dof: bool,
-    /// The side that the pointer was over last: what the panes beside the 3D views are about.
-    pub side: ImprintSource,
-    /// The pose being set.
-    pub hand: Option<HandTry>,
-    /// The point clicked last.
-    pub picked: Option<Picked>,
-    /// Points of the measurement, meters, grasp frame, and the side they were clicked in.
-    pub marks: Vec<(ImprintSource, DVec3)>,
-}
-
-impl Default for Workbench {
-    fn default() -> Self {
-        Self {
-            layer: Layer::None,
-            animate_weakest: false,
-            both_clouds: false,
-            tool: SceneTool::Look,
-            six_dof: false,
-            side: ImprintSource::Measured,
-            hand: None,
-            picked: None,
-            marks: Vec::new(),
-        }
-    }
-}
-
-impl Workbench {
-    /// Forgets what was of the pair: another one is shown.
-    pub(super) fn leave_pair(&mut self) {
-        self.hand = None;
-        self.picked = None;
-        self.marks.clear();
-    }
-
-    /// The pose being set for one imprint.
-    pub fn hand(&self, source: ImprintSource) -> Option<&HandTry> {
-        self.hand.as_ref().filter(|hand| hand.source == source)
-    }
-}
+/// Width of the kernel that costs of poses by hand are counted with, meters: the narrowest of the registration.
+const KERNEL_M: f64 = 1e-3;
 
 /// What can happen to the workbench.
 #[derive(Clone, Debug, PartialEq)]
@@ -193,141 +50,158 @@ pub enum WorkbenchCommand {
     ClearMarks,
 }
 
-/// A finger's row, or the joint one, of the table of poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PoseOf {
-    /// From one finger alone.
-    Finger(PadId),
-    /// From all together.
-    Joint,
-}
-
-impl PoseOf {
-    /// The name on screen.
-    pub fn name(self, rig: &Rig) -> String {
-        match self {
-            Self::Finger(finger) => format!("{} finger", rig.pad_name(finger)),
-            Self::Joint => "Joint".into(),
-        }
-    }
-
-    /// All rows of a rig's table.
-    pub fn all(rig: &Rig) -> Vec<Self> {
-        rig.pads().map(Self::Finger).chain([Self::Joint]).collect()
-    }
-
-    fn finger(self) -> Option<PadId> {
-        match self {
-            Self::Finger(finger) => Some(finger),
-            Self::Joint => None,
-        }
-    }
-}
-
-impl State {
-    /// The true pose of the selected pair, `grasp_from_object`, where it is known.
-    pub fn truth(&self) -> Option<PlanarPose> {
-        self.sample().ready()?.grasp_from_object
-    }
-
-    /// The pose that was accepted for an imprint of the selected pair.
-    pub fn accepted(&self, source: ImprintSource) -> Option<AcceptedPose> {
-        self.document.pair(self.pair_name())?.accepted(source)
-    }
-
-    /// The pose that a person set and accepted.
-    pub fn by_hand(&self, source: ImprintSource) -> Option<HandPose> {
-        self.accepted(source).filter(|a| a.by_hand).map(|a| a.pose)
-    }
-
-    /// Where the tool is shown: where a hand holds it, else where a person put it, else where it was registered.
-    pub fn shown_pose(&self, source: ImprintSource) -> Option<HandPose> {
-        let held = self.workbench.hand(source).map(|hand| hand.pose);
-        held.or_else(|| self.by_hand(source)).or_else(|| Some(self.pose(source).shown()?.grasp_from_object.into()))
-    }
-
-    /// Where setting a pose by hand begins.
-    pub fn hand_begins(&self, source: ImprintSource) -> HandPose {
-        let accepted = self.accepted(source).map(|a| a.pose);
-        accepted.or_else(|| Some(self.pose(source).shown()?.grasp_from_object.into())).unwrap_or_default()
-    }
-
-    /// The recorded registration from the engine's own starts; `Ok(None)` while its inputs are not there.
-    pub fn run_key(&self, source: ImprintSource) -> Option<RunKey> {
-        Some(RunKey { pose: self.pose_key(source).ok()??, start: None })
-    }
-
-    /// What the layers show of an imprint.
-    pub fn layers(&self, source: ImprintSource) -> Lookup<'_, LayerResult> {
-        match self.pose_key(source) {
-            Err(absent) => Lookup::Absent(absent),
-            Ok(None) => Lookup::Waiting,
-            Ok(Some(key)) => match self.results.layers.get(&key) {
-                Some(layers) => Lookup::Ready(layers),
-                None => {
-                    let run = Request::Run(RunKey { pose: key.clone(), start: None });
-                    let failed = |request: &Request| self.tasks.failed.get(request);
-                    match failed(&run).or_else(|| failed(&Request::Layers(key))) {
-                        Some(err) => Lookup::Failed(err),
-                        None => Lookup::Waiting,
-                    }
-                }
-            },
-        }
-    }
-
-    /// Whether something on screen shows the layers of an imprint.
-    pub fn shows_layers(&self, source: ImprintSource) -> bool {
-        let scene = match source {
-            ImprintSource::Measured => Pane::SceneMeasured,
-            ImprintSource::Predicted => Pane::ScenePredicted,
-        };
-        let bench = &self.workbench;
-        let in_scene = self.selection.panes.contains(&scene)
-            && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
-                || bench.picked.is_some_and(|picked| picked.source == source));
-        in_scene || (self.selection.panes.contains(&Pane::Layers) && bench.side == source)
-    }
-
-    /// The recipe of the pose from one finger or both; `Ok(None)` while something is not there yet.
-    ///
-    /// # Errors
-    /// Why there can be none.
-    pub fn pose_key_of(&self, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, super::state::Absent> {
-        let Some(mut key) = self.pose_key(source)? else { return Ok(None) };
-        if let Some(finger) = of.finger() {
-            let part = key.cloud.parts[finger].take();
-            if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
-                return Err(super::state::Absent::NoFinger);
+pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut Vec<Effect>) {
+    let bench = &mut state.workbench;
+    match command {
+        WorkbenchCommand::SetLayer(layer) => bench.layer = layer,
+        WorkbenchCommand::SetAnimateWeakest(on) => bench.animate_weakest = on,
+        WorkbenchCommand::SetBothClouds(on) => bench.both_clouds = on,
+        WorkbenchCommand::SetTool(tool) => {
+            bench.tool = tool;
+            bench.marks.clear();
+            if tool != SceneTool::Pose {
+                bench.hand = None;
             }
-            key.cloud.parts = PerPad::default();
-            key.cloud.parts[finger] = part;
         }
-        Ok(Some(key))
-    }
-
-    /// The pose from one finger or both.
-    pub fn pose_of(&self, source: ImprintSource, of: PoseOf) -> Lookup<'_, PoseResult> {
-        match self.pose_key_of(source, of) {
-            Err(absent) => Lookup::Absent(absent),
-            Ok(None) => Lookup::Waiting,
-            Ok(Some(key)) => match self.results.poses.get(&key) {
-                Some(pose) => Lookup::Ready(pose),
-                None => {
-                    let failed = |request: &Request| self.tasks.failed.get(request);
-                    let cloud = Request::Cloud(key.cloud.clone());
-                    match failed(&Request::Pose(key)).or_else(|| failed(&cloud)) {
-                        Some(err) => Lookup::Failed(err),
-                        None => Lookup::Waiting,
-                    }
-                }
-            },
+        WorkbenchCommand::SetSixDof(on) => {
+            bench.six_dof = on;
+            // A tilt that can no longer be changed must not stay unseen.
+            if let Some(hand) = bench.hand.as_ref().filter(|hand| !on && !hand.pose.is_planar()) {
+                let flat = HandPose::from(hand.pose.planar);
+                put(state, |_| flat);
+            }
         }
+        WorkbenchCommand::SetSide(side) => bench.side = side,
+        WorkbenchCommand::Nudge(axis, by) => {
+            if bench.tool == SceneTool::Pose && (bench.six_dof || !axis.leaves_plane()) {
+                put(state, |pose| pose.moved(axis, by));
+            }
+        }
+        WorkbenchCommand::SetHandPose(pose) => {
+            if bench.tool == SceneTool::Pose {
+                put(state, |_| pose);
+            }
+        }
+        WorkbenchCommand::StartIcp => start_icp(state),
+        WorkbenchCommand::AcceptHand => accept(state, effects),
+        WorkbenchCommand::RevertHand => bench.hand = None,
+        WorkbenchCommand::Pick(picked) => bench.picked = picked,
+        WorkbenchCommand::Mark(side, point) => {
+            let needed = bench.tool.marks();
+            if needed == 0 || !point.is_finite() {
+                return;
+            }
+            // A measurement is of one view; a complete one makes room for the next.
+            if bench.marks.len() >= needed || bench.marks.first().is_some_and(|(of, _)| *of != side) {
+                bench.marks.clear();
+            }
+            bench.marks.push((side, point));
+        }
+        WorkbenchCommand::ClearMarks => bench.marks.clear(),
     }
+}
 
-    /// How far the registered poses of measurement and prediction are apart, where both are there.
-    pub fn sides_apart(&self) -> Option<PoseDifference> {
-        let pose = |source| Some(self.pose(source).ready()?.grasp_from_object);
-        Some(PoseDifference::between(pose(ImprintSource::Measured)?, pose(ImprintSource::Predicted)?))
+/// What a pose costs with the contact points of an imprint; `None` while cloud or model are not there.
+fn cost_of(state: &State, source: ImprintSource, pose: HandPose) -> Option<HandCost> {
+    let clouds = state.cloud(source).ready()?;
+    let tool = &state.tool().ready()?.model;
+    Some(hand::cost(&clouds.contact_points(), &tool.field, &tool.distance, pose, KERNEL_M))
+}
+
+/// The pose being set for the side in hand; begins one if there is none.
+fn hold(state: &State) -> Option<HandTry> {
+    let (pair, source) = (state.pair_key()?, state.workbench.side);
+    if let Some(hand) = state.workbench.hand(source).filter(|hand| hand.pair == pair) {
+        return Some(hand.clone());
     }
+    // Without a model there is nothing to be moved.
+    state.tool().ready()?;
+    let began = state.hand_begins(source);
+    let cost = cost_of(state, source, began);
+    Some(HandTry { pair, source, pose: began, began, cost, began_cost: cost, icp: None, from_icp: None })
+}
+
+/// Puts the tool where `to` says, from where it is. A pose that is not finite changes nothing.
+fn put(state: &mut State, to: impl FnOnce(HandPose) -> HandPose) {
+    let Some(mut hand) = hold(state) else { return };
+    let pose = to(hand.pose);
+    if !pose.is_finite() {
+        return;
+    }
+    hand.cost = cost_of(state, hand.source, pose);
+    hand.pose = pose;
+    // A registration from the place before is no longer asked for.
+    hand.icp = None;
+    hand.from_icp = None;
+    state.workbench.hand = Some(hand);
+}
+
+/// The contact points changed: the same pose costs something else.
+pub(super) fn refresh_cost(state: &mut State) {
+    let Some(mut hand) = state.workbench.hand.take() else { return };
+    hand.cost = cost_of(state, hand.source, hand.pose);
+    hand.began_cost = cost_of(state, hand.source, hand.began);
+    state.workbench.hand = Some(hand);
+}
+
+fn start_icp(state: &mut State) {
+    const WHAT: &str = "Start ICP from here";
+    if state.workbench.tool != SceneTool::Pose {
+        return;
+    }
+    let Some(mut hand) = hold(state) else {
+        return state.log.error(&TaskError::new(WHAT, "there is no tool to be moved"));
+    };
+    let Ok(Some(pose)) = state.pose_key(hand.source) else {
+        return state.log.error(&TaskError::new(WHAT, "the contact points are not there yet").with_hint("Try again."));
+    };
+    let (source, start) = (hand.source, hand.pose.planar);
+    let key = RunKey { pose, start: Some(start.into()) };
+    // Asked for by a person: what failed before is tried again.
+    state.tasks.failed.remove(&Request::Run(key.clone()));
+    hand.icp = Some(key.clone());
+    hand.from_icp = None;
+    state.workbench.hand = Some(hand);
+    if state.results.runs.contains(&key) {
+        run_arrived(state, &key);
+    }
+    // The time machine shows the same run, at its end: there the tool in hand goes.
+    inspect::step(state, InspectCommand::Source(source));
+    inspect::step(state, InspectCommand::Start(Some(start)));
+    inspect::step(state, InspectCommand::End);
+}
+
+/// A recorded registration is there: the tool in hand goes where the one it waits for ended.
+pub(super) fn run_arrived(state: &mut State, key: &RunKey) {
+    let Some(hand) = state.workbench.hand.as_ref().filter(|hand| hand.icp.as_ref() == Some(key)) else { return };
+    let source = hand.source;
+    let Some(pose) = state.results.runs.get(key).map(|run| HandPose::from(run.grasp_from_object)) else { return };
+    let cost = cost_of(state, source, pose);
+    if let Some(hand) = &mut state.workbench.hand {
+        hand.pose = pose;
+        hand.cost = cost;
+        hand.icp = None;
+        hand.from_icp = Some(key.clone());
+    }
+}
+
+/// A recorded registration failed; whether a person waits for it, who has to be told.
+pub(super) fn run_failed(state: &mut State, key: &RunKey) -> bool {
+    match &mut state.workbench.hand {
+        Some(hand) if hand.icp.as_ref() == Some(key) => {
+            hand.icp = None;
+            true
+        }
+        _ => false,
+    }
+}
+
+fn accept(state: &mut State, effects: &mut Vec<Effect>) {
+    let Some(hand) = state.workbench.hand.clone() else { return };
+    if !labels::check_editable(state, "Accept the pose") {
+        return;
+    }
+    let accepted = AcceptedPose { pose: hand.pose, by_hand: true };
+    state.workbench.hand = None;
+    labels::set_accepted(state, "pose set by hand", hand.source, Some(accepted), effects);
 }

@@ -18,8 +18,10 @@ use super::theme::{DARK, LIGHT};
 use super::widget::image_canvas::ViewTransform;
 use super::{bars, layout, log as log_pane, palette, pane, scene, shortcuts, theme};
 use crate::app::action::Action;
-use crate::app::command::{Command, Pane, UiRequest};
-use crate::app::evaluation::EvaluateCommand;
+use crate::app::command::{
+    Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
+};
+use crate::app::evaluate::EvaluateCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
 use crate::app::runtime::Runtime;
@@ -92,9 +94,9 @@ impl StudioApp {
         let mut state = State::default();
         let place = options.open.map(Place::Path);
         let requests = runtime.start(&mut state, place);
-        let mut inbox: Vec<Command> = requests.into_iter().map(Command::Ui).collect();
+        let mut inbox: Vec<Command> = requests.into_iter().map(|request| ViewCommand::Ui(request).into()).collect();
         if options.reset {
-            inbox.push(Command::ResetSettings);
+            inbox.push(Command::Settings(SettingsCommand::ResetSettings));
         }
         Self {
             state,
@@ -120,8 +122,8 @@ impl StudioApp {
     }
 
     /// Executes a command before the next frame. For tests and the screenshot tool.
-    pub fn push(&mut self, command: Command) {
-        self.inbox.push(command);
+    pub fn push(&mut self, command: impl Into<Command>) {
+        self.inbox.push(command.into());
     }
 
     /// Pictures sent to the graphics card so far.
@@ -150,34 +152,42 @@ impl StudioApp {
         // A text for the clipboard and the like is the window's business, all else the model's.
         let mut requests = Vec::new();
         commands.retain(|c| match c {
-            Command::Ui(request) => {
+            Command::View(ViewCommand::Ui(request)) => {
                 requests.push(request.clone());
                 false
             }
             _ => true,
         });
-        if commands.iter().any(|c| matches!(c, Command::Undo | Command::Redo | Command::SetWorkspace(_))) {
+        if commands.iter().any(|c| {
+            matches!(
+                c,
+                Command::Labels(LabelsCommand::Undo)
+                    | Command::Labels(LabelsCommand::Redo)
+                    | Command::Settings(SettingsCommand::SetWorkspace(_))
+            )
+        }) {
             // The pen is not to be followed into another state.
             self.local.painting = None;
         }
         let other_poses = |c: &Command| {
-            use Command::{ResetSettings, SetMask, SetMaskSource, SetPoseEngine, SetShift};
+            use SettingsCommand::{ResetSettings, SetMask, SetMaskSource, SetPoseEngine, SetShift};
+            let Command::Settings(c) = c else { return false };
             matches!(c, SetMask(_) | SetMaskSource(_) | SetPoseEngine(_) | SetShift(_) | ResetSettings)
         };
         if commands.iter().any(other_poses) {
             // Figures made in another way do not belong into the same table.
             self.local.seen.clear();
         }
-        if commands.iter().any(|c| matches!(c, Command::ResetSettings)) {
+        if commands.iter().any(|c| matches!(c, Command::Settings(SettingsCommand::ResetSettings))) {
             self.trees.clear();
         }
         let switched = commands.iter().find_map(|c| match c {
-            Command::SetWorkspace(w) if *w != self.state.settings.workspace => Some(*w),
+            Command::Settings(SettingsCommand::SetWorkspace(w)) if *w != self.state.settings.workspace => Some(*w),
             _ => None,
         });
         if let Some(workspace) = switched {
             self.local.scrolled_to = None;
-            commands.push(Command::ShowBothFingers(workspace == Workspace::Label));
+            commands.push(Command::View(ViewCommand::ShowBothFingers(workspace == Workspace::Label)));
         }
         requests.extend(self.runtime.tick(&mut self.state, commands));
         if self.inline {
@@ -206,7 +216,7 @@ impl StudioApp {
             ctx.set_zoom_factor(settings.ui_zoom);
         } else if (ctx.zoom_factor() - self.applied_zoom).abs() > 1e-4 {
             self.applied_zoom = ctx.zoom_factor();
-            self.inbox.push(Command::SetUiZoom(self.applied_zoom));
+            self.inbox.push(Command::Settings(SettingsCommand::SetUiZoom(self.applied_zoom)));
         }
     }
 
@@ -223,7 +233,7 @@ impl StudioApp {
         if self.state.can_generate().is_ok() && self.state.sample().ready().is_some() {
             self.first_prediction = true;
             if self.state.chosen(self.state.selection.finger).is_none() {
-                self.inbox.push(Command::Generate);
+                self.inbox.push(Command::Predict(PredictCommand::Generate));
             }
         }
     }
@@ -332,7 +342,7 @@ impl StudioApp {
         let all = std::iter::once(own).chain(Workspace::iter());
         let Some(workspace) = all.into_iter().find(|w| layout::panes_of(*w).contains(&pane)) else { return };
         if workspace != own {
-            self.inbox.push(Command::SetWorkspace(workspace));
+            self.inbox.push(Command::Settings(SettingsCommand::SetWorkspace(workspace)));
         }
         self.local.maximized = None;
         if let Some(tree) = self.trees.get_mut(&workspace)
@@ -346,7 +356,7 @@ impl StudioApp {
 
     fn store_layout(&mut self, workspace: Workspace) {
         if let Some(text) = self.trees.get(&workspace).and_then(layout::to_text) {
-            self.inbox.push(Command::SetLayout(workspace, text));
+            self.inbox.push(Command::Settings(SettingsCommand::SetLayout(workspace, text)));
         }
     }
 
@@ -354,7 +364,7 @@ impl StudioApp {
     fn outside(&mut self, ctx: &egui::Context) {
         let dropped: Vec<PathBuf> = ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
         if let Some(path) = dropped.into_iter().next() {
-            self.inbox.push(Command::Open(Place::Path(path)));
+            self.inbox.push(Command::Library(LibraryCommand::Open(Place::Path(path))));
         }
         while let Ok(image) = self.shots.try_recv() {
             self.inbox.push(super::screenshot::save(self.folder.as_deref(), &image));
@@ -440,8 +450,8 @@ impl eframe::App for StudioApp {
             bars::drop_overlay(&cx, &ctx);
             if let Some((purpose, path)) = cx.local.dialogs.show(&ctx) {
                 cx.push(match purpose {
-                    Purpose::Folder | Purpose::File => Command::Open(Place::Path(path)),
-                    Purpose::Export => Command::ExportMasks(path),
+                    Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
+                    Purpose::Export => Command::Labels(LabelsCommand::ExportMasks(path)),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });
             }
@@ -468,7 +478,10 @@ impl eframe::App for StudioApp {
     fn on_exit(&mut self) {
         let commands = std::mem::take(&mut self.inbox);
         self.runtime.tick(&mut self.state, commands);
-        self.runtime.tick(&mut self.state, vec![Command::EndStroke, Command::Save]);
+        self.runtime.tick(
+            &mut self.state,
+            vec![Command::Labels(LabelsCommand::EndStroke), Command::Labels(LabelsCommand::Save)],
+        );
         // Dropping the runtime waits for what is being written.
         self.runtime = Runtime::inline(self.services.clone());
     }
@@ -479,10 +492,10 @@ impl StudioApp {
     fn after_panes(&mut self, ctx: &egui::Context, out: &mut Vec<Command>) {
         self.local.visible = std::mem::take(&mut self.local.visible_next);
         if self.local.visible != self.state.selection.panes {
-            out.push(Command::ShowPanes(self.local.visible.clone()));
+            out.push(Command::View(ViewCommand::ShowPanes(self.local.visible.clone())));
         }
         if self.state.selection.hover.is_some() && !self.local.hover_claimed {
-            out.push(Command::HoverPixel(None));
+            out.push(Command::View(ViewCommand::HoverPixel(None)));
         }
         if self.local.readout != self.local.readout_shown {
             // The status bar was drawn before the pane under the pointer: once more, with the number in it.
@@ -492,7 +505,7 @@ impl StudioApp {
         self.local.readout_before.clone_from(&self.local.readout);
         if self.local.painting.is_some() && !ctx.input(|i| i.pointer.any_down()) {
             self.local.painting = None;
-            out.push(Command::EndStroke);
+            out.push(Command::Labels(LabelsCommand::EndStroke));
         }
     }
 }

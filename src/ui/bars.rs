@@ -8,7 +8,7 @@ use super::dialogs::Purpose;
 use super::theme::{SMALL, caption, medium};
 use super::widget::progress;
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{LibraryCommand, SettingsCommand, TasksCommand, ViewCommand};
 use crate::app::library::Place;
 use crate::app::settings::{Theme, Workspace};
 
@@ -35,7 +35,7 @@ pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui) {
                 let button = egui::Button::new(text).right_text(caption("Ctrl+P", cx.p)).min_size(vec2(width, 24.0));
                 let response = ui.add(button).accessible_name("Command palette");
                 if response.on_hover_text(Action::Palette.help()).clicked() {
-                    cx.push(Command::SetPalette(true));
+                    cx.push(ViewCommand::SetPalette(true));
                 }
             });
         });
@@ -45,11 +45,11 @@ pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
     let (response, _) = egui::containers::menu::MenuButton::new("Open").ui(ui, |ui| {
         if ui.button("Demo").on_hover_text(Action::OpenDemo.tooltip()).clicked() {
-            cx.push(Command::Open(Place::Demo));
+            cx.push(LibraryCommand::Open(Place::Demo));
         }
         let tip = "46 simulated grasps of each of 9 seen and 3 unseen tools, none of them trained on";
         if ui.button("Test set").on_hover_text(tip).clicked() {
-            cx.push(Command::Open(Place::Path("test-set".into())));
+            cx.push(LibraryCommand::Open(Place::Path("test-set".into())));
         }
         let button = ui.add(egui::Button::new("Folder…").shortcut_text("Ctrl+O"));
         if button.on_hover_text(Action::OpenFolder.tooltip()).clicked() {
@@ -115,7 +115,7 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
         Workspace::Evaluate => Action::EvaluateWorkspace,
     };
     if response.on_hover_text(tip.tooltip()).clicked() {
-        cx.push(Command::SetWorkspace(workspace));
+        cx.push(SettingsCommand::SetWorkspace(workspace));
     }
 }
 
@@ -151,14 +151,14 @@ fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
         let button = ui.add(egui::Button::selectable(on, RichText::new(&name).size(12.0)).min_size(vec2(44.0, 20.0)));
         let button = button.accessible_name(format!("{name} finger"));
         if button.on_hover_text(format!("Show the {} finger (U switches)", cx.state.finger_name(finger))).clicked() {
-            cx.push(Command::SelectFinger(finger));
+            cx.push(ViewCommand::SelectFinger(finger));
         }
     }
     let both = cx.state.selection.both_fingers;
     let button = ui.add(egui::Button::selectable(both, RichText::new("Both").size(12.0)).min_size(vec2(44.0, 20.0)));
     let button = button.accessible_name("Both fingers");
     if button.on_hover_text(Action::BothFingers.help()).clicked() {
-        cx.push(Command::ShowBothFingers(!both));
+        cx.push(ViewCommand::ShowBothFingers(!both));
     }
 }
 
@@ -171,7 +171,7 @@ fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
         let cancel = ui.add_enabled(!cancelling, egui::Button::new(RichText::new("Cancel").size(SMALL)));
         let cancel = cancel.accessible_name(format!("Cancel: {}", task.title));
         if cancel.on_hover_text("Stop this job (Esc)").clicked() {
-            cx.push(Command::Cancel(ticket));
+            cx.push(TasksCommand::Cancel(ticket));
         }
         let text = if cancelling { "stopping…".to_owned() } else { task.progress.text.clone() };
         progress::bar(ui, 150.0, task.progress.fraction(), &text);
@@ -241,7 +241,7 @@ pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
                 });
                 ui.add_space(8.0);
                 if ui.button("Got it").on_hover_text("Do not show this again").clicked() {
-                    cx.push(Command::DismissHint);
+                    cx.push(SettingsCommand::DismissHint);
                 }
             });
         });

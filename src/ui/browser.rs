@@ -12,8 +12,8 @@ use super::theme::{Palette, SMALL, caption};
 use super::widget::empty;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
-use crate::app::command::Command;
-use crate::app::document::Review;
+use crate::app::command::{Command, LibraryCommand};
+use crate::app::labels::Review;
 use crate::app::library::{Place, Sort};
 use crate::domain::dataset::PairId;
 
@@ -57,7 +57,7 @@ fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
     let (response, _) = egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| {
         ui.set_min_width(220.0);
         if ui.button("Demo").on_hover_text("Simulated touches of 12 tools, made when they are looked at").clicked() {
-            cx.push(Command::Open(Place::Demo));
+            cx.push(LibraryCommand::Open(Place::Demo));
         }
         let folder = ui.add(egui::Button::new("Open folder…").shortcut_text("Ctrl+O"));
         if folder.on_hover_text("A folder in the lab's layout, or a folder of image pairs").clicked() {
@@ -84,7 +84,7 @@ fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
                 let text = place.to_string();
                 let short = text.rsplit('/').next().unwrap_or(&text).to_owned();
                 if ui.button(short).on_hover_text(text).clicked() {
-                    cx.push(Command::Open(place));
+                    cx.push(LibraryCommand::Open(place));
                 }
             }
         }
@@ -104,7 +104,7 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui) {
             response.request_focus();
         }
         if response.changed() {
-            cx.out.push(Command::SetFilter(cx.local.filter.clone()));
+            cx.out.push(Command::Library(LibraryCommand::SetFilter(cx.local.filter.clone())));
         } else if !response.has_focus() && cx.local.filter != cx.state.library.filter {
             cx.local.filter.clone_from(&cx.state.library.filter);
         }
@@ -117,7 +117,7 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui) {
         let response = combo.show_ui(ui, |ui| {
             for s in Sort::iter() {
                 if ui.selectable_label(s == sort, s.name()).clicked() {
-                    cx.out.push(Command::SetSort(s));
+                    cx.out.push(Command::Library(LibraryCommand::SetSort(s)));
                 }
             }
         });
@@ -131,11 +131,11 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui) {
         let combo = egui::ComboBox::from_id_salt("tool").width(ui.available_width()).selected_text(text).truncate();
         let response = combo.show_ui(ui, |ui| {
             if ui.selectable_label(chosen.is_none(), "All tools").clicked() {
-                cx.out.push(Command::SetToolFilter(None));
+                cx.out.push(Command::Library(LibraryCommand::SetToolFilter(None)));
             }
             for tool in &open.tools {
                 if ui.selectable_label(chosen.as_ref() == Some(tool), tool).clicked() {
-                    cx.out.push(Command::SetToolFilter(Some(tool.clone())));
+                    cx.out.push(Command::Library(LibraryCommand::SetToolFilter(Some(tool.clone()))));
                 }
             }
         });
@@ -184,8 +184,8 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.act(Action::OpenDemo);
             }
         } else if empty::show(ui, "Nothing passes the filter", "", Some(("Clear the filter", "Shows all pairs"))) {
-            cx.push(Command::SetFilter(String::new()));
-            cx.push(Command::SetToolFilter(None));
+            cx.push(LibraryCommand::SetFilter(String::new()));
+            cx.push(LibraryCommand::SetToolFilter(None));
         }
         return;
     }
@@ -215,7 +215,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
         range
     });
     if output.inner != cx.state.library.rows {
-        cx.push(Command::ShowRows(output.inner));
+        cx.push(LibraryCommand::ShowRows(output.inner));
     }
 }
 
@@ -275,7 +275,7 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
     }
     let tip = format!("{}\n{}", entry.name, review.name());
     if response.on_hover_text(tip).clicked() {
-        cx.push(Command::Select(id));
+        cx.push(LibraryCommand::Select(id));
     }
 }
 

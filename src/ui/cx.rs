@@ -38,8 +38,8 @@ pub(super) struct Cx<'a> {
 
 impl Cx<'_> {
     /// Puts a command on the list.
-    pub(super) fn push(&mut self, command: Command) {
-        self.out.push(command);
+    pub(super) fn push(&mut self, command: impl Into<Command>) {
+        self.out.push(command.into());
     }
 
     /// Puts an action on the list, if it can do anything now.

@@ -7,8 +7,8 @@ use super::cx::Cx;
 use super::theme::{SMALL, caption, section, value};
 use super::widget::progress;
 use crate::app::action::Action;
-use crate::app::command::Command;
-use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode};
+use crate::app::command::{PredictCommand, SettingsCommand, TasksCommand};
+use crate::app::keys::{ComparisonKey, PredictionKey, Preset, Sampler, ShiftMode};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::domain::diffusion::GUIDANCE;
 use crate::work::bundles::{BundleInfo, BundleKind};
@@ -150,7 +150,7 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
         if new.preset == spelt_out.preset && !new.same_numbers(&spelt_out) {
             new.preset = None;
         }
-        cx.push(Command::SetGenerate(new));
+        cx.push(SettingsCommand::SetGenerate(new));
     }
 }
 
@@ -174,7 +174,7 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
                 progress::bar(ui, width - 76.0, fraction, &text);
                 let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
                 if cancel.on_hover_text("Stop generating; what is shown stays (Esc)").clicked() {
-                    cx.push(Command::Cancel(ticket));
+                    cx.push(TasksCommand::Cancel(ticket));
                 }
             });
         }
@@ -255,7 +255,7 @@ fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
         for mode in ShiftMode::iter().chain(cx.state.settings.refit.map(ShiftMode::Refit)) {
             let radio = ui.radio(mode == current, mode.label());
             if radio.on_hover_text(shift_tooltip(mode)).clicked() {
-                cx.push(Command::SetShift(mode));
+                cx.push(SettingsCommand::SetShift(mode));
             }
         }
         if cx.state.settings.refit.is_none() {
@@ -281,7 +281,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             .state
             .results
             .comparisons
-            .get(&(recipe.clone(), shift))
+            .get(&ComparisonKey(recipe.clone(), shift))
             .and_then(|c| c.psnr_db)
             .map_or(String::new(), |v| format!("{v:.1} dB"));
         let made = cx.state.results.predictions.get(recipe);
@@ -306,7 +306,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             let reuse = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).min_size(vec2(30.0, 18.0)));
             let reuse = reuse.accessible_name(format!("Use seed {}", recipe.seed));
             if reuse.on_hover_text("Take the seed, the sampler and its numbers for the next run").clicked() {
-                cx.push(Command::SetGenerate(GenerateSettings {
+                cx.push(SettingsCommand::SetGenerate(GenerateSettings {
                     preset: None,
                     steps: recipe.steps,
                     seed: recipe.seed,
@@ -324,12 +324,12 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// Shows a prediction, and that of the other finger made with the same settings, if there is one.
 fn choose(cx: &mut Cx<'_>, recipe: &PredictionKey) {
-    cx.push(Command::Choose(recipe.clone()));
+    cx.push(PredictCommand::Choose(recipe.clone()));
     for finger in cx.state.rig().pads() {
         let Some(touch) = cx.state.touch_key(finger) else { continue };
         let other = PredictionKey { touch, ..recipe.clone() };
         if other != *recipe && cx.state.results.predictions.contains(&other) {
-            cx.push(Command::Choose(other));
+            cx.push(PredictCommand::Choose(other));
         }
     }
 }

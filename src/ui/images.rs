@@ -10,7 +10,7 @@ use super::widget::colorbar::{self, Asked, Colorbar};
 use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, shows_squares};
 use super::widget::texture::{Histogram, depth_image, difference_gain, mask_image, outline, rgb_image};
 use super::widget::{brush_cursor, empty};
-use crate::app::command::{Command, Hover, Pane};
+use crate::app::command::{Hover, LabelsCommand, Pane, SettingsCommand, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, MaskVersion, ShiftMode};
 use crate::app::results::Preview;
 use crate::app::settings::{ColorMap as MapChoice, ColorRange, MaskTool};
@@ -171,10 +171,10 @@ fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histog
     };
     match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {
         Some(Asked::Range(r)) => {
-            cx.push(Command::SetRange(ColorRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..range }));
+            cx.push(SettingsCommand::SetRange(ColorRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..range }));
         }
-        Some(Asked::Auto) => cx.push(Command::RangeFromShown),
-        Some(Asked::Lock(locked)) => cx.push(Command::SetRange(ColorRange { locked, ..range })),
+        Some(Asked::Auto) => cx.push(SettingsCommand::RangeFromShown),
+        Some(Asked::Lock(locked)) => cx.push(SettingsCommand::SetRange(ColorRange { locked, ..range })),
         None => {}
     }
 }
@@ -252,7 +252,7 @@ pub(super) fn failed(cx: &mut Cx<'_>, ui: &mut Ui, err: &TaskError) {
         None => err.why.clone(),
     };
     if empty::show(ui, &format!("{} failed", err.what), &why, Some(("Try again", "Computes it again (Ctrl+R)"))) {
-        cx.push(Command::Retry);
+        cx.push(TasksCommand::Retry);
     }
 }
 
@@ -379,7 +379,7 @@ fn hover(cx: &mut Cx<'_>, finger: PadId, at_px: [f32; 2]) {
     cx.local.hover_claimed = true;
     let hover = Some(Hover { finger, at_px });
     if cx.state.selection.hover != hover {
-        cx.push(Command::HoverPixel(hover));
+        cx.push(ViewCommand::HoverPixel(hover));
     }
 }
 
@@ -581,17 +581,17 @@ fn paint_stroke(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, pane: Pane, sou
                 let erase = button == PointerButton::Secondary || modifiers.ctrl || modifiers.command;
                 cx.local.painting = Some(here);
                 if cx.state.selection.finger != finger {
-                    cx.push(Command::SelectFinger(finger));
+                    cx.push(ViewCommand::SelectFinger(finger));
                 }
                 let at_px = output.map.to_image(pos);
-                cx.push(Command::BeginStroke { finger, source, at_px, erase });
+                cx.push(LabelsCommand::BeginStroke { finger, source, at_px, erase });
             }
             Event::PointerMoved(pos) if cx.local.painting == Some(here) => {
-                cx.push(Command::StrokeTo(output.map.to_image(pos)));
+                cx.push(LabelsCommand::StrokeTo(output.map.to_image(pos)));
             }
             Event::PointerButton { pressed: false, .. } | Event::PointerGone if cx.local.painting == Some(here) => {
                 cx.local.painting = None;
-                cx.push(Command::EndStroke);
+                cx.push(LabelsCommand::EndStroke);
             }
             _ => {}
         }
@@ -601,7 +601,7 @@ fn paint_stroke(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, pane: Pane, sou
         let amount = scroll.x + scroll.y;
         let radius = cx.state.settings.mask.radius_px;
         if amount != 0.0 {
-            cx.push(Command::SetBrushRadius(radius * (amount * 0.005).exp()));
+            cx.push(SettingsCommand::SetBrushRadius(radius * (amount * 0.005).exp()));
         }
         let ctrl = ui.input(|i| i.modifiers.ctrl || i.pointer.secondary_down());
         let erase = (tool == MaskTool::Eraser) != ctrl;

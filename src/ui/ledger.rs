@@ -15,7 +15,7 @@ use super::theme::{SMALL, caption, medium, pane_frame, section};
 use super::widget::progress;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, SettingsCommand, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode, shift_tooltip};
 use crate::app::state::Lookup;
 use crate::domain::colormap::{ColorMap, Range};
@@ -88,7 +88,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
             let button = ui.add(egui::Button::selectable(of == finger, text).min_size(vec2(0.0, 20.0)));
             let button = button.accessible_name(format!("Depth chain of the {name} finger"));
             if button.on_hover_text("The finger that the chain is of").clicked() {
-                cx.push(Command::SelectFinger(of));
+                cx.push(ViewCommand::SelectFinger(of));
             }
         }
         ui.label(caption("Shift", cx.p));
@@ -102,7 +102,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
             for mode in ShiftMode::iter().chain(own) {
                 let label = ui.selectable_label(mode == current, mode.label());
                 if label.on_hover_text(shift_tooltip(mode)).clicked() {
-                    cx.out.push(Command::SetShift(mode));
+                    cx.out.push(Command::Settings(SettingsCommand::SetShift(mode)));
                 }
             }
         });
@@ -116,7 +116,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
                 progress::bar(ui, ui.available_width() - 84.0, fraction, &text);
                 let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
                 if cancel.on_hover_text("Stop computing shift statistics").clicked() {
-                    cx.push(Command::Cancel(ticket));
+                    cx.push(TasksCommand::Cancel(ticket));
                 }
             });
         }
@@ -335,6 +335,6 @@ fn readings(cx: &mut Cx<'_>, ui: &mut Ui, readings: &[ChainReading]) {
         ));
     }
     if let Some(mode) = chosen {
-        cx.push(Command::SetShift(mode));
+        cx.push(SettingsCommand::SetShift(mode));
     }
 }

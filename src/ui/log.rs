@@ -4,7 +4,7 @@ use eframe::egui::{self, Align2, Color32, RichText, ScrollArea, Ui, vec2};
 
 use super::cx::Cx;
 use super::theme::{Palette, SMALL, caption};
-use crate::app::command::Command;
+use crate::app::command::TasksCommand;
 use crate::app::tasks::{Entry, Level};
 
 /// Notices on screen at once.
@@ -63,7 +63,7 @@ pub(super) fn notices(cx: &mut Cx<'_>, ctx: &egui::Context) {
             }
             ui.horizontal(|ui| {
                 if ui.button("Dismiss").on_hover_text("They stay in the log").clicked() {
-                    cx.push(Command::LogSeen(last));
+                    cx.push(TasksCommand::LogSeen(last));
                 }
                 if hidden > 0 {
                     ui.label(caption(format!("and {hidden} more in the log"), cx.p));

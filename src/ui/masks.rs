@@ -7,9 +7,9 @@ use super::browser::review_color;
 use super::cx::Cx;
 use super::theme::{SMALL, caption, section};
 use crate::app::action::Action;
-use crate::app::command::Command;
-use crate::app::document::Review;
+use crate::app::command::{Command, LabelsCommand, SettingsCommand};
 use crate::app::keys::ImprintSource;
+use crate::app::labels::Review;
 use crate::app::settings::{BRUSH_RADIUS_PX, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use crate::app::state::Lookup;
 
@@ -41,7 +41,7 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
             let on = cx.state.settings.mask.tool == tool;
             let button = ui.add(egui::Button::selectable(on, tool.name()).min_size(vec2(56.0, 24.0)));
             if button.on_hover_text(action.help()).clicked() {
-                cx.push(Command::SetMaskTool(tool));
+                cx.push(SettingsCommand::SetMaskTool(tool));
             }
         }
     });
@@ -54,7 +54,7 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
             radius = MaskSettings::default().radius_px;
         }
         if response.changed() || response.double_clicked() {
-            cx.push(Command::SetBrushRadius(radius));
+            cx.push(SettingsCommand::SetBrushRadius(radius));
         }
         let mm = f64::from(radius) / cx.state.rig().depth().map_or(f64::NAN, |sensor| sensor.px_per_m) * 1e3;
         ui.label(caption(format!("{mm:.2} mm"), cx.p));
@@ -74,7 +74,7 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
         for source in MaskSource::iter() {
             let option = ui.selectable_label(source == settings.choice.source, source.name());
             if option.on_hover_text(source.tooltip()).clicked() {
-                cx.out.push(Command::SetMaskSource(source));
+                cx.out.push(Command::Settings(SettingsCommand::SetMaskSource(source)));
             }
         }
     });
@@ -118,7 +118,7 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.label(RichText::new(absent.text()).size(SMALL).color(cx.p.caution));
     }
     if new != *settings {
-        cx.push(Command::SetMask(new));
+        cx.push(SettingsCommand::SetMask(new));
     }
     for finger in cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f)) {
         let text = match cx.state.mask_in_force(ImprintSource::Measured, finger) {
@@ -191,7 +191,7 @@ fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
             let button = ui.add_enabled(editable, egui::Button::selectable(on, text));
             let button = button.accessible_name(format!("Review: {}", review.name()));
             if button.on_hover_text("The review state of this pair").clicked() {
-                cx.push(Command::SetReview(review));
+                cx.push(LabelsCommand::SetReview(review));
             }
         }
         cx.action_button(ui, Action::DoneAndNext, "Done, next");
@@ -206,15 +206,15 @@ fn look(cx: &mut Cx<'_>, ui: &mut Ui) {
         let settings = &cx.state.settings;
         let mut visible = settings.mask_visible;
         if ui.checkbox(&mut visible, "mask").on_hover_text(Action::MaskVisible.help()).changed() {
-            cx.push(Command::SetMaskVisible(visible));
+            cx.push(SettingsCommand::SetMaskVisible(visible));
         }
         let mut outline = settings.mask_outline;
         if ui.checkbox(&mut outline, "outline").on_hover_text(Action::MaskOutline.help()).changed() {
-            cx.push(Command::SetMaskOutline(outline));
+            cx.push(SettingsCommand::SetMaskOutline(outline));
         }
         let mut footprint = settings.footprint_visible;
         if ui.checkbox(&mut footprint, "gel window").on_hover_text(Action::Footprint.help()).changed() {
-            cx.push(Command::SetFootprintVisible(footprint));
+            cx.push(SettingsCommand::SetFootprintVisible(footprint));
         }
     });
     ui.horizontal(|ui| {
@@ -223,7 +223,7 @@ fn look(cx: &mut Cx<'_>, ui: &mut Ui) {
         let response =
             ui.add(egui::Slider::new(&mut opacity, 0.0..=1.0).fixed_decimals(2)).accessible_name("Mask opacity");
         if response.changed() {
-            cx.push(Command::SetMaskOpacity(opacity));
+            cx.push(SettingsCommand::SetMaskOpacity(opacity));
         }
         response.on_hover_text("How strongly the mask covers the image (- and =). Hold X to hide it");
     });

@@ -9,7 +9,7 @@ use super::images;
 use super::scene;
 use super::theme::{SMALL, caption, section, value};
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, LabelsCommand, SettingsCommand};
 use crate::app::keys::{ImprintSource, PoseEngine};
 use crate::app::state::{Absent, Lookup};
 use crate::domain::hand::{HandPose, PoseDifference};
@@ -57,7 +57,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
             let response = combo.show_ui(ui, |ui| {
                 for e in PoseEngine::iter() {
                     if ui.selectable_label(e == engine, e.label()).on_hover_text(e.description()).clicked() {
-                        cx.out.push(Command::SetPoseEngine(e));
+                        cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e)));
                     }
                 }
             });
@@ -117,7 +117,7 @@ fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: HandPose) 
     let withdraw =
         ui.small_button("Withdraw").on_hover_text("The registered pose counts again (Ctrl+Z brings it back)");
     if withdraw.accessible_name(format!("Withdraw the pose by hand, {}", source.name().to_lowercase())).clicked() {
-        cx.push(Command::AcceptPose(source, false));
+        cx.push(LabelsCommand::AcceptPose(source, false));
     }
 }
 

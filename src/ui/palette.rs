@@ -7,7 +7,7 @@ use super::cx::Cx;
 use super::fuzzy::score;
 use super::theme::SMALL;
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{LibraryCommand, ViewCommand};
 use crate::domain::dataset::PairId;
 
 /// Entries shown at most: nobody reads further, and a list of 32,000 pairs stays quick.
@@ -86,15 +86,15 @@ pub(super) fn show(cx: &mut Cx<'_>, ctx: &egui::Context) {
         });
     });
     if let Some(entry) = chosen {
-        cx.push(Command::SetPalette(false));
+        cx.push(ViewCommand::SetPalette(false));
         match entry {
             Entry::Action(action) if action != Action::Palette => cx.act(action),
             Entry::Action(_) => {}
-            Entry::Pair(pair, _) => cx.push(Command::Select(pair)),
-            Entry::Tool(tool) => cx.push(Command::SetToolFilter(Some(tool))),
+            Entry::Pair(pair, _) => cx.push(LibraryCommand::Select(pair)),
+            Entry::Tool(tool) => cx.push(LibraryCommand::SetToolFilter(Some(tool))),
         }
     } else if modal.should_close() {
-        cx.push(Command::SetPalette(false));
+        cx.push(ViewCommand::SetPalette(false));
     }
 }
 

@@ -8,8 +8,8 @@ use super::cx::Cx;
 use super::theme::{SMALL, caption, medium, section};
 use super::widget::{empty, progress};
 use crate::app::action::Action;
-use crate::app::command::Command;
-use crate::app::evaluation::{EvaluateCommand, GRASPS};
+use crate::app::command::{Command, TasksCommand};
+use crate::app::evaluate::{EvaluateCommand, GRASPS};
 use crate::domain::evaluation::{Column, Figures, Group, Row, columns};
 
 /// Height of a row, points.
@@ -95,7 +95,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                 progress::bar(ui, (ui.available_width() - 70.0).max(80.0), fraction, &text);
                 let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
                 if cancel.on_hover_text("Stop, and show what was scored until then").clicked() {
-                    cx.push(Command::Cancel(ticket));
+                    cx.push(TasksCommand::Cancel(ticket));
                 }
             }
             None => {

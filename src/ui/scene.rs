@@ -15,7 +15,7 @@ use super::cx::Cx;
 use super::images;
 use super::scene_view::SceneOutput;
 use super::widget::empty;
-use crate::app::command::{CameraPreset, Command, Hover};
+use crate::app::command::{CameraPreset, Command, Hover, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
 use crate::app::workbench::WorkbenchCommand;
@@ -152,7 +152,7 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, c
     let camera = &cx.local.scenes[source as usize].camera;
     let Some((finger, index)) = nearest(clouds, camera, output.size, pointer) else {
         if cx.state.selection.hover_point.is_some() {
-            cx.push(Command::HoverPoint(None));
+            cx.push(ViewCommand::HoverPoint(None));
         }
         return;
     };
@@ -163,8 +163,8 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, c
     cx.local.hover_claimed = true;
     let hover = Some(Hover { finger, at_px: [f32::from(pixel[0]), f32::from(pixel[1])] });
     if cx.state.selection.hover != hover {
-        cx.push(Command::HoverPixel(hover));
-        cx.push(Command::HoverPoint(Some(point)));
+        cx.push(ViewCommand::HoverPixel(hover));
+        cx.push(ViewCommand::HoverPoint(Some(point)));
     }
     cx.local.readout = Some(format!(
         "3D {} ({}, {})   x {:.2}  y {:.2}  z {:.2} mm in the grasp frame",

@@ -5,7 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use eframe::egui::ColorImage;
 
-use crate::app::command::Command;
+use crate::app::command::{Command, TasksCommand};
 use crate::work::error::TaskError;
 
 /// Writes `image` as a PNG into `folder` (or the working directory), and reports where, or why not.
@@ -16,7 +16,9 @@ pub(super) fn save(folder: Option<&Path>, image: &ColorImage) -> Command {
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| p.to_array()).collect();
     let result = image::save_buffer(&path, &bytes, width, height, image::ExtendedColorType::Rgba8);
     match result {
-        Ok(()) => Command::Notice(format!("Saved {}", path.display())),
-        Err(err) => Command::Report(TaskError::new("Screenshot", format!("{err}: {}", path.display()))),
+        Ok(()) => Command::Tasks(TasksCommand::Notice(format!("Saved {}", path.display()))),
+        Err(err) => {
+            Command::Tasks(TasksCommand::Report(TaskError::new("Screenshot", format!("{err}: {}", path.display()))))
+        }
     }
 }

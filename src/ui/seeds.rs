@@ -10,7 +10,7 @@ use super::theme::{SMALL, caption, section};
 use super::widget::colorbar::gradient;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, PredictCommand};
 use crate::app::keys::{EnsembleKey, ImprintSource, PredictionKey};
 use crate::app::seeds::{COUNT, SeedsCommand};
 use crate::app::state::Lookup;
@@ -111,7 +111,7 @@ fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], poses: &[Option
                     .on_hover_text(format!("Seed {}: click to show it in the other panes", recipe.seed))
                     .clicked()
                 {
-                    cx.push(Command::Choose(recipe.clone()));
+                    cx.push(PredictCommand::Choose(recipe.clone()));
                 }
             }
             None => {

@@ -6,7 +6,7 @@ use strum::IntoEnumIterator as _;
 use super::cx::Cx;
 use super::theme::{caption, section};
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, SettingsCommand};
 use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
 use crate::infer::engine::EngineChoice;
 
@@ -24,7 +24,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         for (theme, name) in [(Theme::Dark, "Dark"), (Theme::Light, "Light")] {
             if ui.radio(settings.theme == theme, name).on_hover_text("Colors of the window").clicked() {
-                cx.out.push(Command::SetTheme(theme));
+                cx.out.push(Command::Settings(SettingsCommand::SetTheme(theme)));
             }
         }
         let mut zoom = settings.ui_zoom;
@@ -32,7 +32,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         // The whole window is scaled: while the number is dragged the pointer must not slip off it.
         let response = ui.add(drag.update_while_editing(false)).accessible_name("Zoom");
         if response.changed() {
-            cx.out.push(Command::SetUiZoom(zoom));
+            cx.out.push(Command::Settings(SettingsCommand::SetUiZoom(zoom)));
         }
         response.on_hover_text("Scale of the whole window (Ctrl + and Ctrl -). Default 1.00");
     });
@@ -41,7 +41,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         for map in ColorMap::iter() {
             let radio = ui.radio(settings.color_map == map, map.name());
             if radio.on_hover_text("Colors of depth").clicked() {
-                cx.out.push(Command::SetColorMap(map));
+                cx.out.push(Command::Settings(SettingsCommand::SetColorMap(map)));
             }
         }
     });
@@ -51,15 +51,15 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         .on_hover_text(Action::Footprint.tooltip())
         .changed()
     {
-        cx.out.push(Command::SetFootprintVisible(footprint));
+        cx.out.push(Command::Settings(SettingsCommand::SetFootprintVisible(footprint)));
     }
     let mut mask = settings.mask_visible;
     if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(Action::MaskVisible.help()).changed() {
-        cx.out.push(Command::SetMaskVisible(mask));
+        cx.out.push(Command::Settings(SettingsCommand::SetMaskVisible(mask)));
     }
     let mut linked = settings.cameras_linked;
     if ui.checkbox(&mut linked, "3D views move together").on_hover_text(Action::LinkCameras.tooltip()).changed() {
-        cx.out.push(Command::SetCamerasLinked(linked));
+        cx.out.push(Command::Settings(SettingsCommand::SetCamerasLinked(linked)));
     }
     ui.label(section("Models", cx.p));
     ui.horizontal(|ui| {
@@ -68,7 +68,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         let response = combo.show_ui(ui, |ui| {
             for runtime in EngineChoice::iter() {
                 if ui.selectable_label(runtime == settings.runtime, runtime.name()).clicked() {
-                    cx.out.push(Command::SetRuntime(runtime));
+                    cx.out.push(Command::Settings(SettingsCommand::SetRuntime(runtime)));
                 }
             }
         });
@@ -80,7 +80,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         let drag = egui::DragValue::new(&mut mib).speed(8.0).range(0..=MAX_CACHE_MIB).suffix(" MiB");
         let response = ui.add(drag.update_while_editing(false)).accessible_name("Keep predictions");
         if response.changed() {
-            cx.out.push(Command::SetCacheBudget(mib));
+            cx.out.push(Command::Settings(SettingsCommand::SetCacheBudget(mib)));
         }
         response.on_hover_text(
             "What predictions kept on the disk may take; the least recently used go first. 0 keeps none. Default 512 MiB",

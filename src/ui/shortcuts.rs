@@ -6,7 +6,7 @@ use strum::IntoEnumIterator as _;
 use super::cx::Cx;
 use super::theme::{Palette, SMALL, section};
 use crate::app::action::{Action, Group, Key, Shortcut};
-use crate::app::command::{Command, Pane};
+use crate::app::command::{Pane, ViewCommand};
 
 /// The toolkit's name of a key.
 fn key_of(key: Key) -> EKey {
@@ -88,7 +88,7 @@ pub(super) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context) {
             ui.label(RichText::new("Shortcuts").heading());
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.button("Close").on_hover_text("Esc").clicked() {
-                    cx.push(Command::SetShortcutSheet(false));
+                    cx.push(ViewCommand::SetShortcutSheet(false));
                 }
             });
         });
@@ -115,7 +115,7 @@ pub(super) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context) {
         });
     });
     if modal.should_close() {
-        cx.push(Command::SetShortcutSheet(false));
+        cx.push(ViewCommand::SetShortcutSheet(false));
     }
 }
 

@@ -8,9 +8,9 @@ use super::scene::error_color;
 use super::theme::{SMALL, caption};
 use super::widget::empty;
 use crate::app::action::Action;
-use crate::app::command::Command;
-use crate::app::document::Review;
-use crate::app::keys::ImprintSource;
+use crate::app::command::{LibraryCommand, ViewCommand};
+use crate::app::keys::{ComparisonKey, ImprintSource};
+use crate::app::labels::Review;
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
 
@@ -96,7 +96,9 @@ fn rows(cx: &Cx<'_>) -> Vec<Row> {
             continue;
         }
         // A finger that was not on screen was not compared.
-        let Some(c) = state.results.comparisons.get(&(recipe.clone(), state.settings.shift)) else { continue };
+        let Some(c) = state.results.comparisons.get(&ComparisonKey(recipe.clone(), state.settings.shift)) else {
+            continue;
+        };
         let image = [c.psnr_db, c.ssim, Some(c.mae_m * 1e3)];
         with_prediction.insert(touch.pair);
         out.extend(row(touch.pair.pair, Some(touch.finger), image));
@@ -246,9 +248,9 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: &Row) {
     }
     ui.painter().circle_filled(pos2(rect.right() - 10.0, rect.center().y), 3.5, review_color(p, row.review));
     if response.on_hover_text("Show this pair").clicked() {
-        cx.push(Command::Select(row.pair));
+        cx.push(LibraryCommand::Select(row.pair));
         if let Some(finger) = row.finger {
-            cx.push(Command::SelectFinger(finger));
+            cx.push(ViewCommand::SelectFinger(finger));
         }
     }
 }

@@ -13,7 +13,7 @@ use super::images;
 use super::theme::{SMALL, caption, pane_frame};
 use super::widget::empty;
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, SettingsCommand};
 use crate::app::inspect::{InspectCommand, Inspected};
 use crate::app::keys::{ImprintSource, PoseBits, PoseEngine};
 use crate::app::state::Lookup;
@@ -127,7 +127,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     let combo = combo.show_ui(ui, |ui| {
         for e in PoseEngine::iter() {
             if ui.selectable_label(e == engine, e.label()).on_hover_text(e.description()).clicked() {
-                cx.out.push(Command::SetPoseEngine(e));
+                cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e)));
             }
         }
     });

@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn contact_points_are_those_of_the_surface_bit_for_bit() {
-        let (spec, config) = (&crate::domain::sim::tools()[0], crate::domain::sim::SimConfig::default());
+        let (spec, config) = (&crate::domain::catalog::tools()[0], crate::domain::sim::SimConfig::default());
         let sample = crate::domain::sim::simulate(spec, crate::domain::sim::random_grasp(3), 3, &config);
         let imprint = |pad| sample.pad(pad)?.depth().map(|bubble| bubble.imprint.clone());
         let mut imprints: PerPad<DepthMap> = sample.rig.pads().map(imprint).collect();

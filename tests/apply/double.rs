@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use touch2touch::app::command::{Command, Opened};
-use touch2touch::app::document::{PairLabels, Review};
 use touch2touch::app::keys::{PredictionKey, ShiftMode, TouchKey};
+use touch2touch::app::labels::{PairLabels, Review};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::{DataSource, Services};
@@ -377,8 +377,8 @@ impl Bench {
     }
 
     /// One round with one command; jobs wait.
-    pub(crate) fn send(&mut self, command: Command) {
-        self.runtime.tick(&mut self.state, vec![command]);
+    pub(crate) fn send(&mut self, command: impl Into<Command>) {
+        self.runtime.tick(&mut self.state, vec![command.into()]);
     }
 
     /// One round.

@@ -3,7 +3,7 @@
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
 use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
 use touch2touch::app::results::Preview;
@@ -15,7 +15,7 @@ use touch2touch::infer::bundle::{Origin, SensorPair};
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
-use touch2touch::app::jobs::Onlooker;
+use touch2touch::app::results::preview::Onlooker;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::job::{JobCx, PreviewPicture};
 use touch2touch::work::prediction::Prediction;
@@ -31,15 +31,15 @@ fn preview(recipe: &PredictionKey, step: u32) -> Arc<Preview> {
 #[test]
 fn a_finger_that_nobody_looks_at_is_not_generated() {
     let mut bench = Bench::open_simulated();
-    bench.send(Command::Select(SIMULATED));
+    bench.send(LibraryCommand::Select(SIMULATED));
     bench.send(panes(&[Pane::Predicted, Pane::Generate]));
     bench.settle();
-    bench.send(Command::Generate);
+    bench.send(PredictCommand::Generate);
     bench.settle();
     assert!(bench.state.chosen(RIGHT).is_some() && bench.state.chosen(LEFT).is_none());
     assert_eq!(bench.services.generated(), 1);
     // A pane that makes a pose of both wants the other one too, made like the first.
-    bench.send(Command::SetGenerate(GenerateSettings { seed: 5, ..bench.state.settings.generate.clone() }));
+    bench.send(SettingsCommand::SetGenerate(GenerateSettings { seed: 5, ..bench.state.settings.generate.clone() }));
     bench.send(panes(&[Pane::Predicted, Pane::ScenePredicted]));
     bench.settle();
     let (right, left) = (bench.state.chosen(RIGHT).unwrap().clone(), bench.state.chosen(LEFT).unwrap().clone());
@@ -48,15 +48,15 @@ fn a_finger_that_nobody_looks_at_is_not_generated() {
     assert!(bench.state.cloud(ImprintSource::Predicted).ready().unwrap().finger(LEFT).is_some());
     // Both on screen are made together, in one call.
     bench.send(panes(&[Pane::Predicted]));
-    bench.send(Command::ShowBothFingers(true));
+    bench.send(ViewCommand::ShowBothFingers(true));
     let batches = bench.services.batches.load(Ordering::Relaxed);
-    bench.send(Command::GenerateNewSeed);
+    bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
     assert_eq!((bench.services.generated(), bench.services.batches.load(Ordering::Relaxed)), (4, batches + 1));
     // Switched off, only the active one is made.
     let one = GenerateSettings { both_fingers: false, ..bench.state.settings.generate.clone() };
-    bench.send(Command::SetGenerate(one));
-    bench.send(Command::GenerateNewSeed);
+    bench.send(SettingsCommand::SetGenerate(one));
+    bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
     assert_eq!(bench.services.generated(), 5);
 }
@@ -91,10 +91,10 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
-    bench.send(Command::Generate);
+    bench.send(PredictCommand::Generate);
     bench.settle();
     let first = bench.state.chosen(RIGHT).unwrap().clone();
-    bench.send(Command::GenerateNewSeed);
+    bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
     let made: Vec<(PredictionKey, Prediction)> = bench.state.results.made[&first.touch]
         .iter()
@@ -114,9 +114,9 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     assert!(again.state.imprint(ImprintSource::Predicted, RIGHT).ready().is_some());
     assert_eq!(again.services.generated(), 0);
     let looked = again.services.looked_up.load(Ordering::Relaxed);
-    again.send(Command::Step(1));
+    again.send(LibraryCommand::Step(1));
     again.settle();
-    again.send(Command::Step(-1));
+    again.send(LibraryCommand::Step(-1));
     again.settle();
     assert_eq!(again.services.looked_up.load(Ordering::Relaxed), looked + 1, "each touch is looked up once");
     assert!(again.runtime.waiting(Lane::Files) == 0);
@@ -131,10 +131,10 @@ fn presets_follow_the_bundle_and_own_numbers_leave_them() {
     assert_eq!(bench.state.settings.generate.preset, Some(Preset::Default));
     assert_eq!(bench.state.recipe(touch).unwrap().steps, 20, "what the bundle recommends");
     let fast = GenerateSettings { preset: Some(Preset::Fast), ..bench.state.settings.generate.clone() };
-    bench.send(Command::SetGenerate(fast));
+    bench.send(SettingsCommand::SetGenerate(fast));
     assert!(bench.state.recipe(touch).unwrap().steps <= 4);
     let own = GenerateSettings { steps: 33, ..bench.state.settings.generate.clone() };
-    bench.send(Command::SetGenerate(own));
+    bench.send(SettingsCommand::SetGenerate(own));
     assert_eq!(bench.state.settings.generate.preset, None);
     assert_eq!(bench.state.recipe(touch).unwrap().steps, 33);
 }

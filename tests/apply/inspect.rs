@@ -1,7 +1,7 @@
 //! The time machine and the basin map: computed only while looked at, found again under their recipe.
 
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, TasksCommand};
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, PoseEngine, Request};
@@ -19,8 +19,8 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 /// The simulated grasp with the true contact as its mask.
 fn bench(list: &[Pane]) -> Bench {
     let mut bench = Bench::open_simulated();
-    bench.send(Command::SetMaskSource(MaskSource::Truth));
-    bench.send(Command::Select(SIMULATED));
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Truth));
+    bench.send(LibraryCommand::Select(SIMULATED));
     bench.send(panes(list));
     bench.settle();
     bench
@@ -138,7 +138,7 @@ fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
     bench.send(back);
     assert!(bench.state.inspection().ready().is_some_and(|i| i.requested(0) != Some(start)));
     send(&mut bench, InspectCommand::Start(Some(start)));
-    bench.send(Command::Select(PairId(0)));
+    bench.send(LibraryCommand::Select(PairId(0)));
     bench.settle();
     assert_eq!(bench.state.inspect.start, None);
     assert!(bench.state.inspected().is_none(), "this pair has no camera");
@@ -149,7 +149,7 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     let mut bench = bench(&[Pane::TimeMachine]);
     send(&mut bench, InspectCommand::Begin);
     send(&mut bench, InspectCommand::Pin);
-    bench.send(Command::SetPoseEngine(PoseEngine::LabIcp));
+    bench.send(SettingsCommand::SetPoseEngine(PoseEngine::LabIcp));
     bench.settle();
     assert_eq!(bench.state.inspection().ready().unwrap().num_runs(), 1);
     send(&mut bench, InspectCommand::End);
@@ -164,9 +164,9 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     send(&mut bench, InspectCommand::Unpin(0));
     send(&mut bench, InspectCommand::Unpin(7));
     assert!(bench.state.pins()[0].is_none() && bench.state.pins()[1].is_some());
-    bench.send(Command::Select(PairId(0)));
+    bench.send(LibraryCommand::Select(PairId(0)));
     assert_eq!(bench.state.pins(), [None, None], "they belong to their pair");
-    bench.send(Command::Select(SIMULATED));
+    bench.send(LibraryCommand::Select(SIMULATED));
     assert!(bench.state.pins()[1].is_some());
 }
 
@@ -182,7 +182,7 @@ fn a_map_that_is_given_up_is_not_computed_until_asked_for() {
     assert!(matches!(bench.state.basin(), Lookup::Failed(err) if err.is_cancelled()));
     bench.settle();
     assert!(bench.state.results.basins.is_empty() && bench.errors() == 0);
-    bench.send(Command::Retry);
+    bench.send(TasksCommand::Retry);
     bench.settle();
     let map = bench.state.basin().ready().unwrap();
     let truth = bench.state.truth().unwrap();

@@ -3,9 +3,9 @@
 use std::sync::atomic::Ordering;
 
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, Pane};
-use touch2touch::app::document::Review;
+use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, SettingsCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
+use touch2touch::app::labels::Review;
 use touch2touch::app::settings::{MaskSource, MaskTool};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
@@ -24,13 +24,13 @@ fn bench() -> Bench {
 }
 
 fn begin(bench: &mut Bench, finger: PadId, at_px: [f32; 2]) {
-    bench.send(Command::BeginStroke { finger, source: MEASURED, at_px, erase: false });
+    bench.send(LabelsCommand::BeginStroke { finger, source: MEASURED, at_px, erase: false });
 }
 
 fn stroke(bench: &mut Bench, finger: PadId, from: [f32; 2], to: [f32; 2]) {
     begin(bench, finger, from);
-    bench.send(Command::StrokeTo(to));
-    bench.send(Command::EndStroke);
+    bench.send(LabelsCommand::StrokeTo(to));
+    bench.send(LabelsCommand::EndStroke);
 }
 
 fn mask(bench: &Bench, finger: PadId) -> Mask {
@@ -44,15 +44,15 @@ fn count(mask: &Mask) -> usize {
 #[test]
 fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     let mut bench = bench();
-    bench.send(Command::SetMaskSource(MaskSource::Threshold));
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
     bench.settle();
     let automatic = mask(&bench, lab::RIGHT);
     assert_eq!(count(&automatic), 35 + 4, "the ring and the spot");
     begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
     bench.settle();
     assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0, "nothing is saved while the pen is down");
-    bench.send(Command::StrokeTo([14.0, 2.0]));
-    bench.send(Command::EndStroke);
+    bench.send(LabelsCommand::StrokeTo([14.0, 2.0]));
+    bench.send(LabelsCommand::EndStroke);
     let drawn = mask(&bench, lab::RIGHT);
     assert!(drawn[(12, 2)] && drawn[(14, 2)] && drawn[(4, 4)]);
     let in_force = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap();
@@ -64,14 +64,14 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     assert_eq!(saved.review, Review::InProgress);
     assert!(bench.state.document.unsaved.is_empty());
     // Another automatic source does not touch it; removing it brings that source back.
-    bench.send(Command::SetMaskSource(MaskSource::TopPercent));
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::TopPercent));
     bench.settle();
     assert_eq!(mask(&bench, lab::RIGHT), drawn);
-    bench.send(Command::ResetMask);
+    bench.send(LabelsCommand::ResetMask);
     bench.settle();
     assert!(matches!(bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().version, MaskVersion::Auto(_)));
     // Undo changes the file too.
-    bench.send(Command::Undo);
+    bench.send(LabelsCommand::Undo);
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
     assert_eq!(*saved.masks[lab::RIGHT].as_ref().unwrap().mask, drawn);
@@ -80,9 +80,9 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
 #[test]
 fn a_stroke_that_changes_nothing_leaves_nothing() {
     let mut bench = bench();
-    bench.send(Command::SetMaskTool(MaskTool::Eraser));
+    bench.send(SettingsCommand::SetMaskTool(MaskTool::Eraser));
     stroke(&mut bench, lab::RIGHT, [21.0, 1.0], [22.0, 1.0]);
-    bench.send(Command::SetMaskTool(MaskTool::Brush));
+    bench.send(SettingsCommand::SetMaskTool(MaskTool::Brush));
     stroke(&mut bench, lab::RIGHT, [900.0, -900.0], [f32::NAN, 1.0]);
     bench.settle();
     assert!(bench.state.document.hand_mask("tool_a/data_0", lab::RIGHT).is_none());
@@ -107,50 +107,50 @@ fn escape_gives_a_stroke_up() {
 fn undo_and_redo_follow_what_is_on_screen() {
     let mut bench = bench();
     let automatic = [mask(&bench, lab::RIGHT), {
-        bench.send(Command::SelectFinger(lab::LEFT));
+        bench.send(ViewCommand::SelectFinger(lab::LEFT));
         bench.settle();
         mask(&bench, lab::LEFT)
     }];
-    bench.send(Command::SelectFinger(lab::RIGHT));
+    bench.send(ViewCommand::SelectFinger(lab::RIGHT));
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     let first = mask(&bench, lab::RIGHT);
     stroke(&mut bench, lab::RIGHT, [20.0, 6.0], [21.0, 6.0]);
     let second = mask(&bench, lab::RIGHT);
-    bench.send(Command::SelectFinger(lab::LEFT));
+    bench.send(ViewCommand::SelectFinger(lab::LEFT));
     stroke(&mut bench, lab::LEFT, [20.0, 1.0], [21.0, 1.0]);
-    bench.send(Command::Select(PairId(1)));
+    bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
     assert!(Action::Undo.command(&bench.state).is_none(), "nothing of pair 1 was changed");
-    bench.send(Command::Undo);
-    bench.send(Command::Select(PairId(0)));
+    bench.send(LabelsCommand::Undo);
+    bench.send(LibraryCommand::Select(PairId(0)));
     bench.settle();
-    bench.send(Command::Undo);
+    bench.send(LabelsCommand::Undo);
     assert_eq!(mask(&bench, lab::LEFT), automatic[1], "only the left finger is on screen");
-    bench.send(Command::SelectFinger(lab::RIGHT));
+    bench.send(ViewCommand::SelectFinger(lab::RIGHT));
     assert_eq!(mask(&bench, lab::RIGHT), second);
-    bench.send(Command::Undo);
+    bench.send(LabelsCommand::Undo);
     assert_eq!(mask(&bench, lab::RIGHT), first);
-    bench.send(Command::Undo);
+    bench.send(LabelsCommand::Undo);
     assert_eq!(mask(&bench, lab::RIGHT), automatic[0]);
     assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo, "untouched again");
-    bench.send(Command::Redo);
-    bench.send(Command::Redo);
+    bench.send(LabelsCommand::Redo);
+    bench.send(LabelsCommand::Redo);
     assert_eq!(mask(&bench, lab::RIGHT), second);
 }
 
 #[test]
 fn clean_ups_work_on_the_mask_in_force() {
     let mut bench = bench();
-    bench.send(Command::FillHoles);
+    bench.send(LabelsCommand::FillHoles);
     assert_eq!(count(&mask(&bench, lab::RIGHT)), 36 + 4);
-    bench.send(Command::LargestIsland);
+    bench.send(LabelsCommand::LargestIsland);
     assert_eq!(count(&mask(&bench, lab::RIGHT)), 36);
-    bench.send(Command::LargestIsland);
+    bench.send(LabelsCommand::LargestIsland);
     assert!(bench.log().last().unwrap().contains("nothing to change"));
-    bench.send(Command::AdoptAutomatic);
+    bench.send(LabelsCommand::AdoptAutomatic);
     assert_eq!(count(&mask(&bench, lab::RIGHT)), 39);
     for expected in [36, 40, 39] {
-        bench.send(Command::Undo);
+        bench.send(LabelsCommand::Undo);
         assert_eq!(count(&mask(&bench, lab::RIGHT)), expected);
     }
     assert!(bench.state.document.hand_mask("tool_a/data_0", lab::RIGHT).is_none());
@@ -166,7 +166,12 @@ fn labels_that_cannot_be_read_are_never_written() {
     assert!(bench.state.document.blocked("tool_a/data_0").is_some());
     let automatic = mask(&bench, lab::RIGHT);
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
-    for command in [Command::FillHoles, Command::AdoptAutomatic, Command::SetReview(Review::Done), Command::ResetMask] {
+    for command in [
+        Command::Labels(LabelsCommand::FillHoles),
+        Command::Labels(LabelsCommand::AdoptAutomatic),
+        Command::Labels(LabelsCommand::SetReview(Review::Done)),
+        Command::Labels(LabelsCommand::ResetMask),
+    ] {
         bench.send(command);
     }
     bench.settle();
@@ -193,7 +198,7 @@ fn a_full_disk_is_said_and_what_was_drawn_is_kept_and_saved_later() {
     assert_eq!(bench.errors(), 1);
     assert!(bench.state.document.unsaved.contains("tool_a/data_0"));
     bench.services.source.full_disk.store(false, Ordering::Relaxed);
-    bench.send(Command::Save);
+    bench.send(LabelsCommand::Save);
     bench.settle();
     assert!(bench.state.document.unsaved.is_empty());
     assert!(bench.services.source.labels.lock().unwrap().contains_key("tool_a/data_0"));
@@ -206,7 +211,7 @@ fn an_answer_to_an_earlier_saving_confirms_nothing_newer() {
     let unsaved = |bench: &Bench| bench.state.document.unsaved.contains("tool_a/data_0");
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     // What an earlier request, which was being carried out when this one came, is answered with.
-    bench.send(Command::LabelsSaved("tool_a/data_0".into(), Revision(0)));
+    bench.send(Answer::LabelsSaved("tool_a/data_0".into(), Revision(0)));
     assert!(unsaved(&bench), "the stroke is not on the disk");
     bench.settle();
     assert!(!unsaved(&bench));
@@ -217,7 +222,7 @@ fn an_answer_to_an_earlier_saving_confirms_nothing_newer() {
 fn moving_on_ends_the_stroke() {
     let mut bench = bench();
     begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
-    bench.send(Command::Step(1));
+    bench.send(LibraryCommand::Step(1));
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
     assert!(saved.masks[lab::RIGHT].as_ref().unwrap().mask[(12, 2)]);
@@ -241,18 +246,18 @@ fn strokes_waiting_for_the_disk_become_one_and_survive_the_end() {
 #[test]
 fn done_goes_to_the_next_unfinished_and_survives_reopening() {
     let mut bench = bench();
-    bench.send(Command::DoneAndNext);
+    bench.send(LibraryCommand::DoneAndNext);
     assert_eq!(bench.state.pair_name(), "tool_a/data_1");
     bench.settle();
-    bench.send(Command::SetReview(Review::Flagged));
+    bench.send(LabelsCommand::SetReview(Review::Flagged));
     bench.settle();
-    bench.send(Command::Reload);
+    bench.send(LibraryCommand::Reload);
     bench.settle();
     assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Done);
     assert_eq!(bench.state.document.review("tool_a/data_1"), Review::Flagged);
-    bench.send(Command::SetFilter("is:done".into()));
+    bench.send(LibraryCommand::SetFilter("is:done".into()));
     assert_eq!(bench.state.library.order, [PairId(0)]);
-    bench.send(Command::NextUnfinished);
+    bench.send(LibraryCommand::NextUnfinished);
     assert!(bench.log().last().unwrap().contains("done or skipped"));
 }
 
@@ -261,7 +266,7 @@ fn opening_again_brings_the_masks_back() {
     let mut bench = bench();
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     let drawn = mask(&bench, lab::RIGHT);
-    bench.send(Command::Reload);
+    bench.send(LibraryCommand::Reload);
     bench.settle();
     assert_eq!(mask(&bench, lab::RIGHT), drawn);
     assert!(Action::Undo.command(&bench.state).is_none(), "what was undone before is not on the list any more");

@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex};
 
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand};
 use touch2touch::app::keys::{ImprintSource, PoseEngine};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
@@ -23,8 +23,8 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 fn the_pose_follows_the_mask() {
     let mut bench = Bench::open_simulated();
     bench.send(panes(&[Pane::SceneMeasured, Pane::Measured]));
-    bench.send(Command::SetMaskSource(MaskSource::Cad));
-    bench.send(Command::Select(SIMULATED));
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Cad));
+    bench.send(LibraryCommand::Select(SIMULATED));
     bench.settle();
     let pose = bench.state.pose(MEASURED).ready().unwrap().clone();
     // The true contact of both fingers: better than the lab's tightest success limit of 5 degrees.
@@ -33,33 +33,33 @@ fn the_pose_follows_the_mask() {
     let cloud = bench.state.cloud(MEASURED).ready().unwrap();
     assert_eq!(cloud.contact_points().len(), pose.num_points);
     // Rubbing out a part: while the pen is down nothing is computed, then cloud and pose are new.
-    bench.send(Command::SetMaskTool(MaskTool::Eraser));
+    bench.send(SettingsCommand::SetMaskTool(MaskTool::Eraser));
     let at_px = {
         let mask = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().mask.clone();
         let at = mask.as_slice().iter().position(|v| *v).unwrap();
         [(at % mask.width()) as f32, (at / mask.width()) as f32]
     };
-    bench.send(Command::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px, erase: false });
-    bench.send(Command::StrokeTo([at_px[0] + 10.0, at_px[1] + 10.0]));
+    bench.send(LabelsCommand::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px, erase: false });
+    bench.send(LabelsCommand::StrokeTo([at_px[0] + 10.0, at_px[1] + 10.0]));
     assert!(bench.state.wanted().is_empty());
     assert!(matches!(bench.state.pose(MEASURED), Lookup::Stale(_)), "the old pose stays until the new one is there");
-    bench.send(Command::EndStroke);
+    bench.send(LabelsCommand::EndStroke);
     bench.settle();
     let after = bench.state.pose(MEASURED).ready().unwrap();
     assert!(after.num_points < pose.num_points);
     // The other registration is another result; the first one is still there.
-    bench.send(Command::SetPoseEngine(PoseEngine::LabIcp));
+    bench.send(SettingsCommand::SetPoseEngine(PoseEngine::LabIcp));
     bench.settle();
     let lab = bench.state.pose(MEASURED).ready().unwrap();
     assert!(lab.error_rad.is_some() && lab.report.iterations > 1);
-    bench.send(Command::SetPoseEngine(PoseEngine::DistanceField));
+    bench.send(SettingsCommand::SetPoseEngine(PoseEngine::DistanceField));
     assert!(bench.state.pose(MEASURED).ready().is_some());
     // Accepting it is a change of the document like any other.
     let accept = Action::AcceptMeasuredPose.command(&bench.state).unwrap();
     bench.send(accept);
     let name = bench.state.pair_name().to_owned();
     assert!(bench.state.document.pair(&name).unwrap().accepted(MEASURED).is_some());
-    bench.send(Command::Undo);
+    bench.send(LabelsCommand::Undo);
     assert!(bench.state.document.pair(&name).unwrap().accepted(MEASURED).is_none());
 }
 
@@ -71,14 +71,14 @@ fn a_source_without_camera_says_why_there_is_no_pose() {
     assert!(matches!(bench.state.cloud(MEASURED), Lookup::Absent(Absent::NoCamera)));
     assert!(bench.state.tasks.is_idle());
     for (source, absent) in [(MaskSource::Truth, Absent::NotSimulated), (MaskSource::Cad, Absent::NoTruth)] {
-        bench.send(Command::SetMaskSource(source));
+        bench.send(SettingsCommand::SetMaskSource(source));
         bench.settle();
         match bench.state.mask_in_force(MEASURED, lab::RIGHT) {
             Err(Lookup::Absent(found)) => assert_eq!(found, absent),
             other => panic!("{other:?}"),
         }
     }
-    bench.send(Command::SetMaskSource(MaskSource::Unet));
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Unet));
     bench.settle();
     assert!(bench.state.mask_in_force(MEASURED, lab::RIGHT).is_ok());
 }
@@ -88,7 +88,7 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     let mut bench = Bench::open();
     bench.services.blind.store(true, Ordering::Relaxed);
     bench.send(panes(&[Pane::Measured]));
-    bench.send(Command::SetMaskSource(MaskSource::Unet));
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Unet));
     bench.settle();
     let shown = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap();
     assert!(shown.label.starts_with("Depth ") && shown.label.contains("found no contact"), "{}", shown.label);
@@ -96,7 +96,7 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     let said = |bench: &Bench| bench.state.log.entries.iter().filter(|e| e.text.contains("found no contact")).count();
     assert_eq!(said(&bench), 1, "{:#?}", bench.state.log.entries);
     // The other finger says so when it is looked at, and a source that finds contact says nothing.
-    bench.send(Command::SetMaskSource(MaskSource::Threshold));
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
     bench.settle();
     assert_eq!(bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().label, "Threshold 5.00 mm");
     assert_eq!(said(&bench), 1);
@@ -113,7 +113,7 @@ fn what_is_odd_about_a_pair_is_logged_once_when_it_is_looked_at() {
         bench.state.log.entries.iter().filter(odd).count()
     };
     for (pair, count) in [(9, 1), (10, 2), (9, 2)] {
-        bench.send(Command::Select(PairId(pair)));
+        bench.send(LibraryCommand::Select(PairId(pair)));
         bench.settle();
         assert_eq!(said(&bench), count, "pair {pair}: {:#?}", bench.state.log.entries);
     }
@@ -126,7 +126,7 @@ fn without_models_the_rest_works_and_a_notice_says_what_to_do() {
     bench.settle();
     assert!(bench.state.log.entries.iter().any(|e| e.text.contains("No generator") && e.hint.is_some()));
     assert!(Action::Generate.command(&bench.state).is_none());
-    bench.send(Command::Generate);
+    bench.send(PredictCommand::Generate);
     assert_eq!(bench.errors(), 1);
     assert!(bench.state.mask_in_force(MEASURED, lab::RIGHT).is_ok());
 }
@@ -148,7 +148,7 @@ fn threads_give_the_same_and_wake_the_window() {
     while state.comparison(lab::RIGHT).ready().is_none() {
         if !asked && state.can_generate().is_ok() && state.sample().ready().is_some() {
             asked = true;
-            runtime.tick(&mut state, vec![Command::Generate]);
+            runtime.tick(&mut state, vec![Command::Predict(PredictCommand::Generate)]);
         } else {
             // Waits for news, not for time: without the bell this test would hang, and that is what it checks.
             let mut rung = woken.0.lock().unwrap();

@@ -1,7 +1,7 @@
 //! Generating as a person sees it: the picture on the way, the presets, the result that is there again after a restart.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::Command;
+use touch2touch::app::command::{PredictCommand, SettingsCommand};
 use touch2touch::app::keys::{ImprintSource, Preset};
 use touch2touch::domain::rig::lab;
 
@@ -12,8 +12,8 @@ const SIZE: [f32; 2] = [1280.0, 800.0];
 #[test]
 fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     let Some((mut rig, gate)) = Rig::gated(SIZE) else { return };
-    rig.harness.state_mut().push(Command::DismissHint);
-    rig.harness.state_mut().push(Command::Generate);
+    rig.harness.state_mut().push(SettingsCommand::DismissHint);
+    rig.harness.state_mut().push(PredictCommand::Generate);
     rig.until("a preview", |state| state.preview(lab::RIGHT).is_some());
     for _ in 0..3 {
         rig.harness.step();
@@ -37,8 +37,8 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
 #[test]
 fn a_color_sensor_is_predicted_in_the_same_pane() {
     let Some(mut rig) = Rig::with_bundle(SIZE, "Tiny generator from Soft Bubble to GelSlim") else { return };
-    rig.send(Command::DismissHint);
-    rig.send(Command::Generate);
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(PredictCommand::Generate);
     let state = rig.harness.state().state();
     let picture = state.predicted_color(lab::RIGHT).expect("the model predicts a color picture").ready().unwrap();
     assert_eq!(picture.size(), lab::GELSLIM.size());

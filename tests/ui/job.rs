@@ -7,7 +7,7 @@ use eframe::egui::{Key, Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::command::{Pane, PredictCommand, SettingsCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch::domain::postprocess::ShiftMode;
@@ -208,7 +208,7 @@ fn the_shortcut_sheet_lists_every_action() {
 #[test]
 fn at_rest_nothing_is_drawn_uploaded_or_written() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(Command::Generate);
+    rig.send(PredictCommand::Generate);
     rig.settle();
     let uploads = rig.harness.state().uploads();
     let mut before = BTreeMap::new();
@@ -228,7 +228,7 @@ fn at_rest_nothing_is_drawn_uploaded_or_written() {
 fn no_pane_asks_for_what_it_does_not_show() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     // One pane alone: its panes are all that is computed for.
-    rig.send(Command::SetWorkspace(Workspace::Label));
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
     rig.harness.get_by_label("Maximize Mask").click();
     rig.settle();
     let state = rig.harness.state().state();

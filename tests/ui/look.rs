@@ -1,7 +1,7 @@
 //! Nothing to see is an error, and pictures for people.
 
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::Command;
+use touch2touch::app::command::{Command, LibraryCommand, PredictCommand, SettingsCommand};
 use touch2touch::app::inspect::{BasinColor, InspectCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{MaskSource, Theme, Workspace};
@@ -21,12 +21,12 @@ const STRAY: PlanarPose = PlanarPose { theta_rad: -0.7, y_m: 0.008, z_m: 0.0 };
 #[test]
 fn every_workspace_draws_in_both_themes() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 3) else { return };
-    rig.send(Command::DismissHint);
-    rig.send(Command::Generate);
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(PredictCommand::Generate);
     for theme in [Theme::Dark, Theme::Light] {
-        rig.send(Command::SetTheme(theme));
+        rig.send(SettingsCommand::SetTheme(theme));
         for workspace in [Workspace::Inspect, Workspace::Align, Workspace::Label, Workspace::Evaluate] {
-            rig.send(Command::SetWorkspace(workspace));
+            rig.send(SettingsCommand::SetWorkspace(workspace));
             rig.shoot(&format!("test-{}-{theme:?}", workspace.name()).to_lowercase());
             let image = rig.harness.render().unwrap();
             let mut colors: Vec<[u8; 4]> = image.pixels().map(|p| p.0).collect();
@@ -46,11 +46,11 @@ fn pictures_for_the_docs() {
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
         rig.shoot(&format!("{name}-first-start"));
-        rig.send(Command::DismissHint);
-        rig.send(Command::Select(PairId(30)));
-        rig.send(Command::Generate);
+        rig.send(SettingsCommand::DismissHint);
+        rig.send(LibraryCommand::Select(PairId(30)));
+        rig.send(PredictCommand::Generate);
         rig.shoot(&format!("{name}-demo-inspect"));
-        rig.send(Command::SetWorkspace(Workspace::Align));
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
         rig.send(Command::Inspect(InspectCommand::Pin));
         rig.send(Command::Inspect(InspectCommand::Begin));
         rig.send(Command::Inspect(InspectCommand::Pin));
@@ -77,26 +77,26 @@ fn pictures_for_the_docs() {
         rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::Pitch, 0.1)));
         rig.shoot(&format!("{name}-demo-align-hand"));
         rig.send(Command::Workbench(WorkbenchCommand::SetTool(SceneTool::Look)));
-        rig.send(Command::SetWorkspace(Workspace::Label));
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
         rig.shoot(&format!("{name}-demo-label"));
-        rig.send(Command::SetMaskSource(MaskSource::Unet));
+        rig.send(SettingsCommand::SetMaskSource(MaskSource::Unet));
         rig.shoot(&format!("{name}-demo-label-unet"));
-        rig.send(Command::SetMaskSource(MaskSource::Cad));
+        rig.send(SettingsCommand::SetMaskSource(MaskSource::Cad));
         rig.shoot(&format!("{name}-demo-label-cad"));
-        rig.send(Command::SetWorkspace(Workspace::Evaluate));
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
         for _ in 0..5 {
-            rig.send(Command::Step(7));
-            rig.send(Command::Generate);
+            rig.send(LibraryCommand::Step(7));
+            rig.send(PredictCommand::Generate);
         }
         rig.shoot(&format!("{name}-demo-evaluate"));
-        rig.send(Command::SetTheme(Theme::Light));
-        rig.send(Command::SetWorkspace(Workspace::Inspect));
+        rig.send(SettingsCommand::SetTheme(Theme::Light));
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Inspect));
         rig.shoot(&format!("{name}-demo-light"));
-        rig.send(Command::SetTheme(Theme::Dark));
+        rig.send(SettingsCommand::SetTheme(Theme::Dark));
         if let Some(pairs) = std::env::var_os("TOUCH2TOUCH_REAL_PAIRS") {
-            rig.send(Command::Open(Place::Path(pairs.into())));
-            rig.send(Command::Select(PairId(7)));
-            rig.send(Command::Generate);
+            rig.send(LibraryCommand::Open(Place::Path(pairs.into())));
+            rig.send(LibraryCommand::Select(PairId(7)));
+            rig.send(PredictCommand::Generate);
             rig.shoot(&format!("{name}-pairs-inspect"));
         }
     }
@@ -114,11 +114,11 @@ fn pictures_of_the_faults() {
         write_pair(folder.path(), Layout::Test, &fault.to_string(), 0, &fault.sample()).unwrap();
     }
     let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(folder.path().to_owned())) else { return };
-    rig.send(Command::DismissHint);
-    rig.send(Command::SetWorkspace(Workspace::Align));
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
     let pairs = rig.harness.state().state().library.open.as_ref().unwrap().index().pairs.clone();
     for (id, pair) in pairs.iter().enumerate() {
-        rig.send(Command::Select(PairId(id as u32)));
+        rig.send(LibraryCommand::Select(PairId(id as u32)));
         let name = pair.tool.clone().unwrap();
         rig.shoot(&format!("fault-{name}-plain"));
         for layer in [Layer::Residuals, Layer::Reasons] {

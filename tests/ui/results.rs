@@ -1,8 +1,8 @@
 //! The results table of the Evaluate workspace, with the shipped models on a few simulated grasps.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, Pane};
-use touch2touch::app::evaluation::EvaluateCommand;
+use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand};
+use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 
@@ -14,8 +14,8 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     let data = folder.path().join("grasps");
     write_dataset(&data, 2);
     let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data.clone())) else { return };
-    rig.send(Command::DismissHint);
-    rig.send(Command::SetWorkspace(Workspace::Evaluate));
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
     assert!(rig.harness.state().state().selection.panes.contains(&Pane::Results));
     rig.shoot("results-before");
 
@@ -44,7 +44,7 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     assert!(out.join("evaluation.md").is_file());
 
     // A table is of one data set.
-    rig.send(Command::Open(Place::Demo));
+    rig.send(LibraryCommand::Open(Place::Demo));
     assert!(rig.harness.state().state().table.result.is_none());
 }
 
@@ -54,8 +54,8 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
 fn pictures_of_the_results() {
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Path("test-set".into())) else { return };
-        rig.send(Command::DismissHint);
-        rig.send(Command::SetWorkspace(Workspace::Evaluate));
+        rig.send(SettingsCommand::DismissHint);
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
         rig.shoot(&format!("{name}-results-empty"));
         rig.send(Command::Evaluate(EvaluateCommand::Grasps(Some(1))));
         rig.send(Command::Evaluate(EvaluateCommand::Published(true)));

@@ -297,7 +297,7 @@ impl Rig {
     }
 
     /// Carries a command out as if a pane had sent it.
-    pub(super) fn send(&mut self, command: Command) {
+    pub(super) fn send(&mut self, command: impl Into<Command>) {
         self.harness.state_mut().push(command);
         self.harness.step();
         self.settle();

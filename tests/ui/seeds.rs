@@ -1,7 +1,7 @@
 //! Several seeds: nothing runs out of sight; the grid, the spreads and the fan come with the predictions.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, Pane};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand};
 use touch2touch::app::seeds::SeedsCommand;
 use touch2touch::domain::ensemble::AngleFan;
 use touch2touch::domain::rig::lab;
@@ -25,7 +25,7 @@ fn there(rig: &Rig) -> usize {
 #[test]
 fn seeds_run_in_sight_only_and_show_where_they_disagree() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 2) else { return };
-    rig.send(Command::DismissHint);
+    rig.send(SettingsCommand::DismissHint);
     // Behind a tab: told to run, but nobody looks.
     rig.send(Command::Seeds(SeedsCommand::Run(true)));
     assert!(!rig.harness.state().state().selection.panes.contains(&Pane::Seeds));
@@ -61,7 +61,7 @@ fn seeds_run_in_sight_only_and_show_where_they_disagree() {
 
     // Stopped: another pair gets none until told so.
     click(&mut rig, "Run the seeds");
-    rig.send(Command::Step(1));
+    rig.send(LibraryCommand::Step(1));
     assert_eq!(there(&rig), 0);
     rig.send(Command::Seeds(SeedsCommand::Count(1)));
     assert_eq!(rig.harness.state().state().seeds.count, 2, "one is no ensemble");

@@ -3,7 +3,9 @@
 use eframe::egui::{Key, Modifiers, Pos2, Vec2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{CameraPreset, Command, Pane, UiRequest};
+use touch2touch::app::command::{
+    CameraPreset, Command, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
+};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
@@ -72,15 +74,15 @@ impl Rig {
     /// The studio on the Align workspace with true masks, the pointer in the measured view, seen from the right.
     fn aligned() -> Option<Self> {
         let mut rig = Self::new(SIZE, 2)?;
-        rig.send(Command::DismissHint);
-        rig.send(Command::LogSeen(u64::MAX));
-        rig.send(Command::SetMaskSource(MaskSource::Truth));
-        rig.send(Command::SetWorkspace(Workspace::Align));
+        rig.send(SettingsCommand::DismissHint);
+        rig.send(TasksCommand::LogSeen(u64::MAX));
+        rig.send(SettingsCommand::SetMaskSource(MaskSource::Truth));
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
         rig.front("Layers");
         let middle = rig.in_view([0.5, 0.5]);
         rig.move_to(middle);
-        rig.send(Command::Ui(UiRequest::Camera(CameraPreset::Right)));
-        rig.send(Command::Ui(UiRequest::Fit));
+        rig.send(ViewCommand::Ui(UiRequest::Camera(CameraPreset::Right)));
+        rig.send(ViewCommand::Ui(UiRequest::Fit));
         assert!(rig.model().pose(MEASURED).ready().is_some());
         assert_eq!(rig.model().workbench.side, MEASURED, "the pointer says which side");
         Some(rig)
@@ -151,7 +153,7 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
     assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
     // After a restart it is still there.
     rig.restart(SIZE);
-    rig.send(Command::SetWorkspace(Workspace::Align));
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
     assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
 }
 
@@ -281,7 +283,7 @@ fn layers_go_round_and_their_numbers_add_up() {
     assert_eq!(layers.histogram.iter().sum::<u32>() as usize + layers.above as usize, contact);
     assert!(layers.directions.unwrap().scene_to_model.overlap > 0.8, "{:?}", layers.directions);
     // The other side has its own.
-    rig.send(Command::Generate);
+    rig.send(PredictCommand::Generate);
     let side = rig.harness.get_by_label("Layers of the predicted side").rect().center();
     rig.click_at(side);
     assert_eq!(rig.model().workbench.side, ImprintSource::Predicted);
@@ -293,12 +295,12 @@ fn layers_go_round_and_their_numbers_add_up() {
 #[test]
 fn what_no_pane_shows_is_not_computed_and_rest_is_rest() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(Command::DismissHint);
-    rig.send(Command::SetMaskSource(MaskSource::Truth));
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetMaskSource(MaskSource::Truth));
     // In Inspect there are 3D views, but neither layers nor poses per finger.
     assert!(rig.model().pose(MEASURED).ready().is_some());
     assert!(rig.model().results.runs.is_empty() && rig.model().results.layers.is_empty());
-    rig.send(Command::SetWorkspace(Workspace::Align));
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
     rig.front("Layers");
     assert_eq!(rig.model().results.layers.len(), 1, "for the side in hand, not for both");
     assert!(!rig.model().selection.panes.contains(&Pane::Poses));

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 
-use super::super::command::Command;
+use super::super::answers::Answer;
 use super::super::keys::DatasetSeq;
 use super::super::services::{DataSource, Following};
 use super::lanes::Event;
@@ -37,15 +37,15 @@ impl Runtime {
         let thread = std::thread::Builder::new().name("follow".into()).spawn(move || {
             if let Err(message) = caught(|| watch(seq, &*source, &stop, &sender, &wake)) {
                 let err = TaskError::panicked("Follow", &message);
-                drop(sender.send(Event { id: JobId::Follow, command: Command::Report(err) }));
+                drop(sender.send(Event { id: JobId::Follow, answer: Answer::JobFailed(err) }));
                 wake();
             }
         });
         match thread {
             Ok(_) => self.follower = Some(Job::Thread(cancel)),
             Err(err) => {
-                let command = Command::Report(TaskError::from_error("Follow", &err));
-                drop(self.sender.send(Event { id: JobId::Follow, command }));
+                let answer = Answer::JobFailed(TaskError::from_error("Follow", &err));
+                drop(self.sender.send(Event { id: JobId::Follow, answer }));
             }
         }
     }
@@ -53,8 +53,8 @@ impl Runtime {
     pub(super) fn poll_follower(&mut self) {
         if let Some(Job::Inline(seq, following)) = &mut self.follower {
             while let Some(followed) = following.poll() {
-                let command = Command::Followed(*seq, followed);
-                drop(self.sender.send(Event { id: JobId::Follow, command }));
+                let answer = Answer::Followed(*seq, followed);
+                drop(self.sender.send(Event { id: JobId::Follow, answer }));
             }
         }
     }
@@ -65,7 +65,7 @@ fn watch(seq: DatasetSeq, source: &dyn DataSource, stop: &Cancel, sender: &Sende
     while !stop.is_cancelled() {
         match following.poll() {
             Some(followed) => {
-                if sender.send(Event { id: JobId::Follow, command: Command::Followed(seq, followed) }).is_err() {
+                if sender.send(Event { id: JobId::Follow, answer: Answer::Followed(seq, followed) }).is_err() {
                     return;
                 }
                 wake();

@@ -7,10 +7,10 @@ use std::thread::JoinHandle;
 
 use strum::IntoEnumIterator as _;
 
-use super::super::command::Command;
-use super::super::jobs::Lane;
-use super::super::jobs::prepare::{Body, RequestJob};
-use super::super::keys::Request;
+use super::super::answers::Answer;
+use super::super::jobs::{self, Body, Lane};
+use super::super::keys::DatasetSeq;
+use super::super::results::{Computed, Request};
 use super::{JobId, Wake, lock};
 use crate::io::caught::caught;
 use crate::work::error::TaskError;
@@ -19,7 +19,7 @@ use crate::work::job::{Cancel, JobCx};
 /// The end of a job.
 pub(super) struct Event {
     pub(super) id: JobId,
-    pub(super) command: Command,
+    pub(super) answer: Answer,
 }
 
 /// A waiting job.
@@ -28,9 +28,9 @@ pub(super) struct Job {
     pub(super) what: String,
     pub(super) cx: JobCx,
     /// Computes the answer.
-    pub(super) body: Body<Command>,
+    pub(super) body: Body<Answer>,
     /// The answer when there is none.
-    pub(super) failed: Box<dyn FnOnce(TaskError) -> Command + Send>,
+    pub(super) failed: Box<dyn FnOnce(TaskError) -> Answer + Send>,
 }
 
 #[derive(Default)]
@@ -121,7 +121,11 @@ impl Lanes {
     }
 
     /// Makes `wanted`, in this order, what waits: what is not wanted any more is dropped, or told to stop if it runs.
-    pub(super) fn demand(&mut self, wanted: &[Request], mut prepare: impl FnMut(&Request) -> Option<RequestJob>) {
+    pub(super) fn demand(
+        &mut self,
+        wanted: &[Request],
+        mut prepare: impl FnMut(&Request) -> Option<(DatasetSeq, jobs::Job<Computed>)>,
+    ) {
         let started: BTreeSet<Request> = self
             .lanes
             .iter()
@@ -140,14 +144,14 @@ impl Lanes {
         }
         let mut fresh: Vec<VecDeque<Job>> = self.lanes.iter().map(|_| VecDeque::new()).collect();
         for request in wanted.iter().filter(|r| !started.contains(r)) {
-            let Some(RequestJob { lane, what, body }) = prepare(request) else { continue };
-            let (done, failed) = (request.clone(), request.clone());
+            let Some((seq, jobs::Job { lane, what, body })) = prepare(request) else { continue };
+            let failed = request.clone();
             fresh[lane as usize].push_back(Job {
                 id: JobId::Request(request.clone()),
                 what,
                 cx: JobCx::unwatched(),
-                body: Box::new(move |cx| Ok(Command::Computed(done, body(cx)?))),
-                failed: Box::new(move |err| Command::RequestFailed(failed, err)),
+                body: Box::new(move |cx| Ok(Answer::Computed(seq, body(cx)?))),
+                failed: Box::new(move |err| Answer::RequestFailed(seq, failed, err)),
             });
         }
         for (state, mut jobs) in self.lanes.iter().zip(fresh) {
@@ -261,5 +265,5 @@ fn execute(job: Job) -> Event {
             Err(message) => Err(TaskError::panicked(what, &message)),
         }
     };
-    Event { id, command: outcome.unwrap_or_else(failed) }
+    Event { id, answer: outcome.unwrap_or_else(failed) }
 }

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use super::super::command::{Command, UiRequest};
+use super::super::answers::Answer;
 use super::super::effect::Effect;
-use super::super::evaluation::EvaluateCommand;
-use super::super::jobs::generate::generate;
-use super::super::jobs::prepare::Body;
-use super::super::jobs::{Lane, Onlooker, PreviewSink};
+use super::super::jobs::{Body, Lane};
 use super::super::results::Preview;
-use super::super::tasks::Ticket;
+use super::super::results::prediction::generate;
+use super::super::results::preview::{Onlooker, PreviewSink};
+use super::super::tasks::state::Ticket;
+use super::super::view::state::UiRequest;
 use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
 use crate::domain::dataset::PairId;
@@ -28,7 +28,7 @@ impl Runtime {
                 let services = self.services.clone();
                 let what = format!("Open {place}");
                 let body =
-                    Box::new(move |_: &JobCx| Ok(Command::Opened(ticket, seq, place.clone(), services.open(&place)?)));
+                    Box::new(move |_: &JobCx| Ok(Answer::Opened(ticket, seq, place.clone(), services.open(&place)?)));
                 self.task(Lane::Files, ticket, what, body);
             }
             Effect::Follow(of) => self.follow(of),
@@ -41,7 +41,7 @@ impl Runtime {
                     "Look for model bundles",
                     Box::new(move |_| {
                         let (bundles, problems) = services.find_bundles(&folders);
-                        Ok(Command::Bundles(bundles, problems))
+                        Ok(Answer::Bundles(bundles, problems))
                     }),
                 );
             }
@@ -49,20 +49,20 @@ impl Runtime {
                 let services = self.services.clone();
                 let what = format!("Generate with {}", bundle.name);
                 let (wish, latest, wake) = (self.preview_wish.clone(), self.previews.clone(), self.wake.clone());
-                let body: Body<Command> = Box::new(move |cx| {
+                let body: Body<Answer> = Box::new(move |cx| {
                     let show: PreviewSink = Arc::new(move |preview: Preview| {
                         lock(&latest).insert(preview.recipe.touch, (ticket, Arc::new(preview)));
                         wake();
                     });
                     let onlooker = Some(Onlooker { wish, sink: show });
                     let made = generate(&*services, recipes, &bundle, &*source, sample, cx, onlooker)?;
-                    Ok(Command::Generated(ticket, made))
+                    Ok(Answer::Generated(ticket, made))
                 });
                 self.task(Lane::Models, ticket, what, body);
             }
             Effect::Refit { ticket, recipe, bundle, source } => {
                 let services = self.services.clone();
-                let body: Body<Command> = Box::new(move |cx| {
+                let body: Body<Answer> = Box::new(move |cx| {
                     let pairs = spread(source.index().pairs.len(), STUDIO_PAIRS);
                     let rig = source.rig();
                     let fail = |err| TaskError::from_error("Shift statistics", &err);
@@ -83,7 +83,7 @@ impl Runtime {
                     let load = |pair| source.load(pair).map(Arc::new);
                     let (found, _) = statistics(&setup, load, predict, cx)?;
                     let saved = services.save_statistics(&found)?;
-                    Ok(Command::Refitted(ticket, Box::new(found), saved.map(|file| file.display().to_string())))
+                    Ok(Answer::Refitted(ticket, Box::new(found), saved.map(|file| file.display().to_string())))
                 });
                 self.task(Lane::Models, ticket, "Shift statistics".into(), body);
             }
@@ -93,8 +93,8 @@ impl Runtime {
                 }
                 // One that waits ends at once, not when its turn comes.
                 if let Some(job) = self.lanes.withdraw(&JobId::Task(ticket)) {
-                    let command = (job.failed)(TaskError::cancelled(job.what));
-                    drop(self.sender.send(Event { id: job.id, command }));
+                    let answer = (job.failed)(TaskError::cancelled(job.what));
+                    drop(self.sender.send(Event { id: job.id, answer }));
                     (self.wake)();
                 }
             }
@@ -106,7 +106,7 @@ impl Runtime {
                     "Save the labels",
                     Box::new(move |_| {
                         source.save_labels(&save.name, &save.labels)?;
-                        Ok(Command::LabelsSaved(save.name, save.revision))
+                        Ok(Answer::LabelsSaved(save.name, save.revision))
                     }),
                 );
             }
@@ -118,7 +118,7 @@ impl Runtime {
                     "Save the preferences",
                     Box::new(move |_| {
                         services.save_settings(&settings)?;
-                        Ok(Command::SettingsSaved)
+                        Ok(Answer::SettingsSaved)
                     }),
                 );
             }
@@ -129,7 +129,7 @@ impl Runtime {
                         TaskError::new("Evaluate", "this kind of source cannot be read outside the studio")
                     })?;
                     let evaluation = Arc::new(services.evaluate(dataset, &setup, cx)?);
-                    Ok(Command::Evaluate(EvaluateCommand::Done(ticket, evaluation)))
+                    Ok(Answer::Evaluated(ticket, evaluation))
                 });
                 self.task(Lane::Batch, ticket, "Evaluate".into(), body);
             }
@@ -137,13 +137,13 @@ impl Runtime {
                 let body = Box::new(move |_: &JobCx| {
                     let folder = evaluate::export(&evaluation, published, &folder)?;
                     let line = format!("Wrote evaluation.csv, .md and .json to {}", folder.display());
-                    Ok(Command::Finished(ticket, Some(line)))
+                    Ok(Answer::Finished(ticket, Some(line)))
                 });
                 self.task(Lane::Files, ticket, "Export the table".into(), body);
             }
             Effect::ExportMasks { ticket, source, labels, folder } => {
                 let body = Box::new(move |cx: &JobCx| {
-                    Ok(Command::Finished(ticket, Some(source.export_masks(&labels, &folder, cx)?)))
+                    Ok(Answer::Finished(ticket, Some(source.export_masks(&labels, &folder, cx)?)))
                 });
                 self.task(Lane::Compute, ticket, "Export masks".into(), body);
             }
@@ -151,7 +151,7 @@ impl Runtime {
     }
 
     /// Queues a job that a person started.
-    fn task(&mut self, lane: Lane, ticket: Ticket, what: String, body: Body<Command>) {
+    fn task(&mut self, lane: Lane, ticket: Ticket, what: String, body: Body<Answer>) {
         let cancel = Cancel::default();
         self.cancels.insert(ticket, cancel.clone());
         let (latest, wake) = (self.progress.clone(), self.wake.clone());
@@ -168,14 +168,14 @@ impl Runtime {
                 what,
                 cx: JobCx::new(cancel, sink),
                 body,
-                failed: Box::new(move |err| Command::TaskFailed(ticket, err)),
+                failed: Box::new(move |err| Answer::TaskFailed(ticket, err)),
             },
         );
     }
 
     /// Queues a job that shows no progress.
-    fn unwatched(&self, lane: Lane, id: JobId, what: &str, body: Body<Command>) {
-        let failed = Box::new(Command::SaveFailed);
+    fn unwatched(&self, lane: Lane, id: JobId, what: &str, body: Body<Answer>) {
+        let failed = Box::new(Answer::JobFailed);
         self.lanes.submit(lane, Job { id, what: what.to_owned(), cx: JobCx::unwatched(), body, failed });
     }
 }

@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::command::Opened;
-use super::super::document::{PairLabels, Review};
 use super::super::keys::{PredictionKey, TouchKey};
-use super::super::library::Place;
-use super::super::settings::{SETTINGS_VERSION, Settings};
+use super::super::labels::state::{PairLabels, Review};
+use super::super::library::state::Place;
+use super::super::settings::state::{SETTINGS_VERSION, Settings};
 use super::{DataSource, Following, Services};
 use crate::domain::contact::ContactMask;
 use crate::domain::dataset::{Index, PairId, Problem};

@@ -4,7 +4,7 @@ use eframe::egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, UiBuilder, p
 use glam::DVec3;
 
 use super::nearest;
-use crate::app::command::Command;
+use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::workbench::{Picked, SceneTool, WorkbenchCommand};
 use crate::domain::units;
@@ -34,7 +34,7 @@ pub(super) fn click(cx: &mut Cx<'_>, source: ImprintSource, output: &SceneOutput
             }
         }
         (_, Some((_, point, _))) => cx.push(Command::Workbench(WorkbenchCommand::Mark(source, point))),
-        (_, None) => cx.push(Command::Notice("No point under the pointer: measure from point to point".into())),
+        (_, None) => cx.push(TasksCommand::Notice("No point under the pointer: measure from point to point".into())),
     }
 }
 

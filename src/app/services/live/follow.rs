@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::super::super::document::Review;
+use super::super::super::labels::state::Review;
 use super::super::{DataSource, Followed, Following};
 use super::LiveSource;
 use crate::domain::dataset::Problem;

@@ -1,21 +1,50 @@
-//! Starting predictions.
+//! The room of predictions: starting them, choosing among them, and the refit of their range.
 
-use super::super::effect::Effect;
-use super::super::keys::PredictionKey;
-use super::super::state::{Absent, State};
-use super::save_settings;
+mod recipe;
+pub(super) mod refit;
+
+use super::effect::Effect;
+use super::keys::PredictionKey;
+use super::settings;
+use super::state::{Absent, State};
 use crate::domain::rig::{PadId, Text};
 use crate::work::bundles::BundleKind;
 use crate::work::error::TaskError;
 
+/// What can happen to predictions.
+#[derive(Clone, Debug)]
+pub enum PredictCommand {
+    /// The generator.
+    Generate,
+    /// Draws a new seed, then generates.
+    GenerateNewSeed,
+    /// Computes shift statistics of the open data set with the generator and its settings, then uses them.
+    Refit,
+    /// Shows another prediction of the same touch.
+    Choose(PredictionKey),
+}
+
+pub(super) fn step(state: &mut State, command: PredictCommand, effects: &mut Vec<Effect>) {
+    match command {
+        PredictCommand::Generate => generate(state, false, effects),
+        PredictCommand::GenerateNewSeed => generate(state, true, effects),
+        PredictCommand::Refit => refit::start(state, effects),
+        PredictCommand::Choose(recipe) => {
+            if state.results.predictions.contains(&recipe) {
+                state.results.chosen.insert(recipe.touch, recipe);
+            }
+        }
+    }
+}
+
 /// Starts the predictions of the fingers that are looked at, in one go; one that exists is shown instead.
-pub(super) fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
+fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
     if let Err(absent) = state.can_generate() {
         return state.log.error(&refusal(absent));
     }
     if new_seed || !state.settings.generate.seed_locked {
         state.settings.generate.seed = next_seed(state.settings.generate.seed);
-        save_settings(state, effects);
+        settings::save(state, effects);
     }
     same_seed(state, effects);
 }

@@ -1,11 +1,10 @@
 //! What the Evaluate workspace asks for, and its last answer.
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::state::State;
-use super::tasks::{Task, Ticket};
+use super::super::state::State;
+use super::super::tasks::state::{Task, Ticket};
 use crate::domain::evaluation::{Row, paper_rows};
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::evaluate::{Evaluation, Setup};
@@ -32,23 +31,6 @@ impl Default for TableState {
     fn default() -> Self {
         Self { left_out: BTreeSet::new(), grasps_per_tool: Some(4), published: false, running: None, result: None }
     }
-}
-
-/// What can happen to it.
-#[derive(Clone, Debug)]
-pub enum EvaluateCommand {
-    /// Gives a generator a row, or none.
-    Choose(Arc<str>, bool),
-    /// How many grasps of each tool.
-    Grasps(Option<usize>),
-    /// Shows what was published, or not.
-    Published(bool),
-    /// Scores the open data set.
-    Start,
-    /// The table is there.
-    Done(Ticket, Arc<Evaluation>),
-    /// Writes the table into a folder.
-    Export(PathBuf),
 }
 
 impl State {

@@ -1,21 +1,98 @@
-//! Changing the document: strokes, clean-ups, review states, accepted poses, undo.
+//! The room of the document: strokes, clean-ups, review states, accepted poses, undo, saving.
 
+pub mod state;
+
+pub use state::*;
+
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::super::document::{HandMask, Review, Stroke};
-use super::super::effect::Effect;
-use super::super::history::{Edit, Gesture};
-use super::super::keys::ImprintSource;
-use super::super::settings::MaskTool;
-use super::super::state::{Lookup, State};
-use super::{reorder, save_labels};
+use super::effect::{Effect, LabelsToSave};
+use super::history::{Edit, Gesture};
+use super::keys::ImprintSource;
+use super::settings;
+use super::settings::state::MaskTool;
+use super::state::{Lookup, State};
+use super::tasks::state::Level;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{self, Patch};
 use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
+
+/// What can happen to the document.
+#[derive(Clone, Debug)]
+pub enum LabelsCommand {
+    /// Pointer down on an image, raw bubble pixels. `erase` swaps brush and eraser for this stroke.
+    BeginStroke {
+        /// The finger drawn on.
+        finger: PadId,
+        /// The imprint it is drawn on: its mask in force is where the correction starts.
+        source: ImprintSource,
+        /// Position.
+        at_px: [f32; 2],
+        /// Whether to remove instead of the tool's own effect.
+        erase: bool,
+    },
+    /// Pointer moved, raw bubble pixels.
+    StrokeTo([f32; 2]),
+    /// Pointer up.
+    EndStroke,
+    /// Gives the stroke up.
+    CancelStroke,
+    /// Fills the holes of the mask in force.
+    FillHoles,
+    /// Keeps the largest island of the mask in force.
+    LargestIsland,
+    /// Makes the automatic mask the corrected one.
+    AdoptAutomatic,
+    /// Removes the corrected mask: the automatic source is in force again.
+    ResetMask,
+    /// Takes back the last change of what is on screen.
+    Undo,
+    /// Does it again.
+    Redo,
+    /// Sets the review state of the selected pair.
+    SetReview(Review),
+    /// Accepts the pose shown for an imprint, or withdraws it.
+    AcceptPose(ImprintSource, bool),
+    /// Writes all labels and settings now.
+    Save,
+    /// Writes the masks to a folder for UNet training.
+    ExportMasks(PathBuf),
+}
+
+pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<Effect>) {
+    match command {
+        LabelsCommand::BeginStroke { finger, source, at_px, erase } => {
+            begin_stroke(state, finger, source, at_px, erase, effects);
+        }
+        LabelsCommand::StrokeTo(at_px) => stroke_to(state, at_px),
+        LabelsCommand::EndStroke => end_stroke(state, effects),
+        LabelsCommand::CancelStroke => cancel_stroke(state),
+        LabelsCommand::FillHoles => replace(state, "fill holes", "Fill holes", effects, label::fill_holes),
+        LabelsCommand::LargestIsland => {
+            replace(state, "largest island", "Largest island", effects, label::largest_island);
+        }
+        LabelsCommand::AdoptAutomatic => adopt_automatic(state, effects),
+        LabelsCommand::ResetMask => reset(state, effects),
+        LabelsCommand::Undo => undo(state, effects),
+        LabelsCommand::Redo => redo(state, effects),
+        LabelsCommand::SetReview(review) => {
+            set_review(state, review, effects);
+            state.reorder();
+        }
+        LabelsCommand::AcceptPose(source, accept) => accept_pose(state, source, accept, effects),
+        LabelsCommand::Save => save_all(state, effects),
+        LabelsCommand::ExportMasks(folder) => {
+            let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
+            let ticket = state.tasks.start("Export masks".into(), Vec::new());
+            effects.push(Effect::ExportMasks { ticket, source, labels: state.document.labels.clone(), folder });
+        }
+    }
+}
 
 /// Whether the selected pair may be edited; says why not.
 pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
@@ -63,7 +140,7 @@ fn edited_source(state: &State, finger: PadId) -> ImprintSource {
     }
 }
 
-pub(super) fn begin_stroke(
+fn begin_stroke(
     state: &mut State,
     finger: PadId,
     source: ImprintSource,
@@ -94,7 +171,7 @@ pub(super) fn begin_stroke(
     stroke_to(state, at_px);
 }
 
-pub(super) fn stroke_to(state: &mut State, at_px: [f32; 2]) {
+fn stroke_to(state: &mut State, at_px: [f32; 2]) {
     let doc = &mut state.document;
     let Some(stroke) = &mut doc.stroke else { return };
     if !at_px.iter().all(|v| v.is_finite()) {
@@ -108,7 +185,7 @@ pub(super) fn stroke_to(state: &mut State, at_px: [f32; 2]) {
         && label::paint(Arc::make_mut(&mut hand.mask), [a, b], radius, value).is_some()
     {
         doc.last_revision += 1;
-        hand.revision = super::super::keys::Revision(doc.last_revision);
+        hand.revision = super::keys::Revision(doc.last_revision);
     }
 }
 
@@ -130,7 +207,7 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     record(state, &pair, if stroke.value { "brush stroke" } else { "eraser stroke" }, edit, effects);
 }
 
-pub(super) fn cancel_stroke(state: &mut State) {
+fn cancel_stroke(state: &mut State) {
     let doc = &mut state.document;
     let Some(stroke) = doc.stroke.take() else { return };
     if let Some(labels) = doc.labels.get_mut(&stroke.pair) {
@@ -146,7 +223,7 @@ fn record(state: &mut State, pair: &str, name: &'static str, edit: Edit, effects
         edits.push(Edit::Review { pair: pair.to_owned(), review: before });
     }
     state.history.record(Gesture { name, edits });
-    save_labels(state, pair, effects);
+    save_pair(state, pair, effects);
 }
 
 /// Replaces the active finger's mask by `f` of the mask in force.
@@ -187,15 +264,7 @@ fn set_hand_mask(
     record(state, &pair, name, edit, effects);
 }
 
-pub(super) fn fill_holes(state: &mut State, effects: &mut Vec<Effect>) {
-    replace(state, "fill holes", "Fill holes", effects, label::fill_holes);
-}
-
-pub(super) fn largest_island(state: &mut State, effects: &mut Vec<Effect>) {
-    replace(state, "largest island", "Largest island", effects, label::largest_island);
-}
-
-pub(super) fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
+fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
     const WHAT: &str = "Threshold to mask";
     end_stroke(state, effects);
     if !check_editable(state, WHAT) {
@@ -217,7 +286,7 @@ pub(super) fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
     }
 }
 
-pub(super) fn reset(state: &mut State, effects: &mut Vec<Effect>) {
+fn reset(state: &mut State, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
     let finger = state.selection.finger;
     if state.document.hand_mask(state.pair_name(), finger).is_some() && check_editable(state, "Remove the correction") {
@@ -234,10 +303,10 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
     let before = state.document.set_review(&pair, review);
     let edit = Edit::Review { pair: pair.clone(), review: before };
     state.history.record(Gesture { name: "review state", edits: vec![edit] });
-    save_labels(state, &pair, effects);
+    save_pair(state, &pair, effects);
 }
 
-pub(super) fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: &mut Vec<Effect>) {
+fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: &mut Vec<Effect>) {
     if !check_editable(state, "Accept the pose") {
         return;
     }
@@ -262,10 +331,10 @@ pub(super) fn set_accepted(
     let mut edit = Edit::Pose { pair: pair.clone(), source, pose };
     edit.swap(&mut state.document);
     state.history.record(Gesture { name, edits: vec![edit] });
-    save_labels(state, &pair, effects);
+    save_pair(state, &pair, effects);
 }
 
-pub(super) fn undo(state: &mut State, effects: &mut Vec<Effect>) {
+fn undo(state: &mut State, effects: &mut Vec<Effect>) {
     if state.document.stroke.is_some() {
         return cancel_stroke(state);
     }
@@ -274,7 +343,7 @@ pub(super) fn undo(state: &mut State, effects: &mut Vec<Effect>) {
     travelled(state, "Undone", &pair, name, effects);
 }
 
-pub(super) fn redo(state: &mut State, effects: &mut Vec<Effect>) {
+fn redo(state: &mut State, effects: &mut Vec<Effect>) {
     if state.document.stroke.is_some() {
         return;
     }
@@ -287,9 +356,30 @@ fn travelled(state: &mut State, how: &str, pair: &str, name: Option<&'static str
     match name {
         Some(name) => {
             state.log.info(format!("{how}: {name}"));
-            save_labels(state, pair, effects);
-            reorder(state);
+            save_pair(state, pair, effects);
+            state.reorder();
         }
         None => state.log.info(format!("{how}: nothing on screen to change")),
     }
+}
+
+/// Writes the labels of a pair of the open data set.
+fn save_pair(state: &mut State, name: &str, effects: &mut Vec<Effect>) {
+    let Some(open) = &state.library.open else { return };
+    let revision = state.document.next_revision();
+    let Some(labels) = state.document.labels.get(name) else { return };
+    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels: labels.clone() };
+    effects.push(Effect::SaveLabels(open.source.clone(), Box::new(save)));
+    state.document.unsaved.insert(name.to_owned());
+    state.document.asked.insert(name.to_owned(), revision);
+}
+
+fn save_all(state: &mut State, effects: &mut Vec<Effect>) {
+    end_stroke(state, effects);
+    let unsaved: Vec<String> = state.document.unsaved.iter().cloned().collect();
+    for name in unsaved {
+        save_pair(state, &name, effects);
+    }
+    settings::save(state, effects);
+    state.log.push(Level::Info, "Labels and preferences are being written", None, None);
 }

@@ -1,16 +1,28 @@
-//! Following a folder: what arrives is listed, and the newest is shown and predicted.
+//! The room of a followed folder: what arrives is listed, and the newest is shown and predicted.
 
-use super::super::effect::Effect;
-use super::super::keys::Request;
-use super::super::library::Follow;
-use super::super::services::Followed;
-use super::super::state::State;
-use super::super::tasks::Ticket;
-use super::{generate, reorder, select};
+use super::effect::Effect;
+use super::keys::Request;
+use super::library::state::Follow;
+use super::results::Results;
+use super::services::Followed;
+use super::state::State;
+use super::tasks::state::Ticket;
+use super::{library, predict};
 use crate::work::error::TaskError;
 
+/// What can happen to following.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FollowCommand {
+    /// Follows the folder that is open, or stops: what arrives is shown and predicted.
+    Set(bool),
+}
+
+pub(super) fn step(state: &mut State, FollowCommand::Set(on): FollowCommand, effects: &mut Vec<Effect>) {
+    set(state, on, effects);
+}
+
 /// Starts or stops following the folder that is open.
-pub(super) fn set(state: &mut State, on: bool, effects: &mut Vec<Effect>) {
+fn set(state: &mut State, on: bool, effects: &mut Vec<Effect>) {
     if on == state.library.follow.is_some() {
         return;
     }
@@ -45,17 +57,17 @@ pub(super) fn arrived(state: &mut State, followed: Followed, current: bool, effe
     open.tools = open.index().tools();
     let mut key = open.key(followed.pair);
     let results = &mut state.results;
-    results.thumbnails.retain(|pair| *pair != key);
+    results.thumbnails.retain(|pair| pair.0 != key);
     if results.samples.contains(&key) && !followed.completed {
         // A file that was written again: under a new number nothing of the old is shown.
         state.library.last_seq.0 += 1;
         open.seq = state.library.last_seq;
         key = open.key(followed.pair);
-        results.clear();
+        *results = Results::default();
         effects.push(Effect::Follow(Some((open.seq, open.source.clone()))));
     }
     state.tasks.failed.clear();
-    reorder(state);
+    state.reorder();
     let name = state.library.entry(followed.pair).map_or_else(String::new, |entry| entry.name.clone());
     let Some(follow) = &mut state.library.follow else { return };
     follow.arrived += usize::from(!followed.completed);
@@ -75,7 +87,7 @@ pub(super) fn arrived(state: &mut State, followed: Followed, current: bool, effe
     if state.document.stroke.is_some() || followed.completed {
         return;
     }
-    select(state, followed.pair, effects);
+    library::select(state, followed.pair, effects);
     // What still waits is of a touch that is not the newest any more; what runs ends.
     let waiting = |ticket: &Ticket| {
         let task = &state.tasks.running[ticket];
@@ -88,5 +100,5 @@ pub(super) fn arrived(state: &mut State, followed: Followed, current: bool, effe
             effects.push(Effect::Cancel(ticket));
         }
     }
-    generate::same_seed(state, effects);
+    predict::same_seed(state, effects);
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::keys::Revision;
+use super::super::keys::Revision;
 use crate::domain::grid::Mask;
 use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
@@ -30,11 +30,11 @@ pub struct Document {
     /// Pairs whose last change is not on the disk yet.
     pub unsaved: BTreeSet<String>,
     /// The last request to write each of them.
-    pub(super) asked: BTreeMap<String, Revision>,
+    pub(in crate::app) asked: BTreeMap<String, Revision>,
     /// The stroke being drawn.
     pub stroke: Option<Stroke>,
     /// The last revision given out.
-    pub(super) last_revision: u64,
+    pub(in crate::app) last_revision: u64,
 }
 
 /// A stroke between pointer down and pointer up.
@@ -51,9 +51,9 @@ pub struct Stroke {
     /// The last position, image pixels.
     pub at: [f32; 2],
     /// The hand mask before the stroke; `None` if there was none.
-    pub(super) before: Option<HandMask>,
+    pub(in crate::app) before: Option<HandMask>,
     /// The pixels before the stroke, as large as the imprint.
-    pub(super) pixels: Arc<Mask>,
+    pub(in crate::app) pixels: Arc<Mask>,
 }
 
 impl Document {
@@ -86,13 +86,13 @@ impl Document {
     }
 
     /// A revision never given out before.
-    pub(super) fn next_revision(&mut self) -> Revision {
+    pub(in crate::app) fn next_revision(&mut self) -> Revision {
         self.last_revision += 1;
         Revision(self.last_revision)
     }
 
     /// Changes the review state in both places that hold it; returns the state before.
-    pub(super) fn set_review(&mut self, name: &str, review: Review) -> Review {
+    pub(in crate::app) fn set_review(&mut self, name: &str, review: Review) -> Review {
         let labels = self.labels.entry(name.to_owned()).or_default();
         let before = std::mem::replace(&mut labels.review, review);
         if review == Review::Todo {

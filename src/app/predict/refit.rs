@@ -2,8 +2,8 @@
 
 use super::super::effect::Effect;
 use super::super::keys::ShiftMode;
+use super::super::settings;
 use super::super::state::State;
-use super::save_settings;
 use crate::domain::rig::PadId;
 use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::BundleKind;
@@ -33,7 +33,7 @@ pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
 }
 
 /// Uses statistics that arrived.
-pub(super) fn arrived(
+pub(in crate::app) fn arrived(
     state: &mut State,
     statistics: &ShiftStatistics,
     saved: Option<String>,
@@ -49,7 +49,7 @@ pub(super) fn arrived(
             ));
             state.settings.refit = Some(shift);
             state.settings.shift = ShiftMode::Refit(shift);
-            save_settings(state, effects);
+            settings::save(state, effects);
         }
         Err(err) => state.log.error(&TaskError::from_error(TITLE, &err)),
     }

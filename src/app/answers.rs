@@ -1,0 +1,181 @@
+//! [`Answer`]: what the runtime answers, and what follows from it in the rooms.
+
+use std::sync::Arc;
+
+use super::effect::Effect;
+use super::keys::{DatasetSeq, Revision};
+use super::library::state::Place;
+use super::results::prediction::Keyed;
+use super::results::{Computed, Preview, Request};
+use super::services::{Followed, Opened};
+use super::settings::state::Settings;
+use super::state::State;
+use super::tasks::state::{Level, Ticket};
+use super::{evaluate, follow, library, predict, settings, tasks, workbench};
+use crate::io::statistics::ShiftStatistics;
+use crate::work::bundles::BundleInfo;
+use crate::work::error::{TaskError, TaskErrorKind};
+use crate::work::evaluate::Evaluation;
+use crate::work::job::Progress;
+
+/// What the runtime answers.
+#[derive(Clone, Debug)]
+pub enum Answer {
+    /// A touch arrived in the followed folder.
+    Followed(DatasetSeq, Followed),
+    /// A data set was opened.
+    Opened(Ticket, DatasetSeq, Place, Opened),
+    /// Bundles were looked for.
+    Bundles(Vec<BundleInfo>, Vec<TaskError>),
+    /// The settings file was read.
+    SettingsLoaded(Box<Settings>, Option<TaskError>),
+    /// What the runtime was asked for because it is shown.
+    Demanded(Vec<Request>),
+    /// A result that a pane asked for, of an opening.
+    Computed(DatasetSeq, Computed),
+    /// Predictions are there.
+    Generated(Ticket, Keyed),
+    /// A prediction as it looks on the way.
+    Previewed(Ticket, Arc<Preview>),
+    /// Shift statistics are there.
+    Refitted(Ticket, Box<ShiftStatistics>, Option<String>),
+    /// A job is under way.
+    Progressed(Ticket, Progress),
+    /// A job without a result is done, with a line for the log.
+    Finished(Ticket, Option<String>),
+    /// A job ended without a result.
+    TaskFailed(Ticket, TaskError),
+    /// A result that a pane asked for could not be made.
+    RequestFailed(DatasetSeq, Request, TaskError),
+    /// The labels of a pair are on the disk, as they were when this writing was asked for.
+    LabelsSaved(String, Revision),
+    /// The settings are on the disk.
+    SettingsSaved,
+    /// A job failed that is neither of a ticket nor of a request.
+    JobFailed(TaskError),
+    /// The results table is there.
+    Evaluated(Ticket, Arc<Evaluation>),
+}
+
+pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>) {
+    match answer {
+        Answer::Opened(ticket, seq, place, opened) => {
+            state.tasks.running.remove(&ticket);
+            // A later opening was started meanwhile: this one is not wanted any more.
+            if seq == state.library.last_seq {
+                let again = library::show(state, seq, place, opened, effects);
+                follow::opened(state, again, effects);
+            }
+        }
+        Answer::Followed(seq, followed) => {
+            let current = is_open(state, seq);
+            follow::arrived(state, followed, current, effects);
+        }
+        Answer::Bundles(bundles, problems) => library::found(state, bundles, problems),
+        Answer::SettingsLoaded(settings, problem) => {
+            state.settings = settings.validated();
+            if let Some(problem) = problem {
+                state.log.push(Level::Warning, problem.what, Some(problem.why), problem.hint);
+            }
+            effects.push(Effect::FindBundles(state.settings.bundle_folders.clone()));
+        }
+        Answer::Demanded(list) => state.tasks.demanded = list,
+        Answer::Computed(seq, computed) if is_open(state, seq) => {
+            let request = computed.request();
+            computed.keep(state);
+            react(state, &request);
+        }
+        Answer::Generated(ticket, predictions) => {
+            tasks::forget(state, ticket);
+            for (key, prediction) in predictions {
+                state.keep_prediction(key, prediction);
+            }
+        }
+        // One that comes after its result, or after Cancel, is too late.
+        Answer::Previewed(ticket, preview) if state.tasks.running.get(&ticket).is_some_and(|task| !task.cancelling) => {
+            state.results.previews.insert(preview.recipe.touch, preview);
+        }
+        Answer::Refitted(ticket, statistics, saved) => {
+            state.tasks.running.remove(&ticket);
+            predict::refit::arrived(state, &statistics, saved, effects);
+        }
+        Answer::Progressed(ticket, progress) => {
+            if let Some(task) = state.tasks.running.get_mut(&ticket) {
+                task.progress = progress;
+            }
+        }
+        Answer::Finished(ticket, line) => {
+            state.tasks.running.remove(&ticket);
+            if let Some(line) = line {
+                state.log.info(line);
+            }
+        }
+        Answer::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
+        Answer::RequestFailed(seq, request, err) if is_open(state, seq) => failed_request(state, request, err),
+        // An answer to anything but the last request: what was changed since is not on the disk yet.
+        Answer::LabelsSaved(name, revision) if state.document.asked.get(&name) == Some(&revision) => {
+            state.document.asked.remove(&name);
+            state.document.unsaved.remove(&name);
+        }
+        Answer::JobFailed(err) => state.log.error(&err),
+        Answer::Evaluated(ticket, evaluation) => {
+            state.tasks.running.remove(&ticket);
+            evaluate::arrived(state, ticket, evaluation);
+        }
+        // What came too late, or needs nothing.
+        Answer::Computed(..)
+        | Answer::RequestFailed(..)
+        | Answer::Previewed(..)
+        | Answer::LabelsSaved(..)
+        | Answer::SettingsSaved => {}
+    }
+}
+
+/// Whether a data set is the one that is open: what is of an earlier opening comes too late.
+fn is_open(state: &State, seq: DatasetSeq) -> bool {
+    state.library.open.as_ref().is_some_and(|open| open.seq == seq)
+}
+
+/// What the rooms do about a result that is there now.
+fn react(state: &mut State, request: &Request) {
+    match request {
+        Request::Sample(key) if state.is_selected(*key) => {
+            settings::follow_range(state);
+            library::say_notes(state);
+        }
+        Request::Cloud(_) => workbench::refresh_cost(state),
+        Request::Run(key) => workbench::run_arrived(state, key),
+        _ => {}
+    }
+}
+
+fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
+    let Some(task) = tasks::forget(state, ticket) else { return };
+    let current = state.library.open.as_ref().map(|open| open.seq);
+    let outdated = task.recipes.iter().any(|r| Some(r.touch.pair.dataset) != current);
+    if outdated && err.is_cancelled() {
+        return;
+    }
+    if task.opening.is_some_and(|seq| seq != state.library.last_seq) {
+        // A later opening was started meanwhile.
+        return;
+    }
+    if task.opening.is_some() {
+        state.library.opening = None;
+        state.library.failure = Some(err.clone());
+    }
+    state.table.running.take_if(|running| *running == ticket);
+    state.log.error(err);
+}
+
+fn failed_request(state: &mut State, request: Request, err: TaskError) {
+    if err.is_cancelled() {
+        return;
+    }
+    // What a pane shows in place of the result is not said a second time, except what nobody would look for there.
+    let awaited = matches!(&request, Request::Run(key) if workbench::run_failed(state, key));
+    if request.failed(state, &err) || awaited || err.kind == TaskErrorKind::Panicked {
+        state.log.error(&err);
+    }
+    state.tasks.failed.insert(request, err);
+}

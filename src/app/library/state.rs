@@ -1,0 +1,205 @@
+//! The open data set, and the list of pairs as the browser shows it.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
+
+use super::super::keys::{DatasetSeq, PairKey};
+use super::super::labels::state::Review;
+use super::super::services::DataSource;
+use super::super::state::State;
+use crate::domain::dataset::{Index, PairEntry, PairId};
+use crate::domain::rig::Rig;
+use crate::work::bundles::{BundleInfo, BundleKind};
+use crate::work::error::TaskError;
+
+/// What can be opened.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Place {
+    /// The built-in simulated data.
+    Demo,
+    /// A folder, or a file in one.
+    Path(PathBuf),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Demo => write!(f, "the demo"),
+            Self::Path(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+/// The order of the browser's list.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Sort {
+    /// By position in the data set.
+    #[default]
+    Natural,
+    /// By name, as text.
+    Name,
+    /// By tool, then position.
+    Tool,
+    /// Unfinished first, then position.
+    Review,
+}
+
+impl Sort {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Natural => "Natural",
+            Self::Name => "Name",
+            Self::Tool => "Tool",
+            Self::Review => "Review state",
+        }
+    }
+}
+
+/// An open data set.
+#[derive(Clone)]
+pub struct OpenDataset {
+    /// This opening.
+    pub seq: DatasetSeq,
+    /// What was opened.
+    pub place: Place,
+    /// The data.
+    pub source: Arc<dyn DataSource>,
+    /// The tools, sorted, each once.
+    pub tools: Vec<String>,
+}
+
+impl std::fmt::Debug for OpenDataset {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "OpenDataset({:?}, {}, {} pairs)", self.seq, self.place, self.index().pairs.len())
+    }
+}
+
+impl OpenDataset {
+    /// All pairs.
+    pub fn index(&self) -> &Index {
+        self.source.index()
+    }
+
+    /// The key of `pair` in this opening.
+    pub fn key(&self, pair: PairId) -> PairKey {
+        PairKey { dataset: self.seq, pair }
+    }
+}
+
+/// A folder that is followed.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Follow {
+    /// Touches that arrived.
+    pub arrived: usize,
+    /// Files among them that could not be read.
+    pub broken: usize,
+    /// The name of the newest.
+    pub newest: Option<String>,
+}
+
+/// The open data set and its list.
+#[derive(Clone, Debug, Default)]
+pub struct Library {
+    /// What is open.
+    pub open: Option<OpenDataset>,
+    /// What is being opened.
+    pub opening: Option<Place>,
+    /// Why the last opening failed, until the next one.
+    pub failure: Option<TaskError>,
+    /// The number of the last opening.
+    pub last_seq: DatasetSeq,
+    /// What was seen of the folder while it is followed; `None` while it is not.
+    pub follow: Option<Follow>,
+    /// Shows only pairs whose name or tool contains every word (any case). `tool:`, `is:` narrow a word.
+    pub filter: String,
+    /// Shows only this tool.
+    pub tool: Option<String>,
+    /// The order.
+    pub sort: Sort,
+    /// The pairs that pass the filter, in order.
+    pub order: Vec<PairId>,
+    /// The rows of `order` that the browser shows: thumbnails are made for these.
+    pub rows: Range<usize>,
+    /// The bundles found.
+    pub bundles: Vec<BundleInfo>,
+    /// What is wrong with bundles that were refused.
+    pub bundle_problems: Vec<TaskError>,
+}
+
+impl Library {
+    /// The index of what is open; empty when nothing is.
+    pub fn pairs(&self) -> &[PairEntry] {
+        self.open.as_ref().map_or(&[], |open| &open.index().pairs)
+    }
+
+    /// The entry of `pair`.
+    pub fn entry(&self, pair: PairId) -> Option<&PairEntry> {
+        self.pairs().get(pair.0 as usize)
+    }
+
+    /// The row of `pair` in the list, if it passes the filter.
+    pub fn row_of(&self, pair: PairId) -> Option<usize> {
+        self.order.iter().position(|p| *p == pair)
+    }
+
+    /// The bundle with this identity.
+    pub fn bundle(&self, id: &str) -> Option<&BundleInfo> {
+        self.bundles.iter().find(|b| &*b.id == id)
+    }
+
+    /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind.
+    pub fn bundle_named(&self, kind: BundleKind, name: Option<&str>, rig: &Rig) -> Option<&BundleInfo> {
+        let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind && b.fits(rig));
+        let first = of_kind.clone().next();
+        match name {
+            Some(name) => of_kind.find(|b| b.name == name).or(first),
+            None => first,
+        }
+    }
+
+    /// Recomputes `order` from filter, tool and sort. `reviews` holds the states that are not "todo", by name.
+    pub(in crate::app) fn reorder(&mut self, reviews: &BTreeMap<String, Review>) {
+        let words: Vec<String> = self.filter.split_whitespace().map(str::to_lowercase).collect();
+        let review = |entry: &PairEntry| reviews.get(&entry.name).copied().unwrap_or_default();
+        let passes = |entry: &PairEntry| {
+            let name = entry.name.to_lowercase();
+            let tool = entry.tool.as_deref().unwrap_or("").to_lowercase();
+            self.tool.as_ref().is_none_or(|t| entry.tool.as_ref() == Some(t))
+                && words.iter().all(|word| {
+                    if let Some(t) = word.strip_prefix("tool:") {
+                        tool.contains(t)
+                    } else if let Some(state) = word.strip_prefix("is:") {
+                        review(entry).name().replace(' ', "-").starts_with(state)
+                    } else {
+                        name.contains(word.as_str()) || tool.contains(word.as_str())
+                    }
+                })
+        };
+        let pairs = self.pairs();
+        let mut order: Vec<PairId> =
+            (0u32..).zip(pairs).filter(|(_, entry)| passes(entry)).map(|(id, _)| PairId(id)).collect();
+        let entry = |id: &PairId| &pairs[id.0 as usize];
+        match self.sort {
+            Sort::Natural => {}
+            Sort::Name => order.sort_by(|a, b| entry(a).name.cmp(&entry(b).name)),
+            Sort::Tool => order.sort_by(|a, b| entry(a).tool.cmp(&entry(b).tool)),
+            Sort::Review => order.sort_by_key(|id| review(entry(id))),
+        }
+        self.order = order;
+    }
+}
+
+impl State {
+    /// Recomputes the order of the list.
+    pub(in crate::app) fn reorder(&mut self) {
+        self.library.reorder(&self.document.reviews);
+    }
+}

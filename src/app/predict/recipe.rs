@@ -1,0 +1,75 @@
+//! What would be generated now.
+
+use super::super::keys::{ImprintSource, PredictionKey, TouchKey};
+use super::super::state::{Absent, State};
+use crate::domain::rig::PadId;
+use crate::domain::sample::Sample;
+use crate::work::bundles::{BundleInfo, BundleKind};
+
+impl State {
+    /// The recipe that the settings give a touch; `None` without a generator.
+    pub fn recipe(&self, touch: TouchKey) -> Option<PredictionKey> {
+        let bundle = self.bundle(BundleKind::Generator).ok()?;
+        let config = self.settings.generate.config(bundle);
+        Some(PredictionKey::new(touch, bundle.id.clone(), self.settings.runtime, &config))
+    }
+
+    /// The fingers whose prediction is looked at: those on screen, and both where a visible pane makes one cloud or
+    /// pose of them (unless the settings say otherwise).
+    pub fn fingers_to_generate(&self) -> Vec<PadId> {
+        let (_, cloud) = self.shows_cloud(ImprintSource::Predicted);
+        if cloud && self.settings.generate.both_fingers {
+            return self.rig().pad_list();
+        }
+        let mut fingers = self.fingers();
+        if !self.settings.generate.both_fingers {
+            fingers.truncate(1);
+        }
+        fingers
+    }
+
+    /// The bundle that the settings name, or the first of its kind.
+    ///
+    /// # Errors
+    /// [`Absent::NoGenerator`], [`Absent::NoMaskModel`].
+    pub fn bundle(&self, kind: BundleKind) -> Result<&BundleInfo, Absent> {
+        let (name, absent) = match kind {
+            BundleKind::Generator => (self.settings.generate.bundle.as_deref(), Absent::NoGenerator),
+            BundleKind::Mask => (self.settings.mask.bundle.as_deref(), Absent::NoMaskModel),
+            BundleKind::Classifier => (None, Absent::NoClassifier),
+        };
+        let rig = self.rig();
+        let others = self.library.bundles.iter().any(|bundle| bundle.kind == kind && !bundle.fits(&rig));
+        let absent = if others { Absent::OtherSensors } else { absent };
+        self.library.bundle_named(kind, name, &rig).ok_or(absent)
+    }
+
+    /// Whether something can be generated for the selected pair.
+    ///
+    /// # Errors
+    /// Why not.
+    pub fn can_generate(&self) -> Result<(), Absent> {
+        self.pair_key().ok_or(if self.library.open.is_none() {
+            Absent::NothingOpen
+        } else {
+            Absent::NothingSelected
+        })?;
+        self.bundle(BundleKind::Generator)?;
+        // While the sample loads, the job loads it itself.
+        let Some(sample) = self.sample().ready() else {
+            return Ok(());
+        };
+        if sample.rig.pads().any(|finger| self.has_input(sample, finger)) { Ok(()) } else { Err(Absent::NoInput) }
+    }
+
+    /// Whether a finger has a reading of the sensor that the generator starts from.
+    fn has_input(&self, sample: &Sample, finger: PadId) -> bool {
+        let ends = self.bundle(BundleKind::Generator).ok().and_then(|bundle| bundle.ends(&sample.rig)?.ok());
+        ends.is_some_and(|ends| sample.pad(finger).is_some_and(|touch| touch.reading(ends.input).is_some()))
+    }
+
+    /// Whether something can be generated for a finger of the selected pair, which is loaded.
+    pub fn can_start(&self, finger: PadId) -> bool {
+        self.sample().ready().is_some_and(|sample| self.has_input(sample, finger))
+    }
+}

@@ -1,0 +1,71 @@
+//! Basin maps: where starts lead.
+
+use std::sync::Arc;
+
+use super::super::view::state::Pane;
+use super::pose::{PoseKey, Registered};
+use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, Wanted};
+use crate::domain::align::basin::{Basin, Plane};
+use crate::work::pose::basin;
+
+/// A basin map.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct BasinKey {
+    /// What is registered, and how.
+    pub pose: PoseKey,
+    /// Which starts are tried.
+    pub plane: Plane,
+}
+
+impl Computes for BasinKey {
+    type Value = Basin;
+
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Basin>> {
+        let Registered { clouds, tool, .. } = self.pose.find(state)?;
+        let (engine, plane) = (self.pose.engine, self.plane);
+        Some(Job::new(Lane::Compute, "Basin map", move |cx| {
+            basin(&clouds.contact_points(), &tool.model, engine, plane, cx)
+        }))
+    }
+
+    fn bytes(found: &Basin) -> usize {
+        found.bytes()
+    }
+
+    fn arrived(&self, state: &mut State, _: &Arc<Basin>) {
+        if let Some(at) = self.pose.cloud.place() {
+            state.results.latest.entry(at).or_default().basin = Some(self.clone());
+        }
+    }
+}
+
+impl State {
+    /// The recipe of the basin map; `Ok(None)` while something it is made from is missing.
+    ///
+    /// # Errors
+    /// Why there can be none.
+    pub fn basin_key(&self) -> Result<Option<BasinKey>, Absent> {
+        let pose = self.pose_key(self.inspect.source)?;
+        Ok(pose.map(|pose| BasinKey { pose, plane: self.inspect.plane }))
+    }
+
+    /// The basin map.
+    pub fn basin(&self) -> Lookup<'_, Basin> {
+        if let failed @ Lookup::Failed(_) = self.tool() {
+            return failed.without();
+        }
+        let before = || {
+            let map = self.results.basins.get(self.latest(self.inspect.source)?.basin.as_ref()?)?;
+            (map.config.plane == self.inspect.plane).then_some(map)
+        };
+        self.look_or(self.basin_key(), before).value()
+    }
+}
+
+impl Wanted<'_> {
+    pub(crate) fn basin(&mut self) {
+        if let (true, Ok(Some(key))) = (self.state.is_visible(&[Pane::BasinMap]), self.state.basin_key()) {
+            self.ask(key);
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! The labels stored for a pair, which go to the document.
+
+use std::sync::Arc;
+
+use super::super::labels::state::{PairLabels, Stored};
+use super::{Computes, Job, Lane, PairKey, SharedServices, State};
+use crate::work::error::TaskError;
+
+/// The labels stored for a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct LabelsKey(pub PairKey);
+
+impl LabelsKey {
+    fn name(self, state: &State) -> Option<String> {
+        Some(state.library.entry(self.0.pair)?.name.clone())
+    }
+}
+
+impl Computes for LabelsKey {
+    type Value = PairLabels;
+
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PairLabels>> {
+        let (source, name) = (state.library.open.as_ref()?.source.clone(), self.name(state)?);
+        Some(Job::new(Lane::Files, format!("Labels of {name}"), move |_| source.load_labels(&name)))
+    }
+
+    fn arrived(&self, state: &mut State, labels: &Arc<PairLabels>) {
+        let Some(name) = self.name(state) else { return };
+        let doc = &mut state.document;
+        if doc.stored.insert(name.clone(), Stored::Loaded) == Some(Stored::Loaded) {
+            // Read twice: what is here may be newer.
+            return;
+        }
+        let mut labels = PairLabels::clone(labels);
+        for hand in labels.masks.iter_mut().flatten() {
+            hand.revision = doc.next_revision();
+        }
+        let review = labels.review;
+        doc.labels.insert(name.clone(), labels);
+        doc.set_review(&name, review);
+    }
+
+    fn failed(&self, state: &mut State, err: &TaskError) -> bool {
+        if let Some(name) = self.name(state) {
+            state.document.stored.insert(name, Stored::Blocked(err.clone()));
+        }
+        true
+    }
+}

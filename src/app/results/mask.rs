@@ -1,0 +1,225 @@
+//! Contact masks: the automatic ones, and which is in force.
+
+use std::sync::Arc;
+
+use super::super::keys::{MaskRecipe, Revision};
+use super::super::labels::state::HandMask;
+use super::super::tasks::state::Level;
+use super::Request;
+use super::imprint::ImprintKey;
+use super::tool::ToolKey;
+use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
+use crate::domain::contact::{ContactMask, MaskBasis};
+use crate::domain::grid::Mask;
+use crate::domain::rig::PadId;
+use crate::work::bundles::BundleKind;
+use crate::work::mask::{self, MaskInputs};
+
+/// An automatic mask of one imprint.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MaskKey {
+    /// The imprint.
+    pub imprint: ImprintKey,
+    /// The recipe.
+    pub recipe: MaskRecipe,
+}
+
+/// The mask in force, as part of a recipe.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum MaskVersion {
+    /// Automatic.
+    Auto(MaskRecipe),
+    /// Corrected by hand.
+    Hand(Revision),
+}
+
+impl MaskVersion {
+    /// The pixels, for an imprint; `None` if they are not there.
+    pub(crate) fn find(&self, state: &State, imprint: &ImprintKey) -> Option<Arc<Mask>> {
+        match self {
+            Self::Auto(recipe) => {
+                let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
+                state.results.masks.get(&key).map(|found| found.mask.clone())
+            }
+            Self::Hand(revision) => {
+                let touch = imprint.touch();
+                let hand = state.document.hand_mask(&state.library.entry(touch.pair.pair)?.name, touch.finger)?;
+                (hand.revision == *revision).then(|| hand.mask.clone())
+            }
+        }
+    }
+}
+
+/// An automatic mask.
+#[derive(Clone, Debug)]
+pub struct AutomaticMask {
+    /// The pixels in contact.
+    pub mask: Arc<Mask>,
+    /// What it is made of in the end.
+    pub basis: MaskBasis,
+}
+
+impl From<ContactMask> for AutomaticMask {
+    fn from(found: ContactMask) -> Self {
+        Self { mask: Arc::new(found.mask), basis: found.basis }
+    }
+}
+
+impl Computes for MaskKey {
+    type Value = AutomaticMask;
+
+    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<AutomaticMask>> {
+        let imprint = self.imprint.find(state)?;
+        let touch = self.imprint.touch();
+        let sample = state.results.samples.get(&touch.pair)?.clone();
+        if let MaskRecipe::Unet(id) = &self.recipe {
+            let (services, runtime) = (services.clone(), state.settings.runtime);
+            let bundle = state.library.bundle(id)?.clone();
+            return Some(Job::new(Lane::Models, "Contact mask by the mask model", move |_| {
+                Ok(services.mask_by_model(&bundle, runtime, imprint.get()?)?.into())
+            }));
+        }
+        let recipe = self.recipe.clone();
+        let tool = state.library.entry(touch.pair.pair).and_then(|entry| entry.tool.as_deref());
+        let tool = tool.map(|tool| ToolKey { dataset: touch.pair.dataset, name: tool.into() });
+        let tool = tool.and_then(|key| state.results.tools.get(&key).cloned());
+        Some(Job::new(Lane::Compute, "Contact mask", move |_| {
+            let tool = tool.as_deref().map(|tool| &tool.model);
+            let inputs = MaskInputs { sample: &sample, tool, labels: None };
+            Ok(mask::without_model(&recipe, imprint.get()?, touch.finger, inputs)?.into())
+        }))
+    }
+
+    fn bytes(found: &AutomaticMask) -> usize {
+        found.mask.len()
+    }
+
+    /// The log says once what a mask is made of where that is not what its recipe names.
+    fn arrived(&self, state: &mut State, found: &Arc<AutomaticMask>) {
+        let Some(why) = found.basis.note() else { return };
+        let touch = self.imprint.touch();
+        let first = state.results.noted.insert(Request::Mask(self.clone()));
+        if let Some(entry) = state.library.entry(touch.pair.pair).filter(|_| first && state.is_selected(touch.pair)) {
+            let text = format!("{}, {} finger: {why}", entry.name, state.finger_name(touch.finger));
+            state.log.push(Level::Warning, text, None, None);
+        }
+    }
+}
+
+/// The mask in force.
+#[derive(Clone, Debug)]
+pub struct MaskInForce<'a> {
+    /// The pixels, as large as the imprint.
+    pub mask: &'a Arc<Mask>,
+    /// What decides whether it has to be drawn again.
+    pub version: MaskVersion,
+    /// Where it comes from, for the screen.
+    pub label: String,
+}
+
+impl State {
+    /// The recipe of the automatic mask that the settings ask for.
+    ///
+    /// # Errors
+    /// Why this source cannot give one for this finger.
+    pub fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
+        let model = self.bundle(BundleKind::Mask).map(|bundle| &bundle.id);
+        let recipe = self.settings.mask.choice.recipe(model.ok()).ok_or(Absent::NoMaskModel)?;
+        match recipe {
+            MaskRecipe::Cad(_) => {
+                self.tool_name()?;
+                let sample = self.sample().ready();
+                if sample.is_some_and(|s| s.grasp_from_object.is_none()) {
+                    return Err(Absent::NoTruth);
+                }
+                if self.touch(finger).ready().is_some_and(|t| t.camera().is_none()) {
+                    return Err(Absent::NoCamera);
+                }
+            }
+            MaskRecipe::Truth => {
+                if self.touch(finger).ready().is_some_and(|t| t.depth().is_none_or(|b| b.truth.is_none())) {
+                    return Err(Absent::NotSimulated);
+                }
+            }
+            MaskRecipe::Threshold(_) | MaskRecipe::TopPercent(_) | MaskRecipe::Unet(_) => {}
+        }
+        Ok(recipe)
+    }
+
+    /// The recipe of the automatic mask of one finger's imprint.
+    fn mask_key(&self, source: ImprintSource, finger: PadId) -> Result<MaskKey, Absent> {
+        Ok(MaskKey { imprint: self.imprint_key(source, finger)?, recipe: self.mask_recipe(finger)? })
+    }
+
+    /// The automatic mask of one finger's imprint.
+    pub fn automatic_mask(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, Arc<Mask>> {
+        if self.imprint(source, finger).ready().is_none() {
+            return self.imprint(source, finger).without();
+        }
+        self.look_or(self.mask_key(source, finger).map(Some), || None).map(|found| &found.mask)
+    }
+
+    /// The corrected mask of one finger, if it is there and as large as the imprint.
+    fn hand_mask_for(&self, source: ImprintSource, finger: PadId) -> Option<&HandMask> {
+        self.document.pair(self.pair_name())?.drawn(finger, self.imprint(source, finger).ready()?)
+    }
+
+    /// The mask in force on one finger's imprint: the corrected one, else the automatic one.
+    ///
+    /// # Errors
+    /// What is there instead.
+    pub fn mask_in_force(
+        &self,
+        source: ImprintSource,
+        finger: PadId,
+    ) -> Result<MaskInForce<'_>, Lookup<'_, Arc<Mask>>> {
+        if let Some(hand) = self.hand_mask_for(source, finger) {
+            let label = if hand.base.is_empty() { "By hand".into() } else { format!("By hand, from {}", hand.base) };
+            return Ok(MaskInForce { mask: &hand.mask, version: MaskVersion::Hand(hand.revision), label });
+        }
+        let lookup = self.automatic_mask(source, finger);
+        match (lookup, self.mask_recipe(finger)) {
+            (Lookup::Ready(mask), Ok(recipe)) => {
+                let label = self.automatic_label(source, finger, &recipe);
+                Ok(MaskInForce { mask, version: MaskVersion::Auto(recipe), label })
+            }
+            (Lookup::Ready(_), Err(absent)) => Err(Lookup::Absent(absent)),
+            (other, _) => Err(other),
+        }
+    }
+
+    /// What an automatic mask that is there is made of, in words.
+    pub fn automatic_label(&self, source: ImprintSource, finger: PadId, recipe: &MaskRecipe) -> String {
+        let label = self.mask_label(recipe);
+        let key = self.imprint_key(source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
+        let found = key.ok().and_then(|key| self.results.masks.get(&key));
+        found.map_or_else(|| label.clone(), |found| found.basis.label(&label))
+    }
+
+    /// An automatic source in words, with its number.
+    pub fn mask_label(&self, recipe: &MaskRecipe) -> String {
+        let model = match recipe {
+            MaskRecipe::Unet(id) => self.library.bundle(id).map_or("", |bundle| &bundle.name),
+            _ => "",
+        };
+        recipe.label(model)
+    }
+}
+
+impl Wanted<'_> {
+    pub(crate) fn mask(&mut self, source: ImprintSource, finger: PadId) {
+        let state = self.state;
+        // Stored corrections first: they may make the automatic mask unnecessary.
+        if !state.document.stored.contains_key(state.pair_name())
+            || state.hand_mask_for(source, finger).is_some()
+            || state.imprint(source, finger).ready().is_none()
+        {
+            return;
+        }
+        let Ok(key) = state.mask_key(source, finger) else { return };
+        if matches!(key.recipe, MaskRecipe::Cad(_)) && state.tool().ready().is_none() {
+            return self.tool();
+        }
+        self.ask(key);
+    }
+}

@@ -1,0 +1,138 @@
+//! Poses of clouds: of both fingers, and of each alone.
+
+use std::sync::Arc;
+
+use super::super::keys::PoseEngine;
+use super::super::workbench::state::PoseOf;
+use super::cloud::CloudKey;
+use super::tool::ToolKey;
+use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
+use crate::domain::align::Ask;
+use crate::domain::frames::PlanarPose;
+use crate::domain::rig::PerPad;
+use crate::work::cloud::Clouds;
+use crate::work::pose::{PoseResult, pose};
+use crate::work::tool::NamedTool;
+
+/// A pose of a cloud.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PoseKey {
+    /// The cloud whose contact points are registered.
+    pub cloud: CloudKey,
+    /// The tool.
+    pub tool: Arc<str>,
+    /// The registration.
+    pub engine: PoseEngine,
+}
+
+/// What is registered: the inputs of every job about a pose.
+pub(crate) struct Registered {
+    pub(crate) clouds: Arc<Clouds>,
+    pub(crate) tool: Arc<NamedTool>,
+    /// The true pose, `grasp_from_object`, where it is known.
+    pub(crate) truth: Option<PlanarPose>,
+}
+
+impl PoseKey {
+    /// What is registered; `None` if it is not there.
+    pub(crate) fn find(&self, state: &State) -> Option<Registered> {
+        let (pair, _) = self.cloud.place()?;
+        let tool = ToolKey { dataset: pair.dataset, name: self.tool.clone() };
+        Some(Registered {
+            clouds: state.results.clouds.get(&self.cloud)?.clone(),
+            tool: state.results.tools.get(&tool)?.clone(),
+            truth: state.results.samples.get(&pair)?.grasp_from_object,
+        })
+    }
+}
+
+impl Computes for PoseKey {
+    type Value = PoseResult;
+
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
+        let (Registered { clouds, tool, truth }, engine) = (self.find(state)?, self.engine);
+        Some(Job::new(Lane::Compute, "Pose", move |_| {
+            pose(&clouds.contact_points(), &tool.model, &*engine.registration(), Ask::default(), truth)
+        }))
+    }
+
+    fn bytes(found: &PoseResult) -> usize {
+        found.bytes()
+    }
+
+    fn arrived(&self, state: &mut State, _: &Arc<PoseResult>) {
+        if let Some(at) = self.cloud.place().filter(|(_, side)| state.pose_key(*side) == Ok(Some(self.clone()))) {
+            state.results.latest.entry(at).or_default().pose = Some(self.clone());
+        }
+    }
+}
+
+impl State {
+    /// The recipe of the pose of an imprint; `Ok(None)` while something it is made from is not there yet.
+    ///
+    /// # Errors
+    /// Why there can be none.
+    pub fn pose_key(&self, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
+        let tool = self.tool_name();
+        let Some(cloud) = self.cloud_key(source)? else {
+            return Ok(None);
+        };
+        if cloud.parts.iter().flatten().all(|(_, mask)| mask.is_none()) {
+            return Err(self.rig().pads().find_map(|f| self.mask_recipe(f).err()).unwrap_or(Absent::NoContact));
+        }
+        Ok(Some(PoseKey { cloud, tool: tool?.into(), engine: self.settings.pose_engine }))
+    }
+
+    /// The pose of an imprint.
+    pub fn pose(&self, source: ImprintSource) -> Lookup<'_, PoseResult> {
+        if let failed @ Lookup::Failed(_) = self.tool() {
+            return failed.without();
+        }
+        let before = || self.results.poses.get(self.latest(source)?.pose.as_ref()?);
+        self.look_or(self.pose_key(source), before).value()
+    }
+
+    /// The recipe of the pose from one finger or both; `Ok(None)` while something is not there yet.
+    ///
+    /// # Errors
+    /// Why there can be none.
+    pub fn pose_key_of(&self, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, Absent> {
+        let Some(mut key) = self.pose_key(source)? else { return Ok(None) };
+        if let PoseOf::Finger(finger) = of {
+            let part = key.cloud.parts[finger].take();
+            if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
+                return Err(Absent::NoFinger);
+            }
+            key.cloud.parts = PerPad::default();
+            key.cloud.parts[finger] = part;
+        }
+        Ok(Some(key))
+    }
+
+    /// The pose from one finger or both.
+    pub fn pose_of(&self, source: ImprintSource, of: PoseOf) -> Lookup<'_, PoseResult> {
+        let key = self.pose_key_of(source, of);
+        let cloud = key.clone().ok().flatten().and_then(|key| self.failure(key.cloud));
+        self.look_or(key, || None).or_failed(cloud).value()
+    }
+}
+
+impl Wanted<'_> {
+    pub(crate) fn pose(&mut self, source: ImprintSource) {
+        if let Ok(Some(key)) = self.state.pose_key(source) {
+            self.ask(key);
+        }
+    }
+
+    /// The poses of all rows of the table, and the clouds of single fingers that they are made of.
+    pub(crate) fn pose_table(&mut self, source: ImprintSource) {
+        let state = self.state;
+        for of in PoseOf::all(&state.rig()) {
+            match state.pose_key_of(source, of) {
+                Ok(Some(key)) if state.results.clouds.contains(&key.cloud) => self.ask(key),
+                Ok(Some(key)) => self.ask(key.cloud),
+                _ => {}
+            }
+        }
+    }
+}

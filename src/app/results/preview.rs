@@ -1,0 +1,92 @@
+//! Pictures of predictions on the way, and who looks at them.
+
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::super::keys::ShiftMode;
+use super::super::view::state::Pane;
+use super::prediction::PredictionKey;
+use super::{State, TouchKey};
+use crate::domain::rig::PadId;
+use crate::work::job::{PreviewPicture, Previews};
+
+/// A prediction as it looks on the way.
+#[derive(Clone, Debug)]
+pub struct Preview {
+    /// What is being made.
+    pub recipe: PredictionKey,
+    /// How it looks.
+    pub picture: PreviewPicture,
+}
+
+/// Receives pictures on the way.
+pub type PreviewSink = Arc<dyn Fn(Preview) + Send + Sync>;
+
+/// What of a prediction under way would be looked at now. The runtime keeps it up to date while jobs run.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PreviewWish {
+    /// After so many steps, and after the first; 0 = never.
+    pub every: u32,
+    /// How they become meters.
+    pub shift: ShiftMode,
+    /// The touches whose predicted imprint is on screen.
+    pub touches: BTreeSet<TouchKey>,
+}
+
+impl PreviewWish {
+    /// Whether a picture of `touch` is wanted after `step` steps.
+    pub fn wants(&self, touch: TouchKey, step: u32) -> bool {
+        self.every > 0 && (step == 1 || step.is_multiple_of(self.every)) && self.touches.contains(&touch)
+    }
+}
+
+/// Who looks at the pictures of predictions on the way, whichever they are.
+#[derive(Clone)]
+pub struct Onlooker {
+    /// What would be looked at now.
+    pub wish: Arc<Mutex<PreviewWish>>,
+    /// Receives it.
+    pub sink: PreviewSink,
+}
+
+impl Onlooker {
+    /// The same for the predictions of one call, in its order.
+    pub fn of(self, items: Vec<PredictionKey>) -> Arc<dyn Previews> {
+        Arc::new(Watched { by: self, items })
+    }
+}
+
+struct Watched {
+    by: Onlooker,
+    items: Vec<PredictionKey>,
+}
+
+impl Previews for Watched {
+    fn wants(&self, item: usize, step: u32) -> Option<ShiftMode> {
+        let wish = self.by.wish.lock().unwrap_or_else(PoisonError::into_inner);
+        wish.wants(self.items.get(item)?.touch, step).then_some(wish.shift)
+    }
+
+    fn show(&self, item: usize, picture: PreviewPicture) {
+        if let Some(recipe) = self.items.get(item).cloned() {
+            (self.by.sink)(Preview { recipe, picture });
+        }
+    }
+}
+
+impl State {
+    /// The prediction on its way to one finger of the selected pair, as it looks now.
+    pub fn preview(&self, finger: PadId) -> Option<&Arc<Preview>> {
+        self.results.previews.get(&self.touch_key(finger)?).filter(|_| self.document.stroke.is_none())
+    }
+
+    /// What of a prediction under way would be looked at: the predicted imprints on screen, unless a pen is on them.
+    pub fn preview_wish(&self) -> PreviewWish {
+        let shown = self.is_visible(&[Pane::Predicted]) && self.document.stroke.is_none();
+        let touches = match self.pair_key().filter(|_| shown) {
+            Some(pair) => self.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
+            None => Default::default(),
+        };
+        PreviewWish { every: self.settings.generate.preview_every, shift: self.settings.shift, touches }
+    }
+}

@@ -1,0 +1,154 @@
+//! Several seeds of one touch: which, what is there of them, and what is missing.
+
+use super::super::keys::{CloudKey, ImprintKey, MaskKey, MaskVersion, MetersKey, PoseKey, PredictionKey, Request};
+use super::super::results::prediction::SeedKey;
+use super::super::state::{Absent, State};
+use super::super::view::state::Pane;
+use super::super::wanted::Wanted;
+use crate::domain::ensemble::seeds;
+use crate::domain::grid::DepthMap;
+use crate::domain::rig::{PadId, PerPad};
+use crate::work::pose::PoseResult;
+
+/// Fewest and most seeds of an ensemble.
+pub const COUNT: std::ops::RangeInclusive<usize> = 2..=16;
+
+/// What a person chose about seeds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seeds {
+    /// How many.
+    pub count: usize,
+    /// Whether those that are missing are made, while their pane is on screen.
+    pub running: bool,
+}
+
+impl Default for Seeds {
+    fn default() -> Self {
+        Self { count: 8, running: false }
+    }
+}
+
+impl State {
+    /// The recipes of the ensemble of one finger: those of the settings, with the seeds from theirs on.
+    ///
+    /// # Errors
+    /// Why nothing can be generated.
+    pub fn seed_recipes(&self, finger: PadId) -> Result<Vec<PredictionKey>, Absent> {
+        self.can_generate()?;
+        let touch = self.touch_key(finger).ok_or(Absent::NothingSelected)?;
+        if self.sample().ready().is_some() && !self.can_start(finger) {
+            return Err(Absent::NoInput);
+        }
+        let first = self.recipe(touch).ok_or(Absent::NoGenerator)?;
+        if self.is_color(&first) {
+            return Err(Absent::PredictsColor);
+        }
+        let recipe = |seed| PredictionKey { seed, ..first.clone() };
+        Ok(seeds(first.seed, self.seeds.count).into_iter().map(recipe).collect())
+    }
+
+    /// The imprint of one seed in meters, if it is there.
+    pub fn seed_imprint(&self, recipe: &PredictionKey) -> Option<&DepthMap> {
+        self.results.imprints.get(&MetersKey(recipe.clone(), self.settings.shift)).map(|imprint| &**imprint)
+    }
+
+    /// The fingers whose seeds make a pose: both, or only the active one, as in generating.
+    pub fn seed_fingers(&self) -> Vec<PadId> {
+        match self.settings.generate.both_fingers {
+            true => self.rig().pads().filter(|f| self.seed_recipes(*f).is_ok()).collect(),
+            false => vec![self.selection.finger],
+        }
+    }
+
+    /// The cloud of one seed with the automatic masks; `Err` holds what is missing for it.
+    fn seed_cloud(&self, at: usize) -> Result<CloudKey, Vec<MaskKey>> {
+        let mut parts = PerPad::default();
+        let mut missing = Vec::new();
+        for finger in self.seed_fingers() {
+            let camera = self.touch(finger).ready().is_some_and(|t| t.camera().is_some());
+            let (Ok(recipes), Ok(mask), true) = (self.seed_recipes(finger), self.mask_recipe(finger), camera) else {
+                continue;
+            };
+            let Some(recipe) = recipes.get(at) else { continue };
+            if self.seed_imprint(recipe).is_none() {
+                return Err(Vec::new());
+            }
+            let imprint = ImprintKey::Predicted(recipe.clone(), self.settings.shift);
+            let key = MaskKey { imprint: imprint.clone(), recipe: mask.clone() };
+            if !self.results.masks.contains(&key) {
+                missing.push(key);
+            }
+            parts[finger] = Some((imprint, Some(MaskVersion::Auto(mask))));
+        }
+        if missing.is_empty() && !parts.is_empty() { Ok(CloudKey { parts }) } else { Err(missing) }
+    }
+
+    fn seed_pose_key(&self, at: usize) -> Option<PoseKey> {
+        let tool = self.tool_name().ok()?.into();
+        Some(PoseKey { cloud: self.seed_cloud(at).ok()?, tool, engine: self.settings.pose_engine })
+    }
+
+    /// The pose of each seed, where it is there.
+    pub fn seed_poses(&self) -> Vec<Option<&PoseResult>> {
+        let pose = |at| self.results.poses.get(&self.seed_pose_key(at)?).map(|pose| &**pose);
+        (0..self.seeds.count).map(pose).collect()
+    }
+
+    /// Why the seeds have no poses, if they cannot have any.
+    pub fn seed_pose_absent(&self) -> Option<Absent> {
+        if let Err(absent) = self.tool_name() {
+            return Some(absent);
+        }
+        let sample = self.sample().ready()?;
+        let camera = |f: &PadId| sample.pad(*f).is_some_and(|t| t.camera().is_some());
+        (!self.seed_fingers().iter().any(camera)).then_some(Absent::NoCamera)
+    }
+
+    /// Seeds that are still to come.
+    pub fn seeds_to_come(&self) -> usize {
+        self.tasks.demanded.iter().filter(|r| matches!(r, Request::Seed(_))).count()
+    }
+}
+
+impl Wanted<'_> {
+    /// What the pane of the seeds shows and is not there, most urgent first.
+    pub(in crate::app) fn seeds(&mut self) {
+        let state = self.state;
+        if !state.is_visible(&[Pane::Seeds]) || state.sample().ready().is_none() {
+            return;
+        }
+        let posed = state.seed_pose_absent().is_none();
+        if posed {
+            self.tool();
+        }
+        let mut fingers = state.seed_fingers();
+        if !fingers.contains(&state.selection.finger) {
+            fingers.push(state.selection.finger);
+        }
+        let mut fresh = Vec::new();
+        for at in 0..state.seeds.count {
+            for finger in &fingers {
+                let Ok(recipes) = state.seed_recipes(*finger) else { continue };
+                let Some(recipe) = recipes.get(at) else { continue };
+                if state.results.predictions.contains(recipe) {
+                    self.ask(MetersKey(recipe.clone(), state.settings.shift));
+                } else if state.seeds.running {
+                    fresh.push(SeedKey(recipe.clone()));
+                }
+            }
+            match state.seed_cloud(at) {
+                _ if !posed => {}
+                Err(missing) => missing.into_iter().for_each(|mask| self.ask(mask)),
+                Ok(cloud) if !state.results.clouds.contains(&cloud) => self.ask(cloud),
+                Ok(_) => state.seed_pose_key(at).into_iter().for_each(|pose| self.ask(pose)),
+            }
+        }
+        if let Some(key) = state.ensemble_key(state.selection.finger) {
+            self.ask(key);
+        }
+        // What is there is evaluated before the next is made.
+        for key in fresh {
+            self.ask_unless(false, key);
+        }
+    }
+}

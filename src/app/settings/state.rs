@@ -1,0 +1,380 @@
+//! What a person prefers. Kept between runs; never part of undo.
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
+
+use super::super::keys::{PoseEngine, Preset, Sampler, ShiftMode, Spacing};
+use super::super::library::state::Place;
+use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
+use crate::domain::postprocess::RefitShift;
+use crate::infer::engine::EngineChoice;
+use crate::work::bundles::BundleInfo;
+pub use crate::work::mask::{MaskChoice, MaskSource};
+
+/// The version of the settings file: a file of another version is set aside and defaults are used.
+pub const SETTINGS_VERSION: u32 = 1;
+/// How many recent places are kept.
+pub const MAX_RECENT: usize = 12;
+/// Brush radii that can be chosen, pixels.
+pub const BRUSH_RADIUS_PX: std::ops::RangeInclusive<f32> = 0.5..=40.0;
+/// Denoising steps that can be chosen.
+pub const STEPS: std::ops::RangeInclusive<u32> = 1..=1000;
+
+/// Largest budget of kept predictions, MiB: a terabyte.
+pub const MAX_CACHE_MIB: u32 = 1 << 20;
+
+/// All preferences.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    /// [`SETTINGS_VERSION`] of the program that wrote it.
+    pub version: u32,
+    /// Colors of the window.
+    pub theme: Theme,
+    /// Scale of the whole window, 1 = the system's.
+    pub ui_zoom: f32,
+    /// The color range of imprints, shared by all panes.
+    pub range: ColorRange,
+    /// The color map of imprints.
+    #[serde(alias = "colour_map")]
+    pub color_map: ColorMap,
+    /// How predictions become meters.
+    pub shift: ShiftMode,
+    /// The last statistics made for a refit shift, to be chosen again.
+    pub refit: Option<RefitShift>,
+    /// The generator.
+    pub generate: GenerateSettings,
+    /// The mask tools.
+    pub mask: MaskSettings,
+    /// The registration.
+    pub pose_engine: PoseEngine,
+    /// The runtime that runs models.
+    pub runtime: EngineChoice,
+    /// What the predictions kept on the disk may take, MiB; 0 keeps none.
+    pub cache_mib: u32,
+    /// Whether the 3D views of prediction and measurement move together.
+    pub cameras_linked: bool,
+    /// Whether the mask is drawn over imprints.
+    pub mask_visible: bool,
+    /// Whether only the outline of the mask is drawn.
+    pub mask_outline: bool,
+    /// How strongly the mask covers, 0..1.
+    pub mask_opacity: f32,
+    /// Whether the GelSlim's window is drawn on bubble images.
+    pub footprint_visible: bool,
+    /// Whether the hint of the first start was dismissed.
+    pub hint_dismissed: bool,
+    /// What was opened before, newest first.
+    pub recent: Vec<Place>,
+    /// The arrangement of the panes per workspace, in the window's own format (validated by it).
+    pub layouts: std::collections::BTreeMap<String, String>,
+    /// The workspace in front.
+    pub workspace: Workspace,
+    /// Folders with further model bundles.
+    pub bundle_folders: Vec<PathBuf>,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            version: SETTINGS_VERSION,
+            theme: Theme::Dark,
+            ui_zoom: 1.0,
+            range: ColorRange::default(),
+            color_map: ColorMap::Viridis,
+            shift: ShiftMode::default(),
+            refit: None,
+            generate: GenerateSettings::default(),
+            mask: MaskSettings::default(),
+            pose_engine: PoseEngine::default(),
+            runtime: EngineChoice::default(),
+            cache_mib: 512,
+            cameras_linked: true,
+            mask_visible: true,
+            mask_outline: false,
+            mask_opacity: 0.35,
+            footprint_visible: true,
+            hint_dismissed: false,
+            recent: Vec::new(),
+            layouts: std::collections::BTreeMap::new(),
+            workspace: Workspace::Inspect,
+            bundle_folders: Vec::new(),
+        }
+    }
+}
+
+impl Settings {
+    /// Brings numbers from a file or a text box back into the ranges that can be drawn and computed with.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        let default = Self::default();
+        self.version = SETTINGS_VERSION;
+        self.ui_zoom = clamp_or(self.ui_zoom, 0.5, 4.0, default.ui_zoom);
+        self.mask_opacity = clamp_or(self.mask_opacity, 0.0, 1.0, default.mask_opacity);
+        if !self.range.is_valid() {
+            self.range = default.range;
+        }
+        self.generate = self.generate.validated();
+        self.mask = self.mask.validated();
+        self.cache_mib = self.cache_mib.min(MAX_CACHE_MIB);
+        self.recent.truncate(MAX_RECENT);
+        self
+    }
+}
+
+fn clamp_or(value: f32, lo: f32, hi: f32, default: f32) -> f32 {
+    if value.is_finite() { value.clamp(lo, hi) } else { default }
+}
+
+/// Colors of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Theme {
+    /// Light on dark.
+    #[default]
+    Dark,
+    /// Dark on light.
+    Light,
+}
+
+/// The four arrangements of the same panes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Workspace {
+    /// Truth and prediction side by side.
+    #[default]
+    Inspect,
+    /// The cloud on the CAD.
+    Align,
+    /// Correcting masks.
+    Label,
+    /// Numbers.
+    Evaluate,
+}
+
+impl Workspace {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Inspect => "Inspect",
+            Self::Align => "Align",
+            Self::Label => "Label",
+            Self::Evaluate => "Evaluate",
+        }
+    }
+}
+
+/// The range of imprint depths that the color map spans, shared by all panes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ColorRange {
+    /// Depth of the first color, meters.
+    pub min_m: f32,
+    /// Depth of the last color, meters.
+    pub max_m: f32,
+    /// Whether the range stays when another sample is shown. Unlocked, each new selection sets it.
+    pub locked: bool,
+}
+
+impl Default for ColorRange {
+    /// 0..18 mm: a 10 mm press tents up to that depth.
+    fn default() -> Self {
+        Self { min_m: 0.0, max_m: 0.018, locked: true }
+    }
+}
+
+impl ColorRange {
+    /// Whether colors can be looked up with it.
+    pub fn is_valid(self) -> bool {
+        self.min_m.is_finite() && self.max_m.is_finite() && self.min_m < self.max_m
+    }
+}
+
+/// Color maps for depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum ColorMap {
+    /// Perceptually uniform, dark blue to yellow, readable by color-blind eyes.
+    #[default]
+    Viridis,
+    /// Gray.
+    Gray,
+}
+
+impl ColorMap {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Viridis => "Viridis",
+            Self::Gray => "Gray",
+        }
+    }
+}
+
+/// The generator's settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct GenerateSettings {
+    /// The bundle's name; `None` takes the first generator found.
+    pub bundle: Option<String>,
+    /// How the steps are chosen; `None` takes the numbers below.
+    pub preset: Option<Preset>,
+    /// Denoising steps.
+    pub steps: u32,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// Whether generating again keeps the seed.
+    pub seed_locked: bool,
+    /// The sampler.
+    pub sampler: Sampler,
+    /// DDIM's noise share, 0..1.
+    pub eta: f32,
+    /// The training steps visited.
+    pub spacing: Spacing,
+    /// Scale of the guidance, for bundles trained for it; 1 is none.
+    pub guidance: f32,
+    /// A picture on the way after so many steps, and after the first; 0 = none.
+    pub preview_every: u32,
+    /// Whether both fingers are generated (the pose needs both), or only the one selected.
+    pub both_fingers: bool,
+}
+
+impl Default for GenerateSettings {
+    fn default() -> Self {
+        Self {
+            bundle: None,
+            // What the bundle recommends; the numbers below are where somebody who chooses himself starts.
+            preset: Some(Preset::Default),
+            steps: 10,
+            seed: 42,
+            seed_locked: true,
+            sampler: Sampler::Ddim,
+            eta: 0.0,
+            spacing: Spacing::Trailing,
+            guidance: 1.0,
+            preview_every: 4,
+            both_fingers: true,
+        }
+    }
+}
+
+impl GenerateSettings {
+    /// Numbers brought into range.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        self.steps = self.steps.clamp(*STEPS.start(), *STEPS.end());
+        self.eta = clamp_or(self.eta, 0.0, 1.0, 0.0);
+        self.guidance = clamp_or(self.guidance, *GUIDANCE.start() as f32, *GUIDANCE.end() as f32, 1.0);
+        self.preview_every = self.preview_every.min(*STEPS.end());
+        self
+    }
+
+    /// The choices of one generation with a bundle.
+    pub fn config(&self, bundle: &BundleInfo) -> GenerateConfig {
+        let own = GenerateConfig {
+            steps: self.steps,
+            eta: self.eta.into(),
+            seed: self.seed,
+            sampler: self.sampler,
+            spacing: self.spacing,
+            guidance: self.guidance.into(),
+        };
+        match (self.preset, &bundle.generator) {
+            (Some(preset), Some(g)) => {
+                GenerateConfig { seed: self.seed, ..preset.config(g.defaults, g.training_steps) }
+            }
+            // Without the training for it a scale means nothing, whatever was chosen for another bundle.
+            (None, Some(g)) if !g.guided => GenerateConfig { guidance: 1.0, ..own },
+            _ => own,
+        }
+    }
+
+    /// The same with the numbers that `preset` or the bundle stand for, so that they can be changed one by one.
+    #[must_use]
+    pub fn spelt_out(&self, bundle: Option<&BundleInfo>) -> Self {
+        let Some(config) = bundle.map(|bundle| self.config(bundle)) else { return self.clone() };
+        Self {
+            steps: config.steps,
+            eta: config.eta as f32,
+            sampler: config.sampler,
+            spacing: config.spacing,
+            guidance: config.guidance as f32,
+            ..self.clone()
+        }
+    }
+
+    /// Whether the numbers that a preset stands for are the same.
+    pub fn same_numbers(&self, other: &Self) -> bool {
+        let numbers = |s: &Self| (s.steps, s.sampler, s.spacing, s.eta.to_bits(), s.guidance.to_bits());
+        numbers(self) == numbers(other)
+    }
+}
+
+/// The mask tools' settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct MaskSettings {
+    /// The tool in hand.
+    pub tool: MaskTool,
+    /// The tool before it.
+    pub last_tool: MaskTool,
+    /// Radius of brush and eraser, image pixels.
+    pub radius_px: f32,
+    /// What is in force where no mask was drawn by hand.
+    #[serde(flatten)]
+    pub choice: MaskChoice,
+    /// The mask bundle's name; `None` takes the first found.
+    pub bundle: Option<String>,
+}
+
+impl Default for MaskSettings {
+    fn default() -> Self {
+        Self {
+            tool: MaskTool::Brush,
+            last_tool: MaskTool::Eraser,
+            radius_px: 4.0,
+            choice: MaskChoice::default(),
+            bundle: None,
+        }
+    }
+}
+
+impl MaskSettings {
+    /// Numbers brought into range.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        let default = Self::default();
+        self.radius_px = clamp_or(self.radius_px, *BRUSH_RADIUS_PX.start(), *BRUSH_RADIUS_PX.end(), default.radius_px);
+        let (choice, default) = (&mut self.choice, default.choice);
+        choice.threshold_m = clamp_or(choice.threshold_m, -0.1, 0.1, default.threshold_m);
+        choice.top_percent = clamp_or(choice.top_percent, 0.0, 100.0, default.top_percent);
+        choice.cad_distance_m = clamp_or(choice.cad_distance_m, 0.0, 0.05, default.cad_distance_m);
+        self
+    }
+}
+
+/// What the pointer does on a mask.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum MaskTool {
+    /// Adds.
+    #[default]
+    Brush,
+    /// Removes.
+    Eraser,
+    /// Moves the image.
+    Pan,
+}
+
+impl MaskTool {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Brush => "Brush",
+            Self::Eraser => "Eraser",
+            Self::Pan => "Pan",
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! Running jobs as the status bar shows them, and the log.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::super::keys::{DatasetSeq, PredictionKey, Request};
+use crate::work::error::{TaskError, TaskErrorKind};
+use crate::work::job::Progress;
+
+/// The name of a running job.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Ticket(pub u64);
+
+/// A job that a person started.
+#[derive(Clone, Debug)]
+pub struct Task {
+    /// Its name on screen, e.g. `Generate data_4 right`.
+    pub title: String,
+    /// How far it is.
+    pub progress: Progress,
+    /// The predictions it makes, if it makes any: one per finger.
+    pub recipes: Vec<PredictionKey>,
+    /// The data set it opens, if it opens one.
+    pub opening: Option<DatasetSeq>,
+    /// Whether it was told to stop and has not stopped yet.
+    pub cancelling: bool,
+}
+
+/// Running jobs, and what the panes wait for.
+#[derive(Clone, Debug, Default)]
+pub struct Tasks {
+    /// Jobs that a person started, by ticket.
+    pub running: BTreeMap<Ticket, Task>,
+    /// What the visible panes wait for: the list last handed to the runtime.
+    pub demanded: Vec<Request>,
+    /// Results that could not be computed, and why: they are not tried again until something changes.
+    pub failed: BTreeMap<Request, TaskError>,
+    pub(in crate::app) last_ticket: u64,
+}
+
+impl Tasks {
+    /// The task that generates `recipe`.
+    pub fn generating(&self, recipe: &PredictionKey) -> Option<(Ticket, &Task)> {
+        self.running.iter().find(|(_, task)| task.recipes.contains(recipe)).map(|(t, task)| (*t, task))
+    }
+
+    /// A task that makes predictions.
+    pub fn any_generating(&self) -> Option<(Ticket, &Task)> {
+        self.running.iter().find(|(_, task)| !task.recipes.is_empty()).map(|(t, task)| (*t, task))
+    }
+
+    /// Whether nothing runs and nothing waits.
+    pub fn is_idle(&self) -> bool {
+        self.running.is_empty() && self.demanded.is_empty()
+    }
+
+    pub(in crate::app) fn start(&mut self, title: String, recipes: Vec<PredictionKey>) -> Ticket {
+        self.last_ticket += 1;
+        let ticket = Ticket(self.last_ticket);
+        self.running
+            .insert(ticket, Task { title, progress: Progress::default(), recipes, opening: None, cancelling: false });
+        ticket
+    }
+}
+
+/// How much a person should care.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// Something was done.
+    Info,
+    /// Something needs care.
+    Warning,
+    /// Something did not work.
+    Error,
+}
+
+/// One line of the log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Counts up from 1: a toast is shown once per number.
+    pub number: u64,
+    /// How much a person should care.
+    pub level: Level,
+    /// What happened.
+    pub text: String,
+    /// Why, and other detail.
+    pub detail: Option<String>,
+    /// What to do.
+    pub hint: Option<String>,
+    /// How often the same line came in a row.
+    pub count: u32,
+}
+
+/// What happened, newest last.
+#[derive(Clone, Debug, Default)]
+pub struct Log {
+    /// The entries; old ones are dropped.
+    pub entries: VecDeque<Entry>,
+    /// Entries up to this number were seen: their toast was closed.
+    pub seen: u64,
+    last: u64,
+}
+
+/// Entries kept.
+const MAX_ENTRIES: usize = 500;
+
+impl Log {
+    /// Adds a line; the same line again only counts up.
+    pub fn push(&mut self, level: Level, text: impl Into<String>, detail: Option<String>, hint: Option<String>) {
+        let text = text.into();
+        if let Some(last) = self.entries.back_mut()
+            && last.level == level
+            && last.text == text
+            && last.detail == detail
+        {
+            last.count += 1;
+            return;
+        }
+        self.last += 1;
+        self.entries.push_back(Entry { number: self.last, level, text, detail, hint, count: 1 });
+        if self.entries.len() > MAX_ENTRIES {
+            self.entries.pop_front();
+        }
+    }
+
+    /// Adds a notice.
+    pub fn info(&mut self, text: impl Into<String>) {
+        self.push(Level::Info, text, None, None);
+    }
+
+    /// Adds a failure. Being told to stop is only a notice.
+    pub fn error(&mut self, err: &TaskError) {
+        let (level, text, detail) = match err.kind {
+            TaskErrorKind::Cancelled => (Level::Info, format!("{}: cancelled", err.what), None),
+            TaskErrorKind::Failed | TaskErrorKind::Panicked => (Level::Error, err.what.clone(), Some(err.why.clone())),
+        };
+        self.push(level, text, detail, err.hint.clone());
+    }
+
+    /// Entries whose toast was not closed yet.
+    pub fn unseen(&self) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(|entry| entry.number > self.seen)
+    }
+}

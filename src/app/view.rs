@@ -1,0 +1,60 @@
+//! The room of what is on screen.
+
+pub mod state;
+
+pub use state::*;
+
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+
+use super::effect::Effect;
+use super::labels;
+use super::state::State;
+use crate::domain::rig::PadId;
+
+/// What can happen to what is on screen.
+#[derive(Clone, Debug)]
+pub enum ViewCommand {
+    /// Makes a finger the active one.
+    SelectFinger(PadId),
+    /// Shows both fingers, or only the active one.
+    ShowBothFingers(bool),
+    /// The pixel under the pointer, shared by all images.
+    HoverPixel(Option<Hover>),
+    /// The point under the pointer in 3D, meters, grasp frame.
+    HoverPoint(Option<DVec3>),
+    /// The panes on screen.
+    ShowPanes(BTreeSet<Pane>),
+    /// Opens or closes the command palette.
+    SetPalette(bool),
+    /// Opens or closes the shortcut sheet.
+    SetShortcutSheet(bool),
+    /// Something only the window can do.
+    Ui(UiRequest),
+}
+
+pub(super) fn step(state: &mut State, command: ViewCommand, effects: &mut Vec<Effect>) {
+    let selection = &mut state.selection;
+    match command {
+        ViewCommand::SelectFinger(finger) => {
+            if finger != selection.finger {
+                // A stroke is drawn on the finger it began on; it must not end out of sight.
+                labels::end_stroke(state, effects);
+                state.selection.finger = finger;
+            }
+        }
+        ViewCommand::ShowBothFingers(both) => {
+            labels::end_stroke(state, effects);
+            state.selection.both_fingers = both;
+        }
+        ViewCommand::HoverPixel(hover) => {
+            selection.hover = hover.filter(|hover| hover.at_px.iter().all(|v| v.is_finite()));
+        }
+        ViewCommand::HoverPoint(point) => selection.hover_point = point.filter(|p| p.is_finite()),
+        ViewCommand::ShowPanes(panes) => selection.panes = panes,
+        ViewCommand::SetPalette(open) => selection.palette = open,
+        ViewCommand::SetShortcutSheet(open) => selection.shortcut_sheet = open,
+        ViewCommand::Ui(request) => effects.push(Effect::Ui(request)),
+    }
+}

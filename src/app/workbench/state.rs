@@ -1,0 +1,231 @@
+//! The workbench: what the 3D panes show besides cloud and model, and what a hand does in them.
+//!
+//! Everything here lasts as long as the window. What a person decides with it (an accepted pose) is the document's.
+
+use glam::DVec3;
+use strum::EnumIter;
+
+use super::super::keys::{ImprintSource, PairKey, RunKey};
+use super::super::state::State;
+use super::super::view::state::Pane;
+use crate::domain::frames::PlanarPose;
+use crate::domain::hand::{AcceptedPose, HandCost, HandPose, PoseDifference};
+use crate::domain::rig::{PadId, Rig};
+
+/// What colors the contact points in 3D.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
+pub enum Layer {
+    /// One color.
+    #[default]
+    None,
+    /// How far each is from the model.
+    Residuals,
+    /// What became of each.
+    Reasons,
+    /// Lines to the model.
+    Correspondences,
+}
+
+impl Layer {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "None",
+            Self::Residuals => "Residuals",
+            Self::Reasons => "Reasons",
+            Self::Correspondences => "Lines",
+        }
+    }
+
+    /// What it shows, for the tooltip.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::None => "Contact points in one color",
+            Self::Residuals => "Contact points colored by their distance to the model, in millimeters",
+            Self::Reasons => "Contact points colored by what became of them in the registration",
+            Self::Correspondences => "Lines from contact points to the model",
+        }
+    }
+}
+
+/// What a click in a 3D pane does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
+pub enum SceneTool {
+    /// Reads a point.
+    #[default]
+    Look,
+    /// Moves the tool.
+    Pose,
+    /// Measures between two points.
+    Distance,
+    /// Measures at the second of three points.
+    Angle,
+}
+
+impl SceneTool {
+    /// Points that make a measurement.
+    pub fn marks(self) -> usize {
+        match self {
+            Self::Look | Self::Pose => 0,
+            Self::Distance => 2,
+            Self::Angle => 3,
+        }
+    }
+}
+
+/// A point that was clicked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Picked {
+    /// Of which imprint.
+    pub source: ImprintSource,
+    /// Of which finger.
+    pub finger: PadId,
+    /// Its raw bubble pixel.
+    pub pixel: [u16; 2],
+}
+
+/// A pose being set by hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HandTry {
+    /// The pair.
+    pub pair: PairKey,
+    /// The imprint it is set for.
+    pub source: ImprintSource,
+    /// The pose, `grasp_from_object`.
+    pub pose: HandPose,
+    /// Where it began.
+    pub began: HandPose,
+    /// What it costs; `None` while cloud or model are not there.
+    pub cost: Option<HandCost>,
+    /// What it cost where it began.
+    pub began_cost: Option<HandCost>,
+    /// The registration from here that is being computed.
+    pub icp: Option<RunKey>,
+    /// The registration that put it where it is, if one did and nothing moved it since.
+    pub from_icp: Option<RunKey>,
+}
+
+/// What the 3D panes do and show besides.
+#[derive(Clone, Debug)]
+pub struct Workbench {
+    /// What colors the contact points.
+    pub layer: Layer,
+    /// Whether the tool is moved along its weakest direction.
+    pub animate_weakest: bool,
+    /// Whether each 3D pane shows the clouds of both imprints.
+    pub both_clouds: bool,
+    /// What a click does.
+    pub tool: SceneTool,
+    /// Whether the tool can leave the plane.
+    pub six_dof: bool,
+    /// The side that the pointer was over last: what the panes beside the 3D views are about.
+    pub side: ImprintSource,
+    /// The pose being set.
+    pub hand: Option<HandTry>,
+    /// The point clicked last.
+    pub picked: Option<Picked>,
+    /// Points of the measurement, meters, grasp frame, and the side they were clicked in.
+    pub marks: Vec<(ImprintSource, DVec3)>,
+}
+
+impl Default for Workbench {
+    fn default() -> Self {
+        Self {
+            layer: Layer::None,
+            animate_weakest: false,
+            both_clouds: false,
+            tool: SceneTool::Look,
+            six_dof: false,
+            side: ImprintSource::Measured,
+            hand: None,
+            picked: None,
+            marks: Vec::new(),
+        }
+    }
+}
+
+impl Workbench {
+    /// Forgets what was of the pair: another one is shown.
+    pub(in crate::app) fn leave_pair(&mut self) {
+        self.hand = None;
+        self.picked = None;
+        self.marks.clear();
+    }
+
+    /// The pose being set for one imprint.
+    pub fn hand(&self, source: ImprintSource) -> Option<&HandTry> {
+        self.hand.as_ref().filter(|hand| hand.source == source)
+    }
+}
+
+/// A finger's row, or the joint one, of the table of poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PoseOf {
+    /// From one finger alone.
+    Finger(PadId),
+    /// From all together.
+    Joint,
+}
+
+impl PoseOf {
+    /// The name on screen.
+    pub fn name(self, rig: &Rig) -> String {
+        match self {
+            Self::Finger(finger) => format!("{} finger", rig.pad_name(finger)),
+            Self::Joint => "Joint".into(),
+        }
+    }
+
+    /// All rows of a rig's table.
+    pub fn all(rig: &Rig) -> Vec<Self> {
+        rig.pads().map(Self::Finger).chain([Self::Joint]).collect()
+    }
+}
+
+impl State {
+    /// The true pose of the selected pair, `grasp_from_object`, where it is known.
+    pub fn truth(&self) -> Option<PlanarPose> {
+        self.sample().ready()?.grasp_from_object
+    }
+
+    /// The pose that was accepted for an imprint of the selected pair.
+    pub fn accepted(&self, source: ImprintSource) -> Option<AcceptedPose> {
+        self.document.pair(self.pair_name())?.accepted(source)
+    }
+
+    /// The pose that a person set and accepted.
+    pub fn by_hand(&self, source: ImprintSource) -> Option<HandPose> {
+        self.accepted(source).filter(|a| a.by_hand).map(|a| a.pose)
+    }
+
+    /// Where the tool is shown: where a hand holds it, else where a person put it, else where it was registered.
+    pub fn shown_pose(&self, source: ImprintSource) -> Option<HandPose> {
+        let held = self.workbench.hand(source).map(|hand| hand.pose);
+        held.or_else(|| self.by_hand(source)).or_else(|| Some(self.pose(source).shown()?.grasp_from_object.into()))
+    }
+
+    /// Where setting a pose by hand begins.
+    pub fn hand_begins(&self, source: ImprintSource) -> HandPose {
+        let accepted = self.accepted(source).map(|a| a.pose);
+        accepted.or_else(|| Some(self.pose(source).shown()?.grasp_from_object.into())).unwrap_or_default()
+    }
+
+    /// Whether something on screen shows the layers of an imprint.
+    pub fn shows_layers(&self, source: ImprintSource) -> bool {
+        let scene = match source {
+            ImprintSource::Measured => Pane::SceneMeasured,
+            ImprintSource::Predicted => Pane::ScenePredicted,
+        };
+        let bench = &self.workbench;
+        let in_scene = self.selection.panes.contains(&scene)
+            && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
+                || bench.picked.is_some_and(|picked| picked.source == source));
+        in_scene || (self.selection.panes.contains(&Pane::Layers) && bench.side == source)
+    }
+
+    /// How far the registered poses of measurement and prediction are apart, where both are there.
+    pub fn sides_apart(&self) -> Option<PoseDifference> {
+        let pose = |source| Some(self.pose(source).ready()?.grasp_from_object);
+        Some(PoseDifference::between(pose(ImprintSource::Measured)?, pose(ImprintSource::Predicted)?))
+    }
+}
