@@ -113,7 +113,7 @@ fn code(text: &str) -> String {
     out.join("\n")
 }
 
-/// The code with each `super::` spelt out: `super::super::keys` in `src/app/jobs/prepare.rs` is `crate::app::keys`.
+/// The code with each `super::` spelt out: `super::super::keys` in `src/app/results/pose.rs` is `crate::app::keys`.
 fn spelt_out(file: &Path, code: &str) -> String {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let module = file.strip_prefix(&src).unwrap().with_extension("");
@@ -165,24 +165,75 @@ fn layers_only_point_downwards() {
     assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
 
-/// Which modules of `layer` name which, by the names directly below it.
-fn uses(layer: &str) -> BTreeMap<String, BTreeSet<String>> {
+/// The first two names of each path below `crate::layer::` in the code; `crate::layer::{a, b::c}` names `a` and `b::c`.
+fn named_below(layer: &str, code: &str) -> Vec<Vec<String>> {
+    let start = format!("crate::{layer}::");
+    let path = |text: &str| {
+        let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_' || c == ':')).unwrap_or(text.len());
+        text[..end].split("::").filter(|name| !name.is_empty()).take(2).map(str::to_owned).collect::<Vec<_>>()
+    };
+    let mut paths = Vec::new();
+    for (at, _) in code.match_indices(&start) {
+        let rest = &code[at + start.len()..];
+        let Some(list) = rest.strip_prefix('{') else {
+            paths.push(path(rest));
+            continue;
+        };
+        let mut depth = 0;
+        let mut begins = true;
+        for (i, c) in list.char_indices() {
+            if begins && !c.is_whitespace() {
+                paths.push(path(&list[i..]));
+                begins = false;
+            }
+            match c {
+                '{' => depth += 1,
+                '}' if depth == 0 => break,
+                '}' => depth -= 1,
+                ',' if depth == 0 => begins = true,
+                _ => {}
+            }
+        }
+    }
+    paths.retain(|path| !path.is_empty());
+    paths
+}
+
+/// Which parts of `layer` name which; `part` says what part a path below the layer belongs to.
+fn uses(layer: &str, part: impl Fn(&[String]) -> String) -> BTreeMap<String, BTreeSet<String>> {
     let dir = Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(layer);
     let mut files = Vec::new();
     rust_files(&dir, &mut files);
-    let top = |file: &Path| {
+    let below = |file: &Path| -> Vec<String> {
         let below = file.strip_prefix(&dir).unwrap().with_extension("");
-        below.iter().next().unwrap().to_string_lossy().into_owned()
+        below.iter().map(|name| name.to_string_lossy().into_owned()).collect()
     };
-    let modules: BTreeSet<String> = files.iter().map(|file| top(file)).collect();
-    let mut uses: BTreeMap<String, BTreeSet<String>> = modules.iter().map(|m| (m.clone(), BTreeSet::new())).collect();
+    let mut uses: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for file in files.iter().filter(|file| !file.ends_with("tests.rs")) {
         let code = spelt_out(file, &code(&std::fs::read_to_string(file).unwrap()));
-        let own = top(file);
-        let named = modules.iter().filter(|m| **m != own && is_named(&code, &format!("crate::{layer}::{m}::")));
-        uses.get_mut(&own).unwrap().extend(named.cloned());
+        let own = part(&below(file));
+        let named = named_below(layer, &code).into_iter().map(|path| part(&path)).filter(|named| *named != own);
+        let named: BTreeSet<String> = named.collect();
+        uses.entry(own).or_default().extend(named);
     }
+    let parts: BTreeSet<String> = uses.keys().cloned().collect();
+    uses.values_mut().for_each(|named| named.retain(|part| parts.contains(part)));
     uses
+}
+
+/// What of `app` knows each other by its nature, and so counts as one part, beside each room's `state.rs`: the state
+/// holds the results and what the rooms keep, a recipe says how its result is computed from the state, and the data
+/// behind the state is one of the services.
+const MODEL: &[&str] = &["history", "keys", "results", "services", "state", "wanted"];
+
+/// The part of `app` that a path below it belongs to: the model, or the module that acts on it.
+fn part_of_app(path: &[String]) -> String {
+    match (path[0].as_str(), path.get(1).map(String::as_str)) {
+        ("services", Some("live")) => "services::live".to_owned(),
+        (_, Some("state")) => "model".to_owned(),
+        (name, _) if MODEL.contains(&name) => "model".to_owned(),
+        (name, _) => name.to_owned(),
+    }
 }
 
 /// A circle among the modules, if there is one.
@@ -211,23 +262,39 @@ fn circle(uses: &BTreeMap<String, BTreeSet<String>>) -> Option<Vec<String>> {
 
 #[test]
 fn the_steps_of_the_job_form_no_circle() {
-    let uses = uses("work");
+    let uses = uses("work", |path| path[0].clone());
     assert!(uses.len() > 10 && uses["models"].contains("prediction"), "the scan sees too little: {uses:?}");
     assert_eq!(circle(&uses), None);
     // The check itself finds one.
     let ring = [("a", "b"), ("b", "c"), ("c", "a"), ("d", "a")];
     let ring = ring.map(|(from, to)| (from.to_owned(), BTreeSet::from([to.to_owned()])));
     assert_eq!(circle(&ring.into()).map(|c| c.len()), Some(3));
+    let names =
+        named_below("app", "use crate::app::{a, b::{c, d},\n    e::f::g}; crate::app::h(); crate::application::i");
+    assert_eq!(names, [vec!["a"], vec!["b"], vec!["e", "f"], vec!["h"]]);
+}
+
+#[test]
+fn the_rooms_of_the_studio_form_no_circle() {
+    let uses = uses("app", part_of_app);
+    assert!(uses.len() > 15 && uses["apply"].len() > 10, "the scan sees too little: {uses:?}");
+    assert_eq!(circle(&uses), None);
+    // The model knows nothing of what acts on it: only what a job is.
+    assert_eq!(uses["model"], BTreeSet::from(["jobs".to_owned()]));
+    // Rooms know neither the list of all commands nor the runtime.
+    for (room, named) in uses.iter().filter(|(room, _)| !["action", "apply", "runtime"].contains(&room.as_str())) {
+        assert!(named.is_disjoint(&["apply", "runtime", "action", "command"].map(str::to_owned).into()), "{room}");
+    }
 }
 
 #[test]
 fn what_is_only_for_tests_is_left_out_and_nothing_else() {
     let text = "#[cfg(test)]\nmod testing;\nuse a::b;\n#[cfg(test)]\nfn c() {\n    d();\n}\nfn e() {}\n// f\n";
     assert_eq!(code(text), "use a::b;\nfn e() {}");
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/app/jobs/prepare.rs");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/app/results/pose.rs");
     assert_eq!(
         spelt_out(&file, "use super::super::keys::X; super::y()"),
-        "use crate::app::keys::X; crate::app::jobs::y()"
+        "use crate::app::keys::X; crate::app::results::y()"
     );
 }
 
