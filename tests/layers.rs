@@ -116,7 +116,7 @@ fn code(text: &str) -> String {
     out.join("\n")
 }
 
-/// The code with each `super::` spelt out: `super::super::keys` in `src/app/jobs/prepare.rs` is `crate::app::keys`.
+/// The code with each `super::` spelt out: `super::super::keys` in `src/app/results/pose.rs` is `crate::app::keys`.
 fn spelt_out(file: &Path, code: &str) -> String {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let module = file.strip_prefix(&src).unwrap().with_extension("");
@@ -172,10 +172,10 @@ fn layers_only_point_downwards() {
 fn what_is_only_for_tests_is_left_out_and_nothing_else() {
     let text = "#[cfg(test)]\nmod testing;\nuse a::b;\n#[cfg(test)]\nfn c() {\n    d();\n}\nfn e() {}\n// f\n";
     assert_eq!(code(text), "use a::b;\nfn e() {}");
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/app/jobs/prepare.rs");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/app/results/pose.rs");
     assert_eq!(
         spelt_out(&file, "use super::super::keys::X; super::y()"),
-        "use crate::app::keys::X; crate::app::jobs::y()"
+        "use crate::app::keys::X; crate::app::results::y()"
     );
 }
 

@@ -12,7 +12,7 @@ use super::state::State;
 use super::tasks::state::{Level, Ticket};
 use crate::work::evaluate::Evaluation;
 
-/// What can happen to it.
+/// What can happen to the results table.
 #[derive(Clone, Debug)]
 pub enum EvaluateCommand {
     /// Gives a generator a row, or none.

@@ -14,7 +14,7 @@ use crate::work::error::TaskError;
 /// What can happen to predictions.
 #[derive(Clone, Debug)]
 pub enum PredictCommand {
-    /// The generator.
+    /// Generates for the selected pair with the settings.
     Generate,
     /// Draws a new seed, then generates.
     GenerateNewSeed,

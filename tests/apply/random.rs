@@ -395,8 +395,8 @@ fn stays(command: &Command) -> bool {
     !matches!(command, Command::Library(LibraryCommand::Open(_) | LibraryCommand::Reload))
 }
 
-fn session(command: impl Strategy<Value = Command>) -> impl Strategy<Value = Vec<(Command, u8)>> {
-    proptest::collection::vec((command, 0u8..4), 1..60)
+fn session(command: impl Strategy<Value = Command>, most: usize) -> impl Strategy<Value = Vec<(Command, u8)>> {
+    proptest::collection::vec((command, 0u8..4), 1..most)
 }
 
 /// Carries a session out, and ends its last stroke. What is on the disk then is what is on the screen.
@@ -436,7 +436,7 @@ proptest! {
 
     #[test]
     fn undoing_everything_brings_the_document_back(
-        commands in session(command().prop_filter("the data set stays open", stays))
+        commands in session(command().prop_filter("the data set stays open", stays), 60)
     ) {
         let mut bench = Bench::open();
         carry_out(&mut bench, commands)?;
@@ -463,11 +463,11 @@ proptest! {
 }
 
 proptest! {
-    // A simulated grasp registers for real.
-    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+    // A simulated grasp registers for real: these take seconds.
+    #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_order_of_commands_panics(commands in session(command())) {
+    fn no_order_of_commands_panics(commands in session(command(), 40)) {
         let mut bench = Bench::open_simulated();
         bench.send(LibraryCommand::Select(SIMULATED));
         carry_out(&mut bench, commands)?;

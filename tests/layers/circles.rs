@@ -226,6 +226,48 @@ fn the_modules_of_a_layer_form_no_circle() {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
+/// What of `app` knows each other by its nature, and so counts as one part, beside each room's `state.rs`: the state
+/// holds the results and what the rooms keep, a recipe says how its result is computed from the state, and the data
+/// behind the state is one of the services.
+const MODEL: &[&str] = &["history", "keys", "results", "services", "state", "wanted"];
+
+/// The part of `app` that a module or an item lies in: the model, or the module that acts on it.
+fn part_of_app(path: &[String]) -> Option<String> {
+    let below = path.strip_prefix(&["app".to_owned()])?;
+    Some(match (below.first()?.as_str(), below.get(1).map(String::as_str)) {
+        ("services", Some("live")) => "services::live".to_owned(),
+        (_, Some("state")) => "model".to_owned(),
+        (name, _) if MODEL.contains(&name) => "model".to_owned(),
+        (name, _) => name.to_owned(),
+    })
+}
+
+#[test]
+fn the_rooms_of_the_studio_form_no_circle() {
+    let sources = sources("app");
+    let (named, imported) = names(&sources);
+    let mut arrows = Arrows::new();
+    for (module, path) in named.iter().flat_map(|(module, paths)| paths.iter().map(move |path| (module, path))) {
+        let path = resolved(path.clone(), &sources, &imported);
+        let (Some(own), Some(other)) = (part_of_app(module), part_of_app(&path)) else { continue };
+        if own != other {
+            let why = format!("{} names {}", module.join("::"), path.join("::"));
+            arrows.entry(own).or_default().entry(other).or_insert(why);
+        }
+    }
+    assert!(arrows.len() > 12 && arrows["apply"].len() > 10, "the scan sees too little: {arrows:?}");
+    assert_eq!(circle(&arrows), None);
+    // The model knows nothing of what acts on it: only what a job is.
+    let knows: Vec<&String> = arrows["model"].keys().collect();
+    assert_eq!(knows, ["jobs"], "{:?}", arrows["model"]);
+    // Rooms know neither the list of all commands nor the runtime.
+    for (room, named) in arrows.iter().filter(|(room, _)| !["action", "apply", "runtime"].contains(&room.as_str())) {
+        for above in ["apply", "runtime", "action", "command"] {
+            assert!(!named.contains_key(above), "{}", named[above]);
+        }
+    }
+}
+
 /// The circles of a crate that consists of these modules: the folder, and how many steps go round.
 fn circles_of(modules: &[(&str, &str)]) -> Vec<(String, usize)> {
     let sources = modules.iter().map(|(module, text)| (parts(module), (*text).to_owned())).collect();

@@ -7,10 +7,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::super::command::Opened;
 use super::super::keys::{PredictionKey, TouchKey};
 use super::super::labels::state::{PairLabels, Review};
 use super::super::library::state::Place;
+use super::super::services::Opened;
 use super::super::settings::state::{SETTINGS_VERSION, Settings};
 use super::{DataSource, Following, Services};
 use crate::domain::contact::ContactMask;

@@ -102,16 +102,16 @@ pub enum CameraPreset {
     Top,
 }
 
-/// What only the window can do, once. Handed out by [`super::runtime::Runtime::tick`].
+/// What only the window can do, once. Handed out by [`super::super::runtime::Runtime::tick`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum UiRequest {
-    /// Show the native dialog for a folder, or a path box; answer with [`Command::Open`].
+    /// Show the native dialog for a folder, or a path box; answer with `LibraryCommand::Open`.
     PickFolder,
-    /// Show the native dialog for a file, or a path box; answer with [`Command::Open`].
+    /// Show the native dialog for a file, or a path box; answer with `LibraryCommand::Open`.
     PickFile,
-    /// Ask for the folder to write the results table to; answer with [`EvaluateCommand::Export`].
+    /// Ask for the folder to write the results table to; answer with `EvaluateCommand::Export`.
     PickTableFolder,
-    /// Ask for the folder to export masks to; answer with [`Command::ExportMasks`].
+    /// Ask for the folder to export masks to; answer with `LabelsCommand::ExportMasks`.
     PickExportFolder,
     /// Turn the 3D cameras.
     Camera(CameraPreset),
