@@ -5,6 +5,8 @@
 #[allow(dead_code, reason = "not every feature set uses every helper")]
 mod support;
 
+#[cfg(feature = "onnx")]
+mod agreement;
 mod apply;
 mod cli;
 #[cfg(feature = "onnx")]

@@ -18,14 +18,14 @@ use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, Touch, ambiguity};
 use crate::domain::dataset::PairId;
 use crate::domain::findings::Finding;
-use crate::domain::grid::{DepthMap, Grid, RgbGrid};
+use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::rig::{PadId, Rig, Text};
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::{metrics, resample};
 use crate::io::dataset::{Dataset, assumed_meters};
 use crate::io::images;
 use crate::io::names::with_ending;
-use crate::work::compare::{Comparison, compare_parts};
+use crate::work::compare::{self, Comparison};
 use crate::work::imprint::{self, imprint_of};
 use crate::work::job::JobCx;
 
@@ -288,26 +288,15 @@ fn score(
     imprint: &DepthMap,
     pair: &mut Pair,
 ) -> anyhow::Result<()> {
-    let scale = sample.scale;
-    match scale {
-        Scale::Measured => {
-            if let Some(bubble) = sample.pad(finger).and_then(|t| t.depth()) {
-                let seen = sample.rig.seen_mask(finger, bubble.imprint.size());
-                take(pair, &compare_parts(imprint, &bubble.imprint, scale, seen.as_ref())?);
-            }
-        }
-        Scale::Assumed => {
-            // Compared on the tile's own pixels and in its orientation, so that the lab's prediction is not resampled.
-            if let Some(tile) = dataset.bubble_tile(id, sample.laid)?.as_ref().map(assumed_meters) {
-                let ours = resample::bilinear(&turned(imprint, &sample.rig), tile.width(), tile.height());
-                let seen = sample.rig.seen_mask(finger, tile.size()).map(|seen| turned(&seen, &sample.rig));
-                take(pair, &compare_parts(&ours, &tile, scale, seen.as_ref())?);
-                if let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_meters) {
-                    let theirs = compare_parts(&vqvae, &tile, scale, seen.as_ref())?;
-                    (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
-                }
-            }
-        }
+    let tile = compare::tile_of(dataset, id, sample)?;
+    if let Some(found) = compare::of_pad(imprint, sample, finger, tile.as_ref())? {
+        take(pair, &found);
+    }
+    if let Some(tile) = tile
+        && let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_meters)
+    {
+        let theirs = compare::tiles(&vqvae, &tile, sample, finger)?;
+        (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
     }
     Ok(())
 }
@@ -316,11 +305,6 @@ fn take(pair: &mut Pair, found: &Comparison) {
     (pair.psnr_db, pair.ssim) = (found.psnr_db, found.ssim);
     pair.seen = found.split.map(|s| s.seen);
     pair.invented = found.split.map(|s| s.invented);
-}
-
-/// As a picture shows it: turned as the depth sensor lies to the rig's first one.
-fn turned<T: Copy>(image: &Grid<T>, rig: &Rig) -> Grid<T> {
-    if rig.depth().is_some_and(|sensor| sensor.rotation_deg == 180) { image.rotated_180() } else { image.clone() }
 }
 
 /// Writes `STEM.npy` (meters, f32, 140 x 175, raw orientation) and a 16-bit picture of it (0.001 mm steps from

@@ -1,9 +1,13 @@
-//! A prediction against the measurement of the same touch: [`compare_parts`].
+//! A prediction against the measurement of the same touch: [`of_pad`].
 
 use super::error::TaskError;
+use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::metrics::{self, Split, SsimRange};
-use crate::domain::sample::Scale;
+use crate::domain::resample::bilinear;
+use crate::domain::rig::{PadId, Rig};
+use crate::domain::sample::{Sample, Scale};
+use crate::io::dataset::{Dataset, LoadError, assumed_meters};
 
 /// The peak of the lab's PSNR, meters.
 pub const LAB_PEAK_M: f64 = 0.0225;
@@ -66,7 +70,7 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
 ///
 /// # Errors
 /// As [`compare`].
-pub fn compare_parts(
+fn compare_parts(
     predicted: &DepthMap,
     measured: &DepthMap,
     scale: Scale,
@@ -87,6 +91,57 @@ pub fn compare_parts(
         }
     }
     Ok(Comparison { split: Some(split), ..whole })
+}
+
+/// The picture that a pair's imprint was made from, in the assumed meters and as the file has it; `None` where imprints
+/// were measured.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn tile_of(dataset: &Dataset, id: PairId, sample: &Sample) -> Result<Option<DepthMap>, TaskError> {
+    let fail = |err: LoadError| TaskError::from_error("Compare prediction and measurement", &err).with_hint(err.hint());
+    Ok(dataset.bubble_tile(id, sample.laid).map_err(fail)?.as_ref().map(assumed_meters))
+}
+
+/// An imprint as the picture of its sensor shows it: turned as that lies, and as large (`[width, height]`).
+pub fn as_tile(imprint: &DepthMap, rig: &Rig, [width, height]: [usize; 2]) -> DepthMap {
+    bilinear(&turned(imprint, rig), width, height)
+}
+
+fn turned<T: Copy>(image: &Grid<T>, rig: &Rig) -> Grid<T> {
+    if rig.depth().is_some_and(|sensor| sensor.rotation_deg == 180) { image.rotated_180() } else { image.clone() }
+}
+
+/// A predicted picture against the picture of the same pad, both as files have them, in the assumed meters.
+///
+/// # Errors
+/// As [`compare`].
+pub fn tiles(predicted: &DepthMap, tile: &DepthMap, sample: &Sample, pad: PadId) -> Result<Comparison, TaskError> {
+    let seen = sample.rig.seen_mask(pad, tile.size()).map(|seen| turned(&seen, &sample.rig));
+    compare_parts(predicted, tile, sample.scale, seen.as_ref())
+}
+
+/// The predicted imprint of a pad (meters, raw orientation) against what was measured: the figures that every part of
+/// the program shows. With a `tile` ([`tile_of`]) they are of its own pixels, so that what the file has is not resampled;
+/// the error map is of the imprint's pixels always. `None` where nothing was measured.
+///
+/// # Errors
+/// As [`compare`].
+pub fn of_pad(
+    imprint: &DepthMap,
+    sample: &Sample,
+    pad: PadId,
+    tile: Option<&DepthMap>,
+) -> Result<Option<Comparison>, TaskError> {
+    let Some(bubble) = sample.pad(pad).and_then(|touch| touch.depth()) else { return Ok(None) };
+    let measured = &bubble.imprint;
+    let Some(tile) = tile else {
+        let seen = sample.rig.seen_mask(pad, measured.size());
+        return compare_parts(imprint, measured, sample.scale, seen.as_ref()).map(Some);
+    };
+    let error = compare(imprint, measured, sample.scale)?.error;
+    let figures = tiles(&as_tile(imprint, &sample.rig, tile.size()), tile, sample, pad)?;
+    Ok(Some(Comparison { error, ..figures }))
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! A prediction against the measurement.
 
 use super::super::keys::ShiftMode;
-use super::imprint::{Imprint, MetersKey};
+use super::imprint::MetersKey;
 use super::prediction::PredictionKey;
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
 use crate::domain::rig::PadId;
-use crate::work::compare::{Comparison, compare_parts};
+use crate::work::compare::{Comparison, of_pad, tile_of};
+use crate::work::error::TaskError;
 
 /// A prediction in meters, compared.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -18,11 +19,15 @@ impl Computes for ComparisonKey {
         let touch = self.0.touch;
         let predicted = state.results.imprints.get(&MetersKey(self.0.clone(), self.1))?.clone();
         let sample = state.results.samples.get(&touch.pair)?.clone();
-        let measured = Imprint::Measured(sample.clone(), touch);
-        Some(Job::new(Lane::Compute, "Compare prediction and measurement", move |_| {
-            let measured = measured.get()?;
-            let seen = sample.rig.seen_mask(touch.finger, measured.size());
-            compare_parts(&predicted, measured, sample.scale, seen.as_ref())
+        let source = state.library.open.as_ref()?.source.clone();
+        const WHAT: &str = "Compare prediction and measurement";
+        Some(Job::new(Lane::Compute, WHAT, move |_| {
+            let tile = match source.as_dataset() {
+                Some(dataset) => tile_of(dataset, touch.pair.pair, &sample)?,
+                None => None,
+            };
+            let found = of_pad(&predicted, &sample, touch.finger, tile.as_ref())?;
+            found.ok_or_else(|| TaskError::new(WHAT, "the measured imprint is not there"))
         }))
     }
 

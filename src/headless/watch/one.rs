@@ -206,6 +206,7 @@ impl<'a> Worker<'a> {
         let files = write::predictions(stem, &sample.rig, &contact, &self.args.save)?;
         latency.write = ms(step);
         latency.total = since(ready.stamp.closed, SystemTime::now());
+        let tile = compare::tile_of(dataset, ready.id, sample)?;
         let mut done = Done {
             name: ready.name.clone(),
             source: source.clone(),
@@ -214,7 +215,7 @@ impl<'a> Worker<'a> {
             notes: sample.notes.clone(),
             scale: sample.scale.key(),
             mask_notes: contact.notes(&sample.rig),
-            fingers: sample.rig.pads().filter_map(|pad| figures(sample, pad, &contact)).collect(),
+            fingers: sample.rig.pads().filter_map(|pad| figures(sample, pad, &contact, tile.as_ref())).collect(),
             pose,
             no_pose,
             latency,
@@ -299,12 +300,10 @@ fn load_tool(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<
 }
 
 /// Numbers of one prediction, against the measurement where there is one.
-fn figures(sample: &Sample, pad: PadId, contact: &Contact) -> Option<FingerFigures> {
+fn figures(sample: &Sample, pad: PadId, contact: &Contact, tile: Option<&DepthMap>) -> Option<FingerFigures> {
     let imprint = contact.imprints[pad].as_ref()?;
     let stats = crate::domain::postprocess::Stats::of(imprint);
-    let measured = sample.pad(pad).and_then(|t| t.depth()).map(|b| &b.imprint);
-    let measured = measured.filter(|m| m.size() == imprint.size());
-    let compared = measured.and_then(|m| compare::compare(imprint, m, sample.scale).ok());
+    let compared = compare::of_pad(imprint, sample, pad, tile).ok().flatten();
     let mask = contact.masks[pad].as_ref();
     let count = |found: &ContactMask| found.mask.as_slice().iter().filter(|&&m| m).count();
     Some(FingerFigures {

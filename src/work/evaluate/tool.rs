@@ -15,12 +15,12 @@ use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers,
 use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use crate::domain::metrics::{LEVELS, SsimRange, planes, ssim_ranges, unit_range};
 use crate::domain::pose::ToolModel;
-use crate::domain::resample::bilinear;
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{Sample, Scale};
 use crate::infer::classifier::Verdict;
 use crate::io::dataset::Dataset;
 use crate::work::cloud::contact_points;
+use crate::work::compare::as_tile;
 use crate::work::job::JobCx;
 use crate::work::mask::MaskInputs;
 use crate::work::models::Masking;
@@ -217,7 +217,7 @@ fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
             let tile = case.tile.as_ref()?;
             let prediction = match (&made.tile, &made.imprints[finger]) {
                 (Some(stored), _) => stored.clone(),
-                (None, Some(imprint)) => bilinear(&imprint.rotated_180(), tile.width(), tile.height()),
+                (None, Some(imprint)) => as_tile(imprint, &case.sample.rig, tile.size()),
                 (None, None) => return None,
             };
             let (prediction, truth) = (unit_range(&prediction), unit_range(tile));

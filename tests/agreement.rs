@@ -1,0 +1,308 @@
+//! The studio and the command line are one program: what a button does, a verb does, and with the same numbers.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use serde_json::Value;
+use strum::IntoEnumIterator as _;
+use touch2touch::app::action::Action;
+use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::library::Place;
+use touch2touch::app::runtime::Runtime;
+use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::state::{Lookup, State};
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::grid::Grid;
+use touch2touch::io::images;
+
+use crate::support::run;
+
+/// How an action is had from the command line.
+enum How {
+    /// By these arguments, which must parse.
+    Verb(&'static [&'static str]),
+    /// Not at all, because it only changes what the window shows or prefers, or moves about in it.
+    Window,
+    /// By options of the verbs that compute: what the window prefers, they are told.
+    Options(&'static [&'static str]),
+    /// It takes back, stops or repeats: a verb is stopped by Ctrl-C and repeated by running it again.
+    Shell,
+}
+
+/// A new action does not compile until it is said here how it is had from the command line.
+fn how(action: Action) -> How {
+    use Action as A;
+    use How::{Options, Shell, Verb, Window};
+    match action {
+        A::OpenFolder | A::OpenDemo | A::Reload => Verb(&["doctor", "demo"]),
+        A::Follow => Verb(&["watch", "folder"]),
+        // Labels are on the disk as soon as a verb ends.
+        A::Save => Shell,
+        A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),
+        A::Generate => Verb(&["generate", "demo", "--out", "folder"]),
+        A::GenerateNewSeed | A::LockSeed => Options(&["generate", "demo", "--out", "folder", "--seed", "7"]),
+        A::RunSeeds => Verb(&["generate", "demo", "--out", "folder", "--seeds", "8"]),
+        A::EvaluateDataset => Verb(&["evaluate", "demo"]),
+        A::ExportTable => Verb(&["evaluate", "demo", "--csv", "a.csv", "--markdown", "a.md"]),
+        A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
+        A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),
+        A::FillHoles => Verb(&["label", "demo", "--pair", "a", "--fill-holes"]),
+        A::LargestIsland => Verb(&["label", "demo", "--pair", "a", "--largest-island"]),
+        A::AdoptAutomatic => Verb(&["label", "demo", "--pair", "a", "--adopt", "--mask", "top_percent"]),
+        A::ResetMask => Verb(&["label", "demo", "--pair", "a", "--remove-mask"]),
+        A::DoneAndNext => Verb(&["label", "demo", "--pair", "a", "--review", "done"]),
+        A::Flag => Verb(&["label", "demo", "--pair", "a", "--review", "flagged"]),
+        A::Skip => Verb(&["label", "demo", "--pair", "a", "--review", "skip"]),
+        A::MarkTodo => Verb(&["label", "demo", "--pair", "a", "--review", "todo"]),
+        A::AcceptMeasuredPose => Verb(&["label", "demo", "--pair", "a", "--accept", "measured"]),
+        A::AcceptPredictedPose => Verb(&["label", "demo", "--pair", "a", "--accept", "predicted"]),
+        A::AcceptHand => Verb(&["label", "demo", "--pair", "a", "--accept", "measured", "--pose", "-3,0,1.5"]),
+        A::RunPose => Verb(&["pose", "demo"]),
+        A::IcpFromHere => Verb(&["pose", "demo", "--start", "10,0,-2"]),
+        A::OwnStarts => Verb(&["basin", "demo", "--pair", "a"]),
+        A::NextPoseEngine => Options(&["pose", "demo", "--engine", "gicp"]),
+        A::DepthChain => Verb(&["ledger", "demo", "--pair", "a"]),
+        // Steps, residuals and reasons are in the report of the registration.
+        A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep | A::Correspondences => {
+            Options(&["pose", "demo", "--trace", "--json"])
+        }
+        A::NextLayer | A::AnimateWeakest => Options(&["pose", "demo", "--trace", "--json"]),
+        A::CancelJobs | A::Undo | A::Redo => Shell,
+        A::PreviousSample | A::NextSample | A::TenBack | A::TenForward | A::FirstSample | A::LastSample => Window,
+        A::NextUnfinished | A::OtherFinger | A::BothFingers | A::FindSample => Window,
+        // A stroke is drawn by a hand.
+        A::Brush | A::Eraser | A::PanTool | A::LastTool | A::BrushSmaller | A::BrushLarger => Window,
+        A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger => Window,
+        A::PoseTool | A::SixDof | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
+        A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
+        A::LockRange | A::RangeOnce | A::ResetRange | A::Fit | A::BothClouds | A::LinkCameras | A::Footprint => Window,
+        A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop | A::SwitchTheme => Window,
+        A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace => Window,
+        A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
+        A::Palette | A::ShortcutSheet | A::ResetSettings => Window,
+    }
+}
+
+#[test]
+fn every_action_that_computes_or_writes_has_its_verb() {
+    let (mut verbs, mut all) = (0, 0);
+    for action in Action::iter() {
+        all += 1;
+        let (How::Verb(arguments) | How::Options(arguments)) = how(action) else { continue };
+        verbs += 1;
+        let words = std::iter::once(&"touch2touch").chain(arguments).copied();
+        if let Err(err) = touch2touch::headless::check_command(words) {
+            panic!("{action:?}: {arguments:?}: {err}");
+        }
+    }
+    assert!(verbs > 35 && all > verbs, "{verbs} of {all}");
+}
+
+/// The studio on a place, run until nothing is left to compute.
+struct Studio {
+    state: State,
+    runtime: Runtime,
+}
+
+impl Studio {
+    fn open(place: Place, home: &Path) -> Self {
+        let services = LiveServices::with_config_folder(Some(home.to_owned()));
+        let runtime = Runtime::threads(Arc::new(services), Arc::new(|| {}));
+        let mut studio = Self { state: State::default(), runtime };
+        studio.runtime.start(&mut studio.state, Some(place));
+        let panes =
+            [Pane::Measured, Pane::Predicted, Pane::Error, Pane::Metrics, Pane::SceneMeasured, Pane::ScenePredicted];
+        studio.send(ViewCommand::ShowPanes(panes.into_iter().collect()).into());
+        studio.send(ViewCommand::ShowBothFingers(true).into());
+        studio
+    }
+
+    fn send(&mut self, command: Command) {
+        self.runtime.tick(&mut self.state, vec![command]);
+        let (begin, mut idle) = (Instant::now(), 0);
+        while idle < 5 {
+            assert!(begin.elapsed() < Duration::from_secs(240), "{:?}", self.state.log.entries.back());
+            std::thread::sleep(Duration::from_millis(4));
+            self.runtime.tick(&mut self.state, Vec::new());
+            let settled = self.state.tasks.is_idle() && self.state.document.unsaved.is_empty();
+            idle = if settled && self.state.library.open.is_some() && !self.state.library.bundles.is_empty() {
+                idle + 1
+            } else {
+                0
+            };
+        }
+    }
+
+    /// Shows a pair and has it predicted.
+    fn predict(&mut self, pair: u32) {
+        self.send(LibraryCommand::Select(PairId(pair)).into());
+        self.send(PredictCommand::Generate.into());
+    }
+}
+
+/// A number as serde writes it: what bit-for-bit means in a text.
+fn number(value: f64) -> Value {
+    serde_json::from_str(&serde_json::to_string(&value).unwrap()).unwrap()
+}
+
+fn optional(value: Option<f64>) -> Value {
+    value.map_or(Value::Null, number)
+}
+
+fn json(arguments: &[&str], home: &Path) -> Value {
+    let output = run(&[arguments, &["--json"]].concat(), home);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    serde_json::from_str(&text)
+        .unwrap_or_else(|err| panic!("{arguments:?}: {err}\n{text}\n{}", String::from_utf8_lossy(&output.stderr)))
+}
+
+/// Compares every pose, comparison and mask that the studio shows of a pair with what the verbs say of it.
+fn assert_same(place: Place, path: &str, home: &Path, pairs: u32) -> BTreeMap<String, usize> {
+    let poses = json(&["pose", path, "--imprint", "both"], home);
+    let out = home.join("generated");
+    let generated = json(&["generate", path, "--out", out.to_str().unwrap()], home);
+    let mut studio = Studio::open(place, home);
+    let mut compared: BTreeMap<String, usize> = BTreeMap::new();
+    for pair in 0..pairs {
+        studio.predict(pair);
+        let state = &studio.state;
+        let name = state.pair_name();
+        for source in ImprintSource::iter() {
+            let case = poses["cases"].as_array().unwrap().iter();
+            let case = case.filter(|case| case["name"] == name && case["imprint"] == source.key()).collect::<Vec<_>>();
+            let Lookup::Ready(pose) = state.pose(source) else {
+                assert!(
+                    case.is_empty() || case[0]["angle_deg"].is_null(),
+                    "{name} {source:?}: only the verb has a pose"
+                );
+                continue;
+            };
+            let place = pose.object_from_grasp();
+            assert_eq!(case.len(), 1, "{name} {source:?}");
+            assert_eq!(case[0]["angle_deg"], number(pose.angle_rad.to_degrees()), "{name} {source:?}");
+            assert_eq!(case[0]["error_deg"], optional(pose.error_rad.map(f64::to_degrees)), "{name} {source:?}");
+            assert_eq!([&case[0]["y_m"], &case[0]["z_m"]], [&number(place.y_m), &number(place.z_m)], "{name}");
+            *compared.entry(case[0]["mask"].as_str().unwrap().to_owned()).or_default() += 1;
+        }
+        for finger in state.rig().pads() {
+            let Lookup::Ready(found) = state.comparison(finger) else { continue };
+            let key = state.finger_name(finger).to_string();
+            let row = generated["pairs"].as_array().unwrap().iter();
+            let row = row.filter(|row| row["name"] == name && row["finger"] == key.as_str()).collect::<Vec<_>>();
+            assert_eq!(row.len(), 1, "{name} {key}");
+            assert_eq!(row[0]["psnr_db"], optional(found.psnr_db), "{name} {key}");
+            assert_eq!(row[0]["ssim"], optional(found.ssim), "{name} {key}");
+            *compared.entry("comparison".to_owned()).or_default() += 1;
+        }
+    }
+    compared
+}
+
+/// A lab folder with a corrected mask and reviews, made by the verbs as a person would.
+fn lab_folder(home: &Path) -> PathBuf {
+    let folder = home.join("lab");
+    let path = folder.to_str().unwrap();
+    let args = ["simulate", "--out", path, "--tools", "pattern_36", "--grasps", "3", "--seed", "5"];
+    assert!(run(&args, home).status.success());
+    folder
+}
+
+fn name_of(report: &Value, pair: usize) -> String {
+    report["cases"][pair]["name"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn on_the_demo_the_studio_says_what_the_verbs_say() {
+    let home = tempfile::tempdir().unwrap();
+    let found = assert_same(Place::Demo, "demo", home.path(), 2);
+    assert_eq!((found.get("unet"), found.get("comparison")), (Some(&4), Some(&4)), "{found:?}");
+}
+
+#[test]
+fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let path = folder.to_str().unwrap();
+    let names: Vec<String> = {
+        let report = json(&["pose", path], home.path());
+        (0..3).map(|pair| name_of(&report, pair)).collect()
+    };
+    // One is corrected and accepted by the verb, another by the studio; the third is left out.
+    let adopt =
+        ["label", path, "--pair", &names[0], "--adopt", "--mask", "cad", "--finger", "right", "--accept", "measured"];
+    let labeled = json(&adopt, home.path());
+    assert_eq!(
+        (&labeled["pairs"][0]["review"], &labeled["pairs"][0]["masks"][0][0]),
+        (&"in_progress".into(), &"right".into())
+    );
+    let skipped = json(&["label", path, "--pair", &names[2], "--review", "skip"], home.path());
+    assert_eq!(skipped["pairs"][0]["review"], "skip");
+
+    let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
+    studio.send(LibraryCommand::Select(PairId(1)).into());
+    studio.send(LabelsCommand::AdoptAutomatic.into());
+    studio.send(LabelsCommand::LargestIsland.into());
+    studio.send(LabelsCommand::AcceptPose(ImprintSource::Measured, true).into());
+    let exported = home.path().join("by_studio");
+    studio.send(LabelsCommand::ExportMasks(exported.clone()).into());
+    let state = &studio.state;
+    assert_eq!(state.document.review(&names[2]).stored(), "skip");
+    assert_eq!(state.document.review(&names[0]).stored(), "in_progress");
+    drop(studio);
+
+    // What the studio accepted is what the verb's registration answers now.
+    let report = json(&["pose", path], home.path());
+    for pair in [0, 1] {
+        let case = &report["cases"][pair];
+        assert!(case["mask"].as_str().unwrap().starts_with("hand"), "{case}");
+        for key in ["angle_deg", "y_m", "z_m"] {
+            assert_eq!(case["accepted"][key], case[key], "{key} of {}", names[pair]);
+        }
+    }
+    // Both export the same files.
+    let by_verb = home.path().join("by_verb");
+    let export = json(&["masks", "export", path, "--out", by_verb.to_str().unwrap()], home.path());
+    assert_eq!((&export["corrected"], &export["skipped"]), (&2.into(), &0.into()));
+    let files = |root: &Path| {
+        let mut found = BTreeMap::new();
+        let mut folders = vec![root.to_owned()];
+        while let Some(folder) = folders.pop() {
+            for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+                if entry.is_dir() {
+                    folders.push(entry);
+                } else {
+                    found.insert(entry.strip_prefix(root).unwrap().to_owned(), std::fs::read(&entry).unwrap());
+                }
+            }
+        }
+        found
+    };
+    let (studios, verbs) = (files(&exported), files(&by_verb));
+    assert!(studios.len() >= 4, "{:?}", studios.keys());
+    assert!(studios == verbs, "{:?} and {:?}", studios.keys(), verbs.keys());
+
+    let found = assert_same(Place::Path(folder.clone()), path, home.path(), 3);
+    assert_eq!((found["hand, unet"] + found["unet"], found["comparison"]), (6, 6), "{found:?}");
+    assert_eq!(found["hand, unet"], 4, "both imprints of both corrected pairs: {found:?}");
+    // Left out where it is asked for.
+    let without = json(&["pose", path, "--no-hand"], home.path());
+    assert_eq!(without["cases"][0]["mask"], "unet");
+}
+
+#[test]
+fn on_a_folder_of_pictures_the_figures_are_of_the_files_own_pixels_in_both() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = home.path().join("pictures");
+    std::fs::create_dir_all(&folder).unwrap();
+    for (name, at) in [("a", 30), ("b", 70)] {
+        let gelslim = Grid::from_fn(128, 128, |x, y| [(x % 90) as f32 + 80.0, ((y + at) % 70) as f32 + 90.0, 120.0]);
+        images::write_rgb8(&folder.join(format!("{name}_gelslim.png")), &gelslim).unwrap();
+        let bubble = Grid::from_fn(128, 128, |x, y| 220 - 2 * x.abs_diff(at).max(y.abs_diff(60)).min(100) as u8);
+        images::write_gray8(&folder.join(format!("{name}_bubble.png")), &bubble).unwrap();
+    }
+    let found = assert_same(Place::Path(folder.clone()), folder.to_str().unwrap(), home.path(), 2);
+    assert_eq!(found["comparison"], 2, "{found:?}");
+}
