@@ -75,9 +75,13 @@ impl JsonArgs {
     /// Old command lines put a space before the file's name: `--json FILE.json`.
     pub(super) fn with_equals(arguments: Vec<OsString>) -> Vec<OsString> {
         let mut out: Vec<OsString> = Vec::with_capacity(arguments.len());
+        // `bench` takes no other word.
+        let bench = arguments.get(1).is_some_and(|verb| verb == "bench");
         for argument in arguments {
+            let word = !argument.to_string_lossy().starts_with('-');
+            let file = Path::new(&argument).extension().is_some_and(|ending| ending == "json") || (bench && word);
             match out.last_mut() {
-                Some(last) if last == "--json" && Path::new(&argument).extension().is_some_and(|e| e == "json") => {
+                Some(last) if last == "--json" && file => {
                     last.push("=");
                     last.push(argument);
                 }
@@ -129,9 +133,11 @@ mod tests {
     fn a_json_file_may_follow_a_space_and_a_path_is_no_json_file() {
         let with =
             |words: &str| JsonArgs::with_equals(words.split(' ').map(OsString::from).collect()).join(" ".as_ref());
-        assert_eq!(with("basin --json a/b.json demo"), "basin --json=a/b.json demo");
-        assert_eq!(with("basin --json demo --pair x.json"), "basin --json demo --pair x.json");
-        assert_eq!(with("pose demo --json"), "pose demo --json");
+        assert_eq!(with("t basin --json a/b.json demo"), "t basin --json=a/b.json demo");
+        assert_eq!(with("t basin --json demo --pair x.json"), "t basin --json demo --pair x.json");
+        assert_eq!(with("t bench generator --json out --grasps 3"), "t bench generator --json=out --grasps 3");
+        assert_eq!(with("t bench generator --json --grasps 3"), "t bench generator --json --grasps 3");
+        assert_eq!(with("t pose demo --json"), "t pose demo --json");
     }
 
     #[test]
