@@ -13,7 +13,7 @@ use super::widget::{brush_cursor, empty};
 use crate::app::command::{Command, Hover, Pane};
 use crate::app::keys::{ImprintSource, MaskVersion, ShiftMode};
 use crate::app::results::Preview;
-use crate::app::settings::{ColorMap, ColorRange, MaskTool};
+use crate::app::settings::{ColorMap as MapChoice, ColorRange, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::grid::{DepthMap, RgbGrid};
@@ -34,8 +34,8 @@ pub(super) fn range_of(state: &State) -> Range {
 /// The color map of imprints.
 pub(super) fn map_of(state: &State) -> ColorMap {
     match state.settings.color_map {
-        ColorMap::Viridis => ColorMap::Viridis,
-        ColorMap::Gray => ColorMap::Gray,
+        MapChoice::Viridis => ColorMap::Viridis,
+        MapChoice::Gray => ColorMap::Gray,
     }
 }
 
