@@ -14,6 +14,7 @@ pub mod command;
 pub mod document;
 pub mod effect;
 pub mod evaluation;
+pub mod figures;
 mod generating;
 pub mod history;
 pub mod inspect;

@@ -181,15 +181,28 @@ impl State {
         })
     }
 
-    /// The recipe of the automatic mask that the settings ask for.
+    /// The recipe of the automatic masks that the settings ask for, of whatever pair.
+    pub(super) fn automatic_recipe(&self) -> MaskRecipe {
+        let mask = &self.settings.mask;
+        let threshold = || MaskRecipe::Threshold(mask.threshold_m.into());
+        match mask.source {
+            MaskSource::Threshold => threshold(),
+            MaskSource::TopPercent => MaskRecipe::TopPercent(mask.top_percent.into()),
+            MaskSource::Cad => MaskRecipe::Cad(mask.cad_distance_m.into()),
+            // Without a model the threshold serves: the recipe, and with it the name on screen, says so.
+            MaskSource::Unet => {
+                self.bundle(BundleKind::Mask).map_or_else(|_| threshold(), |b| MaskRecipe::Unet(b.id.clone()))
+            }
+            MaskSource::Truth => MaskRecipe::Truth,
+        }
+    }
+
+    /// The recipe of a finger's automatic mask.
     ///
     /// # Errors
-    /// Why this source cannot give one for this finger.
+    /// Why the source that the settings ask for cannot give one for this finger.
     pub fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
-        let mask = &self.settings.mask;
-        match mask.source {
-            MaskSource::Threshold => Ok(MaskRecipe::Threshold(mask.threshold_m.into())),
-            MaskSource::TopPercent => Ok(MaskRecipe::TopPercent(mask.top_percent.into())),
+        match self.settings.mask.source {
             MaskSource::Cad => {
                 self.tool_name()?;
                 let sample = self.sample().ready();
@@ -199,19 +212,15 @@ impl State {
                 if self.touch(finger).ready().is_some_and(|t| t.camera().is_none()) {
                     return Err(Absent::NoCamera);
                 }
-                Ok(MaskRecipe::Cad(mask.cad_distance_m.into()))
             }
-            // Without a model the threshold serves: the recipe, and with it the name on screen, says so.
-            MaskSource::Unet => Ok(self
-                .bundle(BundleKind::Mask)
-                .map_or(MaskRecipe::Threshold(mask.threshold_m.into()), |bundle| MaskRecipe::Unet(bundle.id.clone()))),
             MaskSource::Truth => {
                 if self.touch(finger).ready().is_some_and(|t| t.depth().is_none_or(|b| b.truth.is_none())) {
                     return Err(Absent::NotSimulated);
                 }
-                Ok(MaskRecipe::Truth)
             }
+            MaskSource::Threshold | MaskSource::TopPercent | MaskSource::Unet => {}
         }
+        Ok(self.automatic_recipe())
     }
 
     /// The automatic mask of one finger's imprint.

@@ -10,7 +10,7 @@ use eframe::egui::{self, ThemePreference, ViewportCommand};
 use egui_tiles::Tree;
 use strum::IntoEnumIterator as _;
 
-use super::cx::{Cx, Local, SeenPose};
+use super::cx::{Cx, Local};
 use super::dialogs::Purpose;
 use super::pane::Docking;
 use super::scene_view::Device;
@@ -27,7 +27,6 @@ use crate::app::services::SharedServices;
 use crate::app::settings::{Theme, Workspace};
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
-use crate::domain::hand::PoseDifference;
 
 /// How the studio is started.
 pub struct Options {
@@ -160,14 +159,6 @@ impl StudioApp {
             // The pen is not to be followed into another state.
             self.local.painting = None;
         }
-        let other_poses = |c: &Command| {
-            use Command::{ResetSettings, SetMask, SetMaskSource, SetPoseEngine, SetShift};
-            matches!(c, SetMask(_) | SetMaskSource(_) | SetPoseEngine(_) | SetShift(_) | ResetSettings)
-        };
-        if commands.iter().any(other_poses) {
-            // Figures made in another way do not belong into the same table.
-            self.local.seen.clear();
-        }
         if commands.iter().any(|c| matches!(c, Command::ResetSettings)) {
             self.trees.clear();
         }
@@ -191,7 +182,6 @@ impl StudioApp {
         }
         self.local.saved.observe(&self.state.document.unsaved);
         self.first_prediction();
-        self.remember_poses();
         let settings = &self.state.settings;
         if self.applied_theme != Some(settings.theme) {
             self.applied_theme = Some(settings.theme);
@@ -225,30 +215,6 @@ impl StudioApp {
             if self.state.chosen(self.state.selection.finger).is_none() {
                 self.inbox.push(Command::Generate);
             }
-        }
-    }
-
-    /// Keeps the pose errors of the pair on screen for the table.
-    fn remember_poses(&mut self) {
-        let Some(key) = self.state.pair_key() else { return };
-        let mut seen = self.local.seen.get(&key).copied().unwrap_or_default();
-        for source in ImprintSource::iter() {
-            let at = source as usize;
-            if let Some(pose) = self.state.pose(source).ready() {
-                seen.error_rad[at] = pose.error_rad;
-                seen.angle_rad[at] = Some(pose.angle_rad);
-                // What a person set counts before what was registered.
-                let hand = self.state.by_hand(source);
-                seen.by_hand[at] = hand.is_some();
-                if let Some(hand) = hand {
-                    let off = self.state.truth().map(|truth| PoseDifference::between(hand.planar, truth));
-                    seen.error_rad[at] = off.map(|d| d.angle_rad);
-                    seen.angle_rad[at] = Some(hand.planar.inverse().theta_rad);
-                }
-            }
-        }
-        if seen != SeenPose::default() {
-            self.local.seen.insert(key, seen);
         }
     }
 

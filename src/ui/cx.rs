@@ -1,6 +1,6 @@
 //! What every pane gets: the state to read, a list to put commands on, and what only the window knows.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use eframe::egui::{self, Response, Ui};
@@ -16,7 +16,7 @@ use super::widget::image_canvas::ViewTransform;
 use super::widget::texture::{Memo, Textures};
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
-use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource, PairKey};
+use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource};
 use crate::app::state::State;
 use crate::domain::mesh::TriMesh;
 use crate::domain::postprocess::Stats;
@@ -70,17 +70,6 @@ pub(super) struct Painting {
     pub pane: Pane,
     /// The finger.
     pub finger: PadId,
-}
-
-/// Figures of a pair as they were when it was last on screen, for the table.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct SeenPose {
-    /// Size of the angle's error, radians, by imprint source.
-    pub error_rad: [Option<f64>; 2],
-    /// The angle, radians, by imprint source.
-    pub angle_rad: [Option<f64>; 2],
-    /// Whether a person set the pose, by imprint source.
-    pub by_hand: [bool; 2],
 }
 
 /// Points as the renderer takes them, made once per cloud.
@@ -165,8 +154,6 @@ pub(super) struct Local {
     pub hidden: BTreeSet<Pane>,
     /// A pane to be shown or hidden.
     pub toggle_pane: Option<Pane>,
-    /// Poses seen, for the table.
-    pub seen: BTreeMap<PairKey, SeenPose>,
     /// Column of the table that is sorted by, and whether downwards.
     pub table_sort: (usize, bool),
     /// The panes of the last frame.
@@ -211,7 +198,6 @@ impl Local {
             frame_ms: 0.0,
             hidden: BTreeSet::new(),
             toggle_pane: None,
-            seen: BTreeMap::new(),
             table_sort: (4, false),
             visible: BTreeSet::new(),
             visible_next: BTreeSet::new(),

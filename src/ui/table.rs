@@ -10,9 +10,11 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::document::Review;
-use crate::app::keys::ImprintSource;
+use crate::app::figures::PairFigures;
+use crate::app::state::State;
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
+use crate::domain::units;
 
 /// Height of a row, points.
 const ROW: f32 = 24.0;
@@ -44,7 +46,7 @@ struct Row {
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
-        let mut rows = rows(cx);
+        let mut rows = rows(cx.state);
         if rows.is_empty() {
             let action = Action::Generate.command(cx.state).map(|_| ("Generate (Ctrl+G)", Action::Generate.tooltip()));
             if empty::show(
@@ -71,40 +73,29 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
 }
 
-/// One row per prediction that is shown for a touch, and one per pair that only has a pose.
-fn rows(cx: &Cx<'_>) -> Vec<Row> {
-    let state = cx.state;
-    let Some(open) = &state.library.open else { return Vec::new() };
-    let mut out = Vec::new();
-    let mut with_prediction = std::collections::BTreeSet::new();
-    let row = |pair: PairId, finger: Option<PadId>, image: [Option<f64>; 3]| {
-        let entry = state.library.entry(pair)?;
-        let seen = cx.local.seen.get(&open.key(pair)).copied().unwrap_or_default();
-        let angle = |source: ImprintSource| seen.error_rad[source as usize].map(f64::to_degrees);
+/// The rows, in the order of the results.
+fn rows(state: &State) -> Vec<Row> {
+    let row = |f: &PairFigures<'_>| {
+        let entry = state.library.entry(f.pair)?;
+        let [measured, predicted] = f.poses.map(|pose| pose.error_rad.map(f64::to_degrees));
+        let c = f.comparison;
         Some(Row {
-            pair,
+            pair: f.pair,
             name: entry.name.rsplit('/').next().unwrap_or(&entry.name).to_owned(),
             tool: entry.tool.as_deref().unwrap_or("").trim_start_matches("pattern_").replace('_', " "),
-            finger,
+            finger: f.finger,
             review: state.document.review(&entry.name),
-            numbers: [image[0], image[1], image[2], angle(ImprintSource::Measured), angle(ImprintSource::Predicted)],
-            by_hand: seen.by_hand,
+            numbers: [
+                c.and_then(|c| c.psnr_db),
+                c.and_then(|c| c.ssim),
+                c.map(|c| units::mm(c.mae_m)),
+                measured,
+                predicted,
+            ],
+            by_hand: f.poses.map(|pose| pose.by_hand),
         })
     };
-    for (touch, recipe) in &state.results.chosen {
-        if touch.pair.dataset != open.seq {
-            continue;
-        }
-        // A finger that was not on screen was not compared.
-        let Some(c) = state.results.comparisons.get(&(recipe.clone(), state.settings.shift)) else { continue };
-        let image = [c.psnr_db, c.ssim, Some(c.mae_m * 1e3)];
-        with_prediction.insert(touch.pair);
-        out.extend(row(touch.pair.pair, Some(touch.finger), image));
-    }
-    for key in cx.local.seen.keys().filter(|k| k.dataset == open.seq && !with_prediction.contains(*k)) {
-        out.extend(row(key.pair, None, [None; 3]));
-    }
-    out
+    state.figures_so_far().iter().filter_map(row).collect()
 }
 
 /// Sorts by a column; rows without a number come last either way.
