@@ -10,7 +10,7 @@ use super::cx::Cx;
 use super::images;
 use super::theme::{SMALL, caption, section};
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, Pane};
 use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
 use crate::app::workbench::{Layer, WorkbenchCommand};
@@ -49,8 +49,11 @@ fn reason_tip(reason: Reason) -> &'static str {
     }
 }
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("layers").show(ui, |ui| {

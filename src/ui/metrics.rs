@@ -8,8 +8,9 @@ use super::cx::{Cx, side_color};
 use super::images;
 use super::scene;
 use super::theme::{SMALL, caption, section, value};
+use super::widget::texture::Memo;
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, Pane};
 use crate::app::keys::{ImprintSource, PoseEngine};
 use crate::app::state::{Absent, Lookup};
 use crate::domain::hand::{HandPose, PoseDifference};
@@ -19,15 +20,22 @@ use crate::domain::units;
 use crate::work::compare::Comparison;
 use strum::IntoEnumIterator as _;
 
+/// Figures that only this pane shows.
+#[derive(Default)]
+pub(super) struct Memory {
+    /// Of the error and of the measured imprint.
+    stats: Memo<Stats>,
+}
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("metrics").show(ui, |ui| {
             pair(cx, ui);
             pose(cx, ui);
             comparison(cx, ui);
-            ledger(cx, ui);
+            ledger(cx, ui, memory);
         });
     });
 }
@@ -219,7 +227,7 @@ fn line(ui: &mut Ui, name: (&str, Color32), numbers: &[(String, Color32)], width
 }
 
 /// The stages that a prediction went through, with the figures of each.
-fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
+fn ledger(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     let finger = cx.state.selection.finger;
     let shift = cx.state.settings.shift;
     let mut rows: Vec<(&str, Option<Color32>, Stats, bool)> = Vec::new();
@@ -239,14 +247,14 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
         if let Lookup::Ready(c) = cx.state.comparison(finger) {
-            let stats = *cx.local.stats.get("error", (&recipe, shift), || Stats::of(&c.error));
+            let stats = *memory.stats.get("error", (&recipe, shift), || Stats::of(&c.error));
             rows.push(("Error", None, stats, true));
         }
     }
     if let (Lookup::Ready(imprint), Some(touch)) =
         (cx.state.imprint(ImprintSource::Measured, finger), cx.state.touch_key(finger))
     {
-        let stats = *cx.local.stats.get("measured", touch, || Stats::of(imprint));
+        let stats = *memory.stats.get("measured", touch, || Stats::of(imprint));
         let at = rows.len().saturating_sub(usize::from(rows.last().is_some_and(|r| r.0 == "Error")));
         rows.insert(at, ("Measured", Some(side_color(cx.p, ImprintSource::Measured)), stats, true));
     }

@@ -1,5 +1,7 @@
 //! The docked panes: titles, title bars, and which function draws which.
 
+use std::collections::BTreeSet;
+
 use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetText, vec2};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles, UiResponse};
 
@@ -78,39 +80,63 @@ fn side(pane: Pane) -> Option<ImprintSource> {
     }
 }
 
+/// What each file that draws panes keeps from one frame to the next.
+#[derive(Default)]
+pub(super) struct Memories {
+    pub browser: browser::Memory,
+    pub images: images::Memory,
+    pub scene: scene::Memory,
+    timemachine: timemachine::Memory,
+    metrics: metrics::Memory,
+    table: table::Memory,
+}
+
+/// The panes of the window.
+#[derive(Default)]
+pub(super) struct Panes {
+    /// What each of them remembers.
+    pub memories: Memories,
+    /// The pane that fills the window.
+    pub maximized: Option<Pane>,
+    /// The pane under the pointer.
+    pub hovered: Option<Pane>,
+    /// The panes drawn in this frame, so far.
+    pub drawn: BTreeSet<Pane>,
+}
+
 /// Draws a pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
-    cx.local.visible_next.insert(pane);
+fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
+    panes.drawn.insert(pane);
     if ui.rect_contains_pointer(ui.max_rect()) {
-        cx.local.hovered_pane = Some(pane);
+        panes.hovered = Some(pane);
     }
+    let of = &mut panes.memories;
     match pane {
-        Pane::Browser => browser::show(cx, ui),
+        Pane::Browser => browser::show(cx, ui, &mut of.browser, pane),
         Pane::GelRaw | Pane::GelReference | Pane::GelDifference | Pane::Measured | Pane::Predicted | Pane::Error => {
-            images::show(cx, ui, pane)
+            images::show(cx, ui, &mut of.images, pane)
         }
-        Pane::SceneMeasured => scene::show(cx, ui, ImprintSource::Measured),
-        Pane::ScenePredicted => scene::show(cx, ui, ImprintSource::Predicted),
-        Pane::TimeMachine => timemachine::show(cx, ui),
-        Pane::BasinMap => basin::show(cx, ui),
-        Pane::Generate => generate::show(cx, ui),
-        Pane::Seeds => seeds::show(cx, ui),
-        Pane::Masks => masks::show(cx, ui),
-        Pane::Layers => layers::show(cx, ui),
-        Pane::Poses => poses::show(cx, ui),
-        Pane::Ledger => ledger::show(cx, ui),
-        Pane::Metrics => metrics::show(cx, ui),
-        Pane::Table => table::show(cx, ui),
-        Pane::Results => results::show(cx, ui),
-        Pane::Log => log::show(cx, ui),
-        Pane::Settings => settings_pane::show(cx, ui),
+        Pane::SceneMeasured | Pane::ScenePredicted => scene::show(cx, ui, &mut of.scene, pane),
+        Pane::TimeMachine => timemachine::show(cx, ui, &mut of.timemachine, pane),
+        Pane::BasinMap => basin::show(cx, ui, &mut (), pane),
+        Pane::Generate => generate::show(cx, ui, &mut (), pane),
+        Pane::Seeds => seeds::show(cx, ui, &mut (), pane),
+        Pane::Masks => masks::show(cx, ui, &mut (), pane),
+        Pane::Layers => layers::show(cx, ui, &mut (), pane),
+        Pane::Poses => poses::show(cx, ui, &mut (), pane),
+        Pane::Ledger => ledger::show(cx, ui, &mut (), pane),
+        Pane::Metrics => metrics::show(cx, ui, &mut of.metrics, pane),
+        Pane::Table => table::show(cx, ui, &mut of.table, pane),
+        Pane::Results => results::show(cx, ui, &mut (), pane),
+        Pane::Log => log::show(cx, ui, &mut (), pane),
+        Pane::Settings => settings_pane::show(cx, ui, &mut (), pane),
     }
 }
 
 /// The help mark of a pane, if it has mouse controls of its own.
 fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
     match pane {
-        Pane::Measured | Pane::Predicted if cx.local.visible.contains(&Pane::Masks) => {
+        Pane::Measured | Pane::Predicted if cx.state.selection.panes.contains(&Pane::Masks) => {
             help::mark(ui, title(pane), help::PAINT);
         }
         Pane::GelRaw | Pane::GelReference | Pane::GelDifference | Pane::Measured | Pane::Predicted | Pane::Error => {
@@ -127,6 +153,8 @@ fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
 pub(super) struct Docking<'a, 'b> {
     /// What the panes get.
     pub cx: &'b mut Cx<'a>,
+    /// The panes.
+    pub panes: &'b mut Panes,
     /// Whether a person moved something.
     pub edited: bool,
 }
@@ -135,7 +163,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
         let rect = ui.max_rect();
         ui.painter().rect_filled(rect, 0.0, self.cx.p.panel);
-        show(self.cx, ui, *pane);
+        show(self.cx, ui, self.panes, *pane);
         UiResponse::None
     }
 
@@ -155,7 +183,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
         match tiles.get(tile) {
             Some(Tile::Pane(pane)) => {
                 if response.double_clicked() {
-                    self.cx.local.maximized = Some(*pane);
+                    self.panes.maximized = Some(*pane);
                 }
                 response.on_hover_text(format!("{}. Drag to move, double-click to maximize", tooltip(*pane)))
             }
@@ -181,7 +209,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
         let square = egui::Rect::from_center_size(response.rect.center(), vec2(8.0, 8.0));
         ui.painter().rect_stroke(square, 1.0, Stroke::new(1.25, color), egui::StrokeKind::Inside);
         if response.on_hover_text("Let this pane fill the window (`)").clicked() {
-            self.cx.local.maximized = Some(*pane);
+            self.panes.maximized = Some(*pane);
         }
         help_mark(self.cx, ui, *pane);
     }
@@ -236,7 +264,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
 }
 
 /// One pane over the whole window, with the way back.
-pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
     let full = ui.available_rect_before_wrap();
     ui.painter().rect_filled(full, 0.0, cx.p.frame);
     let bar = egui::Rect::from_min_size(full.min, vec2(full.width(), 26.0));
@@ -245,7 +273,7 @@ pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
             ui.label(super::theme::title(title(pane)));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.button(RichText::new("Back to all panes").size(SMALL)).on_hover_text("` or Esc").clicked() {
-                    cx.local.maximized = None;
+                    panes.maximized = None;
                 }
                 help_mark(cx, ui, pane);
             });
@@ -255,7 +283,7 @@ pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
     ui.scope_builder(egui::UiBuilder::new().max_rect(rest), |ui| {
         ui.set_clip_rect(rest);
         ui.painter().rect_filled(rest, 0.0, cx.p.panel);
-        show(cx, ui, pane);
+        show(cx, ui, panes, pane);
     });
     ui.advance_cursor_after_rect(full);
 }

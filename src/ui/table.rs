@@ -5,10 +5,10 @@ use eframe::egui::{self, Align2, Color32, FontId, RichText, Role, ScrollArea, Se
 use super::browser::review_color;
 use super::cx::Cx;
 use super::scene::error_color;
-use super::theme::{SMALL, caption};
+use super::theme::{Palette, SMALL, caption};
 use super::widget::empty;
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, Pane};
 use crate::app::document::Review;
 use crate::app::figures::PairFigures;
 use crate::app::state::State;
@@ -42,8 +42,20 @@ struct Row {
     by_hand: [bool; 2],
 }
 
+/// The order of the rows.
+pub(super) struct Memory {
+    /// The column sorted by, and whether downwards.
+    sort: (usize, bool),
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self { sort: (4, false) }
+    }
+}
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         let mut rows = rows(cx.state);
@@ -59,10 +71,10 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
             return;
         }
-        let (column, down) = cx.local.table_sort;
+        let (column, down) = memory.sort;
         sort(&mut rows, column, down);
         summary(cx, ui, &rows);
-        header(cx, ui);
+        header(cx.p, ui, memory);
         ui.spacing_mut().item_spacing.y = 0.0;
         let n = rows.len();
         ScrollArea::vertical().auto_shrink(false).id_salt("table").show_rows(ui, ROW, n, |ui, range| {
@@ -154,15 +166,15 @@ fn columns(left: f32, width: f32) -> [(f32, f32); 8] {
     })
 }
 
-fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
+fn header(p: &Palette, ui: &mut Ui, memory: &mut Memory) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
-    ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, cx.p.line));
-    let (column, down) = cx.local.table_sort;
+    ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, p.line));
+    let (column, down) = memory.sort;
     for (i, ((name, _, number, tip), (x, w))) in COLUMNS.iter().zip(columns(rect.left(), rect.width())).enumerate() {
         let cell = egui::Rect::from_min_size(pos2(x, rect.top()), vec2(w, ROW));
         let response = ui.interact(cell, ui.scope_id().with(("column", i)), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Sort by {name}")));
-        let color = if i == column || response.hovered() { cx.p.strong } else { cx.p.weak };
+        let color = if i == column || response.hovered() { p.strong } else { p.weak };
         let font = FontId::new(SMALL, super::theme::medium());
         let (at, anchor) = if *number {
             (pos2(cell.right() - 14.0, cell.center().y), Align2::RIGHT_CENTER)
@@ -178,7 +190,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         if response.on_hover_text(format!("{tip}. Click to sort; again to turn round")).clicked() {
             // Worst first: small PSNR and SSIM, large errors.
-            cx.local.table_sort = if i == column { (i, !down) } else { (i, i >= 5) };
+            memory.sort = if i == column { (i, !down) } else { (i, i >= 5) };
         }
     }
 }

@@ -3,7 +3,7 @@
 use eframe::egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, UiBuilder, pos2, vec2};
 use glam::DVec3;
 
-use super::nearest;
+use super::{Memory, nearest};
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::workbench::{Picked, SceneTool, WorkbenchCommand};
@@ -15,13 +15,13 @@ use crate::ui::theme::{SMALL, caption};
 use crate::work::cloud::Clouds;
 
 /// What a click does.
-pub(super) fn click(cx: &mut Cx<'_>, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
+pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let tool = cx.state.workbench.tool;
     if !output.response.clicked() || tool == SceneTool::Pose {
         return;
     }
     let Some(pointer) = output.pointer else { return };
-    let camera = &cx.local.scenes[source as usize].camera;
+    let camera = &memory.views[source as usize].camera;
     let hit = nearest(clouds, camera, output.size, pointer).and_then(|(finger, index)| {
         let cloud = clouds.finger(finger)?;
         Some((finger, *cloud.points.get(index)?, *cloud.pixels.get(index)?))
@@ -39,7 +39,7 @@ pub(super) fn click(cx: &mut Cx<'_>, source: ImprintSource, output: &SceneOutput
 }
 
 /// The measurement: its points, the lines between them, and the number.
-pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput) {
+pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput) {
     let bench = &cx.state.workbench;
     let rect = output.response.rect;
     let painter = ui.painter_at(rect);
@@ -55,7 +55,7 @@ pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneO
         label(pos2(rect.center().x - 90.0, rect.bottom() - 34.0), text, cx.p.text);
     }
     let points: Vec<DVec3> = bench.marks.iter().filter(|(of, _)| *of == source).map(|(_, p)| *p).collect();
-    let camera = &cx.local.scenes[source as usize].camera;
+    let camera = &memory.views[source as usize].camera;
     let places: Vec<Option<Pos2>> = points.iter().map(|p| output.on_screen(camera, *p)).collect();
     let color = cx.p.strong;
     for pair in places.windows(2) {
