@@ -21,6 +21,7 @@ pub mod inspect;
 pub mod jobs;
 pub mod keys;
 pub mod library;
+pub mod pane;
 pub mod results;
 pub mod runtime;
 pub mod seeds;

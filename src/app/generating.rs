@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::command::Pane;
 use super::jobs::PreviewWish;
 use super::keys::{ImprintSource, PredictionKey, TouchKey};
+use super::pane::Need;
 use super::results::Preview;
 use super::state::State;
 use crate::domain::rig::PadId;
@@ -39,7 +39,7 @@ impl State {
 
     /// What of a prediction under way would be looked at: the predicted imprints on screen, unless a pen is on them.
     pub fn preview_wish(&self) -> PreviewWish {
-        let shown = self.is_visible(&[Pane::Predicted]) && self.document.stroke.is_none();
+        let shown = self.needs(Need::Imprint(ImprintSource::Predicted)) && self.document.stroke.is_none();
         let touches = match self.pair_key().filter(|_| shown) {
             Some(pair) => self.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
             None => Default::default(),

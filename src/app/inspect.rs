@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::command::Pane;
 use super::keys::{BasinKey, ImprintSource, PairKey, PoseBits, PoseEngine, Request, RunKey};
+use super::pane::Need;
 use super::state::{Absent, Lookup, State};
 use super::workbench::Layer;
 use crate::domain::align::basin::{Basin, Plane};
@@ -14,9 +14,6 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::inspect::Counterparts;
 use crate::domain::pose::ToolModel;
 use crate::work::pose::PoseResult;
-
-/// Panes that show a recorded run or the map of starts.
-pub const INSPECT_PANES: [Pane; 2] = [Pane::TimeMachine, Pane::BasinMap];
 
 /// What of a registration is looked at. Not kept between runs of the program.
 #[derive(Clone, Debug, PartialEq)]
@@ -315,12 +312,8 @@ impl State {
 
     /// Whether something on screen shows a step of an imprint's registration.
     pub fn shows_steps(&self, source: ImprintSource) -> bool {
-        let scene = match source {
-            ImprintSource::Measured => Pane::SceneMeasured,
-            ImprintSource::Predicted => Pane::ScenePredicted,
-        };
-        let lines = self.workbench.layer == Layer::Correspondences && self.selection.panes.contains(&scene);
-        self.inspect.source == source && (lines || self.selection.panes.contains(&Pane::TimeMachine))
+        let lines = self.workbench.layer == Layer::Correspondences && self.needs(Need::Scene(source));
+        self.inspect.source == source && (lines || self.needs(Need::Steps))
     }
 
     /// The step that the 3D view of a side shows instead of the registered pose.

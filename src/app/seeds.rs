@@ -1,7 +1,7 @@
 //! Several seeds of one touch: which, what is there of them, and what is missing.
 
-use super::command::Pane;
 use super::keys::{CloudKey, EnsembleKey, ImprintKey, MaskKey, MaskVersion, PoseKey, PredictionKey, Request};
+use super::pane::Need;
 use super::state::{Absent, Lookup, State};
 use crate::domain::ensemble::seeds;
 use crate::domain::grid::DepthMap;
@@ -150,7 +150,7 @@ impl State {
     /// What the pane of the seeds shows and is not there, most urgent first.
     pub(super) fn wanted_seeds(&self) -> Vec<Request> {
         let mut list = Vec::new();
-        if !self.selection.panes.contains(&Pane::Seeds) || self.sample().ready().is_none() {
+        if !self.needs(Need::Seeds) || self.sample().ready().is_none() {
             return list;
         }
         let posed = self.seed_pose_absent().is_none();

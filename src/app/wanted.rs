@@ -4,12 +4,11 @@ mod chain;
 
 use std::sync::Arc;
 
-use super::command::Pane;
-use super::inspect::INSPECT_PANES;
 use super::keys::{
     CloudKey, ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, PairKey, PoseKey, PredictionKey, Request,
     TouchKey,
 };
+use super::pane::Need;
 use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use super::workbench::PoseOf;
@@ -447,41 +446,27 @@ impl State {
     /// Whether the cloud of an imprint is needed for the 3D views and what lies beside them (with its pose), and
     /// whether it is needed at all.
     pub(super) fn shows_cloud(&self, source: ImprintSource) -> (bool, bool) {
-        let (own, other) = match source {
-            ImprintSource::Measured => (Pane::SceneMeasured, Pane::ScenePredicted),
-            ImprintSource::Predicted => (Pane::ScenePredicted, Pane::SceneMeasured),
+        let other = match source {
+            ImprintSource::Measured => ImprintSource::Predicted,
+            ImprintSource::Predicted => ImprintSource::Measured,
         };
-        let layers = self.is_visible(&[Pane::Layers]) && self.workbench.side == source;
-        let both = self.workbench.both_clouds && self.is_visible(&[other]);
-        let scene = layers || both || self.is_visible(&[own, Pane::Metrics, Pane::Poses]);
-        (scene, scene || (self.is_visible(&INSPECT_PANES) && self.inspect.source == source))
+        let layers = self.needs(Need::Layers) && self.workbench.side == source;
+        let both = self.workbench.both_clouds && self.needs(Need::Scene(other));
+        let scene = layers || both || self.needs(Need::Scene(source)) || self.needs(Need::Poses);
+        let inspected = self.inspect.source == source && (self.needs(Need::Steps) || self.needs(Need::Basin));
+        (scene, scene || inspected)
     }
 
-    pub(super) fn is_visible(&self, panes: &[Pane]) -> bool {
-        panes.iter().any(|pane| self.selection.panes.contains(pane))
+    /// Whether a pane on screen needs something.
+    pub(super) fn needs(&self, need: Need) -> bool {
+        self.selection.panes.iter().any(|pane| pane.needs().contains(&need))
+    }
+
+    /// Whether a pane on screen shows something of the selected pair.
+    fn shows_pair(&self) -> bool {
+        self.selection.panes.iter().any(|pane| pane.is_of_pair())
     }
 }
-
-/// Panes that show something of the selected pair.
-const PAIR_PANES: [Pane; 17] = [
-    Pane::GelRaw,
-    Pane::GelReference,
-    Pane::GelDifference,
-    Pane::Measured,
-    Pane::Predicted,
-    Pane::Error,
-    Pane::SceneMeasured,
-    Pane::ScenePredicted,
-    Pane::TimeMachine,
-    Pane::BasinMap,
-    Pane::Generate,
-    Pane::Seeds,
-    Pane::Masks,
-    Pane::Layers,
-    Pane::Poses,
-    Pane::Ledger,
-    Pane::Metrics,
-];
 
 /// Collects what is missing.
 struct Wanted<'a> {
@@ -503,7 +488,7 @@ impl Wanted<'_> {
     fn selection(&mut self) {
         let state = self.state;
         let Some(pair) = state.pair_key() else { return };
-        if !state.is_visible(&PAIR_PANES) {
+        if !state.shows_pair() {
             return;
         }
         self.sample(pair);
@@ -516,8 +501,8 @@ impl Wanted<'_> {
         let shown = state.fingers();
         for finger in state.rig().pads() {
             let on_screen = shown.contains(&finger);
-            let image = state.is_visible(&[Pane::Predicted]) && on_screen;
-            let compared = state.is_visible(&[Pane::Error, Pane::Metrics]) && on_screen;
+            let image = state.needs(Need::Imprint(predicted)) && on_screen;
+            let compared = state.needs(Need::Comparison) && on_screen;
             if image || compared || cloud_predicted {
                 self.stored(finger, pair.finger(finger));
                 self.imprint(finger, pair.finger(finger));
@@ -528,14 +513,14 @@ impl Wanted<'_> {
             if compared {
                 self.comparison(finger, pair.finger(finger));
             }
-            if image || (on_screen && state.is_visible(&[Pane::Metrics])) {
+            if on_screen && state.needs(Need::Ambiguity) {
                 self.ambiguity(finger, pair.finger(finger));
             }
-            let drawn = on_screen && (state.settings.mask_visible || state.is_visible(&[Pane::Masks]));
-            if cloud_measured || (drawn && state.is_visible(&[Pane::Measured])) {
+            let drawn = on_screen && (state.settings.mask_visible || state.needs(Need::Masks));
+            if cloud_measured || (drawn && state.needs(Need::Imprint(measured))) {
                 self.mask(measured, finger);
             }
-            if cloud_predicted || (drawn && state.is_visible(&[Pane::Predicted])) {
+            if cloud_predicted || (drawn && state.needs(Need::Imprint(predicted))) {
                 self.mask(predicted, finger);
             }
         }
@@ -551,7 +536,7 @@ impl Wanted<'_> {
             }
             self.inspection();
         }
-        if state.is_visible(&[Pane::Metrics, Pane::Ledger]) {
+        if state.needs(Need::Ledger) {
             self.ledger(pair.finger(state.selection.finger));
         }
     }
@@ -665,7 +650,7 @@ impl Wanted<'_> {
                 false => self.ask(state.results.inspections.contains(&key), Request::Run(key)),
             }
         }
-        if state.is_visible(&[Pane::BasinMap])
+        if state.needs(Need::Basin)
             && let Ok(Some(key)) = state.basin_key()
         {
             self.ask(state.results.basins.contains(&key), Request::Basin(key));
@@ -678,7 +663,7 @@ impl Wanted<'_> {
         if state.tool().ready().is_none() || state.cloud(source).ready().is_none() {
             return;
         }
-        if state.is_visible(&[Pane::Poses]) {
+        if state.needs(Need::FingerPoses) {
             for key in
                 PoseOf::all(&state.rig()).into_iter().filter_map(|of| state.pose_key_of(source, of).ok().flatten())
             {
@@ -705,7 +690,7 @@ impl Wanted<'_> {
 
     fn thumbnails(&mut self) {
         let state = self.state;
-        let Some(open) = state.library.open.as_ref().filter(|_| state.is_visible(&[Pane::Browser])) else {
+        let Some(open) = state.library.open.as_ref().filter(|_| state.needs(Need::Thumbnails)) else {
             return;
         };
         let end = state.library.rows.end.min(state.library.order.len());
@@ -721,7 +706,7 @@ impl Wanted<'_> {
         let (Some(open), Some(selected)) = (state.library.open.as_ref(), state.selection.pair) else {
             return;
         };
-        if !state.is_visible(&PAIR_PANES) {
+        if !state.shows_pair() {
             return;
         }
         let Some(row) = state.library.row_of(selected) else {

@@ -5,8 +5,8 @@
 use glam::DVec3;
 use strum::EnumIter;
 
-use super::command::Pane;
 use super::keys::{ImprintSource, PairKey, PoseKey, Request, RunKey};
+use super::pane::Need;
 use super::state::{Lookup, State};
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::{AcceptedPose, HandAxis, HandCost, HandPose, PoseDifference};
@@ -278,15 +278,11 @@ impl State {
 
     /// Whether something on screen shows the layers of an imprint.
     pub fn shows_layers(&self, source: ImprintSource) -> bool {
-        let scene = match source {
-            ImprintSource::Measured => Pane::SceneMeasured,
-            ImprintSource::Predicted => Pane::ScenePredicted,
-        };
         let bench = &self.workbench;
-        let in_scene = self.selection.panes.contains(&scene)
+        let in_scene = self.needs(Need::Scene(source))
             && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
                 || bench.picked.is_some_and(|picked| picked.source == source));
-        in_scene || (self.selection.panes.contains(&Pane::Layers) && bench.side == source)
+        in_scene || (self.needs(Need::Layers) && bench.side == source)
     }
 
     /// The recipe of the pose from one finger or both; `Ok(None)` while something is not there yet.

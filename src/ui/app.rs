@@ -21,6 +21,7 @@ use crate::app::command::{Command, Pane, UiRequest};
 use crate::app::evaluation::EvaluateCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
+use crate::app::pane::Kind;
 use crate::app::runtime::Runtime;
 use crate::app::services::SharedServices;
 use crate::app::settings::{Theme, Workspace};
@@ -234,23 +235,16 @@ impl StudioApp {
             UiRequest::PickExportFolder => self.shared.dialogs.open(Purpose::Export, ctx),
             UiRequest::Camera(preset) => {
                 // The view under the pointer turns; linked cameras turn together.
-                let only = match (self.panes.hovered, self.state.settings.cameras_linked) {
-                    (Some(Pane::SceneMeasured), false) => Some(ImprintSource::Measured),
-                    (Some(Pane::ScenePredicted), false) => Some(ImprintSource::Predicted),
-                    _ => None,
-                };
+                let over = self.panes.hovered.filter(|pane| matches!(pane.kind(), Kind::Scene(_)));
+                let only = over.and_then(Pane::side).filter(|_| !self.state.settings.cameras_linked);
                 self.panes.memories.scene.look_from(only, preset);
             }
             UiRequest::Fit => {
                 let memories = &mut self.panes.memories;
-                match self.panes.hovered {
-                    Some(Pane::SceneMeasured | Pane::ScenePredicted) => memories.scene.fit(),
-                    Some(Pane::GelRaw | Pane::GelReference | Pane::GelDifference) => {
-                        memories.images.fit(Some(SensorKind::Color));
-                    }
-                    Some(Pane::Measured | Pane::Predicted | Pane::Error) => {
-                        memories.images.fit(Some(SensorKind::Depth));
-                    }
+                match self.panes.hovered.map(Pane::kind) {
+                    Some(Kind::Scene(_)) => memories.scene.fit(),
+                    Some(Kind::Color) => memories.images.fit(Some(SensorKind::Color)),
+                    Some(Kind::Imprint(_) | Kind::Error) => memories.images.fit(Some(SensorKind::Depth)),
                     _ => {
                         memories.images.fit(None);
                         memories.scene.fit();
@@ -297,7 +291,7 @@ impl StudioApp {
     fn show_pane(&mut self, pane: Pane) {
         let own = self.state.settings.workspace;
         let all = std::iter::once(own).chain(Workspace::iter());
-        let Some(workspace) = all.into_iter().find(|w| layout::panes_of(*w).contains(&pane)) else { return };
+        let Some(workspace) = all.into_iter().find(|w| pane.dock(*w).is_some()) else { return };
         if workspace != own {
             self.inbox.push(Command::SetWorkspace(workspace));
         }

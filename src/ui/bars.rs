@@ -81,10 +81,10 @@ fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
     let (response, _) = egui::containers::menu::MenuButton::new("View").ui(ui, |ui| {
         ui.set_min_width(200.0);
         ui.label(caption("Panes of this workspace", cx.p));
-        for pane in super::layout::panes_of(cx.state.settings.workspace) {
-            let Some(id) = tree.tiles.find_pane(pane) else { continue };
+        for pane in Pane::of(cx.state.settings.workspace) {
+            let Some(id) = tree.tiles.find_pane(&pane) else { continue };
             let mut shown = tree.is_visible(id);
-            if ui.checkbox(&mut shown, super::pane::title(*pane)).on_hover_text("Show or hide this pane").changed() {
+            if ui.checkbox(&mut shown, pane.title()).on_hover_text("Show or hide this pane").changed() {
                 tree.set_visible(id, shown);
                 edited = true;
             }

@@ -359,7 +359,7 @@ fn gel_image(
     };
     let Some(touch) = cx.state.touch_key(finger) else { return };
     let mut view = memory.gel_view;
-    let label = format!("{} {}", super::pane::title(pane), cx.state.finger_name(finger));
+    let label = format!("{} {}", pane.title(), cx.state.finger_name(finger));
     let canvas = ImageCanvas {
         label: &label,
         size: image.size(),
@@ -385,7 +385,7 @@ fn gel_image(
         if let (Some(v), Some((x, y))) = (value, output.map.pixel(px)) {
             cx.shared.readout = Some(format!(
                 "{} {} ({x}, {y})   R {:.1}  G {:.1}  B {:.1} of 255",
-                super::pane::title(pane),
+                pane.title(),
                 cx.state.finger_name(finger),
                 v[0],
                 v[1],
@@ -461,7 +461,7 @@ fn depth_pane(
         && cx.state.document.is_editable(cx.state.pair_name());
     let primary = if paintable { Primary::Caller } else { Primary::Pan };
     let mut view = memory.bubble_view;
-    let label = format!("{} {}", super::pane::title(pane), cx.state.finger_name(finger));
+    let label = format!("{} {}", pane.title(), cx.state.finger_name(finger));
     let canvas = ImageCanvas { label: &label, size: depth.size(), rotated: false, primary, background: cx.p.canvas };
     let output = canvas.show(ui, &mut view);
     memory.bubble_view = view;
@@ -516,7 +516,7 @@ fn preview_image(
 ) -> Option<Histogram> {
     let pane = Pane::Predicted;
     let mut view = memory.bubble_view;
-    let label = format!("{} {}, preview", super::pane::title(pane), cx.state.finger_name(finger));
+    let label = format!("{} {}, preview", pane.title(), cx.state.finger_name(finger));
     let canvas = ImageCanvas {
         label: &label,
         size: preview.picture.depth.size(),
@@ -583,7 +583,7 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
 fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, depth: &DepthMap, px: [f32; 2]) {
     let Some((x, y)) = output.map.pixel(px) else { return };
     let Some(v) = depth.get(x, y).copied() else { return };
-    let name = super::pane::title(pane);
+    let name = pane.title();
     let note = scale_note(cx.state);
     let note = if note.is_empty() { String::new() } else { format!(" ({note})") };
     cx.shared.readout = Some(if v.is_finite() {

@@ -1,95 +1,32 @@
-//! The docked panes: titles, title bars, and which function draws which.
+//! The docked panes: their memories, title bars, and how they behave in their tree.
 
 use std::collections::BTreeSet;
 
 use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetText, vec2};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles, UiResponse};
 
-use super::cx::Cx;
+use super::cx::{Cx, side_color};
 use super::theme::{SMALL, medium};
-use super::timemachine;
 use super::widget::help;
-use super::{
-    basin, browser, generate, images, layers, ledger, log, masks, metrics, poses, results, scene, seeds, settings_pane,
-    table,
-};
-use crate::app::command::Pane;
-use crate::app::keys::ImprintSource;
+use crate::app::pane::{Kind, Pane, panes};
 
-/// The title of a pane.
-pub(super) fn title(pane: Pane) -> &'static str {
-    match pane {
-        Pane::Browser => "Samples",
-        Pane::GelRaw => "GelSlim raw",
-        Pane::GelReference => "GelSlim reference",
-        Pane::GelDifference => "GelSlim difference",
-        Pane::Measured => "Measured imprint",
-        Pane::Predicted => "Predicted imprint",
-        Pane::Error => "Error",
-        Pane::SceneMeasured => "3D measured",
-        Pane::ScenePredicted => "3D predicted",
-        Pane::TimeMachine => "Time machine",
-        Pane::BasinMap => "Basin map",
-        Pane::Generate => "Generate",
-        Pane::Seeds => "Seeds",
-        Pane::Masks => "Mask",
-        Pane::Layers => "Layers",
-        Pane::Poses => "Poses",
-        Pane::Ledger => "Depth chain",
-        Pane::Metrics => "Figures",
-        Pane::Table => "All figures",
-        Pane::Results => "Results",
-        Pane::Log => "Log",
-        Pane::Settings => "Settings",
-    }
-}
+macro_rules! views {
+    ($( $file:ident { $( $pane:ident $row:tt )* } )*) => {
+        /// What each file that draws panes keeps from one frame to the next.
+        #[derive(Default)]
+        pub(super) struct Memories {
+            $( pub $file: super::$file::Memory, )*
+        }
 
-/// What a pane shows, for the tooltip of its title.
-fn tooltip(pane: Pane) -> &'static str {
-    match pane {
-        Pane::Browser => "The pairs of what is open",
-        Pane::GelRaw => "The GelSlim image during the touch, rotated to line up with the bubble",
-        Pane::GelReference => "The GelSlim image without contact, rotated to line up with the bubble",
-        Pane::GelDifference => "Touched minus untouched, around mid gray: what the generator sees",
-        Pane::Measured => "What the Soft Bubble measured; dashed: what the GelSlim sees of it",
-        Pane::Predicted => "What the generator predicts from the GelSlim image, in the same colors",
-        Pane::Error => "Predicted minus measured: blue too shallow, red too deep",
-        Pane::SceneMeasured => "The measured surface on the CAD model, grasp frame",
-        Pane::ScenePredicted => "The predicted surface on the CAD model, grasp frame",
-        Pane::TimeMachine => "The steps of a registration, forwards and backwards",
-        Pane::BasinMap => "Where starts lead; a click on one loads its run into the time machine",
-        Pane::Generate => "Predicts the Soft Bubble imprint",
-        Pane::Seeds => "Several predictions of the touch: where they disagree, and how their poses fan out",
-        Pane::Masks => "Corrects the contact mask",
-        Pane::Layers => "Residuals, drop reasons, distances both ways and the weak direction of a registration",
-        Pane::Poses => "Truth, measurement and prediction against each other, per finger and joint",
-        Pane::Ledger => "Everything between the decoder and the meters, stage by stage",
-        Pane::Metrics => "The figures of this pair",
-        Pane::Table => "The figures of all pairs so far",
-        Pane::Results => "The paper's results table of the open data set",
-        Pane::Log => "What happened",
-        Pane::Settings => "Preferences",
-    }
+        /// Draws a pane.
+        fn draw(cx: &mut Cx<'_>, ui: &mut Ui, memories: &mut Memories, pane: Pane) {
+            match pane {
+                $( $( Pane::$pane )|* => super::$file::show(cx, ui, &mut memories.$file, pane), )*
+            }
+        }
+    };
 }
-
-fn side(pane: Pane) -> Option<ImprintSource> {
-    match pane {
-        Pane::Measured | Pane::SceneMeasured => Some(ImprintSource::Measured),
-        Pane::Predicted | Pane::ScenePredicted => Some(ImprintSource::Predicted),
-        _ => None,
-    }
-}
-
-/// What each file that draws panes keeps from one frame to the next.
-#[derive(Default)]
-pub(super) struct Memories {
-    pub browser: browser::Memory,
-    pub images: images::Memory,
-    pub scene: scene::Memory,
-    timemachine: timemachine::Memory,
-    metrics: metrics::Memory,
-    table: table::Memory,
-}
+panes!(views);
 
 /// The panes of the window.
 #[derive(Default)]
@@ -110,43 +47,20 @@ fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
     if ui.rect_contains_pointer(ui.max_rect()) {
         panes.hovered = Some(pane);
     }
-    let of = &mut panes.memories;
-    match pane {
-        Pane::Browser => browser::show(cx, ui, &mut of.browser, pane),
-        Pane::GelRaw | Pane::GelReference | Pane::GelDifference | Pane::Measured | Pane::Predicted | Pane::Error => {
-            images::show(cx, ui, &mut of.images, pane)
-        }
-        Pane::SceneMeasured | Pane::ScenePredicted => scene::show(cx, ui, &mut of.scene, pane),
-        Pane::TimeMachine => timemachine::show(cx, ui, &mut of.timemachine, pane),
-        Pane::BasinMap => basin::show(cx, ui, &mut (), pane),
-        Pane::Generate => generate::show(cx, ui, &mut (), pane),
-        Pane::Seeds => seeds::show(cx, ui, &mut (), pane),
-        Pane::Masks => masks::show(cx, ui, &mut (), pane),
-        Pane::Layers => layers::show(cx, ui, &mut (), pane),
-        Pane::Poses => poses::show(cx, ui, &mut (), pane),
-        Pane::Ledger => ledger::show(cx, ui, &mut (), pane),
-        Pane::Metrics => metrics::show(cx, ui, &mut of.metrics, pane),
-        Pane::Table => table::show(cx, ui, &mut of.table, pane),
-        Pane::Results => results::show(cx, ui, &mut (), pane),
-        Pane::Log => log::show(cx, ui, &mut (), pane),
-        Pane::Settings => settings_pane::show(cx, ui, &mut (), pane),
-    }
+    draw(cx, ui, &mut panes.memories, pane);
 }
 
 /// The help mark of a pane, if it has mouse controls of its own.
 fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
-    match pane {
-        Pane::Measured | Pane::Predicted if cx.state.selection.panes.contains(&Pane::Masks) => {
-            help::mark(ui, title(pane), help::PAINT);
-        }
-        Pane::GelRaw | Pane::GelReference | Pane::GelDifference | Pane::Measured | Pane::Predicted | Pane::Error => {
-            help::mark(ui, title(pane), help::IMAGE);
-        }
-        Pane::SceneMeasured | Pane::ScenePredicted => help::mark(ui, title(pane), help::SCENE),
-        Pane::TimeMachine => help::mark(ui, title(pane), help::STEPS),
-        Pane::BasinMap => help::mark(ui, title(pane), help::BASIN),
-        _ => {}
-    }
+    let controls = match pane.kind() {
+        Kind::Form => return,
+        Kind::Imprint(_) if cx.state.selection.panes.contains(&Pane::Masks) => help::PAINT,
+        Kind::Color | Kind::Imprint(_) | Kind::Error => help::IMAGE,
+        Kind::Scene(_) => help::SCENE,
+        Kind::Steps => help::STEPS,
+        Kind::Map => help::BASIN,
+    };
+    help::mark(ui, pane.title(), controls);
 }
 
 /// How the panes behave in their tree.
@@ -168,15 +82,8 @@ impl Behavior<Pane> for Docking<'_, '_> {
     }
 
     fn tab_title_for_pane(&mut self, pane: &Pane) -> WidgetText {
-        let title = match pane {
-            // Three tabs have to fit side by side into the narrowest column.
-            Pane::GelDifference => "GelSlim diff",
-            Pane::GelRaw => "raw",
-            Pane::GelReference => "reference",
-            pane => title(*pane),
-        };
-        let color = side(*pane).map_or(self.cx.p.text, |s| super::cx::side_color(self.cx.p, s));
-        RichText::new(title).family(medium()).size(12.0).color(color).into()
+        let color = pane.side().map_or(self.cx.p.text, |side| side_color(self.cx.p, side));
+        RichText::new(pane.tab()).family(medium()).size(12.0).color(color).into()
     }
 
     fn on_tab_button(&mut self, tiles: &mut Tiles<Pane>, tile: TileId, response: egui::Response) -> egui::Response {
@@ -185,7 +92,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
                 if response.double_clicked() {
                     self.panes.maximized = Some(*pane);
                 }
-                response.on_hover_text(format!("{}. Drag to move, double-click to maximize", tooltip(*pane)))
+                response.on_hover_text(format!("{}. Drag to move, double-click to maximize", pane.tip()))
             }
             _ => response,
         }
@@ -204,7 +111,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
         ui.add_space(4.0);
         let response = ui
             .add(egui::Button::new("").frame(false).min_size(vec2(16.0, 16.0)))
-            .accessible_name(format!("Maximize {}", title(*pane)));
+            .accessible_name(format!("Maximize {}", pane.title()));
         let color = if response.hovered() { self.cx.p.strong } else { self.cx.p.weak };
         let square = egui::Rect::from_center_size(response.rect.center(), vec2(8.0, 8.0));
         ui.painter().rect_stroke(square, 1.0, Stroke::new(1.25, color), egui::StrokeKind::Inside);
@@ -270,7 +177,7 @@ pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pa
     let bar = egui::Rect::from_min_size(full.min, vec2(full.width(), 26.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar.shrink2(vec2(8.0, 0.0))), |ui| {
         ui.horizontal_centered(|ui| {
-            ui.label(super::theme::title(title(pane)));
+            ui.label(super::theme::title(pane.title()));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.button(RichText::new("Back to all panes").size(SMALL)).on_hover_text("` or Esc").clicked() {
                     panes.maximized = None;
