@@ -276,3 +276,21 @@ impl Pane {
         self.needs().iter().any(|need| *need != Need::Thumbnails)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use strum::IntoEnumIterator as _;
+
+    #[test]
+    fn every_pane_can_be_found() {
+        for workspace in Workspace::iter() {
+            assert_eq!(Pane::of(workspace)[0], Pane::Browser, "{workspace:?} begins at the left");
+        }
+        for pane in Pane::iter() {
+            assert!(!pane.places().is_empty(), "{pane:?} lies in no workspace");
+            let same = Pane::iter().filter(|other| other.title() == pane.title()).count();
+            assert_eq!(same, 1, "{pane:?} shares its title with another");
+        }
+    }
+}

@@ -1,17 +1,19 @@
 //! The image panes: GelSlim, measured and predicted imprint, error. Linked pan, zoom and cross-hair.
 
+mod paint;
+
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Color32, PointerButton, Rect, TextureId, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{Align2, Color32, Rect, Ui, UiBuilder, pos2, vec2};
 
 use super::cx::{Cx, side_color};
 use super::theme::Palette;
 use super::widget::colorbar::{self, Asked, Colorbar};
+use super::widget::empty;
 use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, ViewTransform, shows_squares};
-use super::widget::texture::{Histogram, Memo, depth_image, difference_gain, mask_image, outline, rgb_image};
-use super::widget::{brush_cursor, empty};
+use super::widget::texture::{Histogram, Memo, depth_image, difference_gain, rgb_image};
 use crate::app::command::{Command, Hover, Pane};
-use crate::app::keys::{ImprintSource, MaskVersion, ShiftMode};
+use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::results::Preview;
 use crate::app::settings::{ColorMap as MapChoice, ColorRange, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
@@ -477,7 +479,7 @@ fn depth_pane(
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
     output.paint(texture, if stale { Color32::from_gray(130) } else { Color32::WHITE });
     if pane != Pane::Error {
-        paint_mask(cx, ui, memory, &output, source, finger);
+        paint::mask(cx, ui, memory, &output, source, finger);
     }
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
         output.dashed_rect(link.window, Color32::from_gray(235));
@@ -500,7 +502,7 @@ fn depth_pane(
         output.painter.circle_stroke(at, 6.0, eframe::egui::Stroke::new(1.5, cx.p.accent));
     }
     if paintable {
-        paint_stroke(cx, ui, memory, &output, (pane, source, finger));
+        paint::stroke(cx, ui, memory, &output, (pane, source, finger));
     }
     captions(cx, &output, pane, finger);
     histogram
@@ -595,91 +597,6 @@ fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, de
     } else {
         format!("{name} {} ({x}, {y})   no measurement", cx.state.finger_name(finger))
     });
-}
-
-/// The mask in force as a veil with an outline, or the outline alone.
-fn paint_mask(
-    cx: &mut Cx<'_>,
-    ui: &Ui,
-    memory: &mut Memory,
-    output: &CanvasOutput,
-    source: ImprintSource,
-    finger: PadId,
-) {
-    let settings = &cx.state.settings;
-    if !settings.mask_visible || ui.input(|i| i.key_down(eframe::egui::Key::X)) && !ui.ctx().egui_wants_keyboard_input()
-    {
-        return;
-    }
-    let Ok(in_force) = cx.state.mask_in_force(source, finger) else { return };
-    let key: (&MaskVersion, _) = (&in_force.version, cx.state.imprint_key(source, finger).ok());
-    // Where nobody paints the data itself is what counts: the outline says enough.
-    if !settings.mask_outline && cx.state.selection.panes.contains(&Pane::Masks) {
-        let mask = in_force.mask;
-        let slot = ("mask", source, finger);
-        let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, || (mask_image(mask, Color32::WHITE), None));
-        let texture: TextureId = picture.texture.id();
-        output.paint(texture, CONTACT.gamma_multiply(settings.mask_opacity));
-    }
-    let mask = in_force.mask;
-    let segments = memory.outlines.get(&("mask", source, finger), &key, || outline(mask));
-    output.segments(segments, Color32::from_black_alpha(110), 2.5);
-    output.segments(segments, CONTACT, 1.25);
-}
-
-/// Walks every pointer event of the frame: at a low frame rate one frame holds many moves, and a stroke must follow
-/// all of them.
-fn paint_stroke(
-    cx: &mut Cx<'_>,
-    ui: &Ui,
-    memory: &mut Memory,
-    output: &CanvasOutput,
-    (pane, source, finger): (Pane, ImprintSource, PadId),
-) {
-    use eframe::egui::Event;
-    let here = (pane, finger);
-    let tool = cx.state.settings.mask.tool;
-    let events = ui.input(|i| i.events.clone());
-    let on_top = output.response.contains_pointer() || output.response.is_pointer_button_down_on();
-    for event in events {
-        match event {
-            Event::PointerButton { pos, button, pressed: true, modifiers }
-                if matches!(button, PointerButton::Primary | PointerButton::Secondary)
-                    && on_top
-                    && !output.panning
-                    && memory.painting.is_none()
-                    && output.painter.clip_rect().contains(pos) =>
-            {
-                let erase = button == PointerButton::Secondary || modifiers.ctrl || modifiers.command;
-                memory.painting = Some(here);
-                if cx.state.selection.finger != finger {
-                    cx.push(Command::SelectFinger(finger));
-                }
-                let at_px = output.map.to_image(pos);
-                cx.push(Command::BeginStroke { finger, source, at_px, erase });
-            }
-            Event::PointerMoved(pos) if memory.painting == Some(here) => {
-                cx.push(Command::StrokeTo(output.map.to_image(pos)));
-            }
-            Event::PointerButton { pressed: false, .. } | Event::PointerGone if memory.painting == Some(here) => {
-                memory.painting = None;
-                cx.push(Command::EndStroke);
-            }
-            _ => {}
-        }
-    }
-    if let Some(pos) = output.response.hover_pos() {
-        let scroll = ui.input(|i| if i.modifiers.shift { i.smooth_scroll_delta() } else { vec2(0.0, 0.0) });
-        let amount = scroll.x + scroll.y;
-        let radius = cx.state.settings.mask.radius_px;
-        if amount != 0.0 {
-            cx.push(Command::SetBrushRadius(radius * (amount * 0.005).exp()));
-        }
-        let ctrl = ui.input(|i| i.modifiers.ctrl || i.pointer.secondary_down());
-        let erase = (tool == MaskTool::Eraser) != ctrl;
-        brush_cursor::paint(output, output.map.to_image(pos), radius, erase, Color32::WHITE);
-        ui.ctx().set_cursor_icon(eframe::egui::CursorIcon::None);
-    }
 }
 
 /// The small square in the color of a side, beside the pane's title.
