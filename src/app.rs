@@ -7,6 +7,7 @@
 //!   [`workbench`], [`evaluate`], [`settings`], [`tasks`]): its file has its commands and what they do, `state.rs` in its
 //!   folder what it keeps and how views find it.
 //! * [`results`] is the table of what is computed: each kind with its recipe, its job and its look-up in one file.
+//! * [`pane`] is the table of the panes: titles, places, which file of the window draws each and what it needs.
 //! * [`state::State::wanted`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
 //!   its lanes (files, computing, models) and answers with commands.
 //! * [`action::Action`] is the table of what a person can trigger: menus, palette and shortcut sheet are made from it.
@@ -18,6 +19,7 @@ pub mod apply;
 pub mod command;
 pub mod effect;
 pub mod evaluate;
+pub mod figures;
 pub mod follow;
 pub mod history;
 pub mod inspect;
@@ -25,6 +27,7 @@ pub mod jobs;
 pub mod keys;
 pub mod labels;
 pub mod library;
+pub mod pane;
 pub mod predict;
 pub mod results;
 pub mod runtime;

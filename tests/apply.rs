@@ -2,6 +2,7 @@
 //! thread, so that every order of events can be had on purpose.
 
 mod double;
+mod figures;
 mod generating;
 mod inspect;
 mod masks;

@@ -6,13 +6,14 @@ pub use super::follow::FollowCommand;
 pub use super::inspect::InspectCommand;
 pub use super::labels::LabelsCommand;
 pub use super::library::LibraryCommand;
+pub use super::pane::Pane;
 pub use super::predict::PredictCommand;
 pub use super::seeds::SeedsCommand;
 pub use super::services::Opened;
 pub use super::settings::SettingsCommand;
 pub use super::tasks::TasksCommand;
 pub use super::view::ViewCommand;
-pub use super::view::state::{CameraPreset, Hover, Pane, UiRequest};
+pub use super::view::state::{CameraPreset, Hover, UiRequest};
 pub use super::workbench::WorkbenchCommand;
 
 macro_rules! commands {

@@ -8,11 +8,12 @@ use super::inspect::state::Inspect;
 use super::keys::{PairKey, TouchKey};
 use super::labels::state::Document;
 use super::library::state::Library;
+use super::pane::Need;
 use super::results::Results;
 use super::seeds::state::Seeds;
 use super::settings::state::Settings;
 use super::tasks::state::{Log, Tasks};
-use super::view::state::{Pane, Selection};
+use super::view::state::Selection;
 use super::workbench::state::Workbench;
 use crate::domain::dataset::PairEntry;
 use crate::domain::rig::{PadId, Rig, Text};
@@ -95,9 +96,14 @@ impl State {
         self.pair_key() == Some(key)
     }
 
-    /// Whether one of these panes is on screen.
-    pub(super) fn is_visible(&self, panes: &[Pane]) -> bool {
-        panes.iter().any(|pane| self.selection.panes.contains(pane))
+    /// Whether a pane on screen needs something.
+    pub(super) fn needs(&self, need: Need) -> bool {
+        self.selection.panes.iter().any(|pane| pane.needs().contains(&need))
+    }
+
+    /// Whether a pane on screen shows something of the selected pair.
+    pub(super) fn shows_pair(&self) -> bool {
+        self.selection.panes.iter().any(|pane| pane.is_of_pair())
     }
 }
 

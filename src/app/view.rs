@@ -10,6 +10,7 @@ use glam::DVec3;
 
 use super::effect::Effect;
 use super::labels;
+use super::pane::Pane;
 use super::state::State;
 use crate::domain::rig::PadId;
 

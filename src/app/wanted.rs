@@ -2,12 +2,11 @@
 //!
 //! Each result says in its own file when it is asked for; here stands what is more urgent than what.
 
-use super::inspect::state::INSPECT_PANES;
 use super::keys::ImprintSource;
+use super::pane::Need;
 use super::results::labels::LabelsKey;
 use super::results::{Cached, Request};
 use super::state::State;
-use super::view::state::Pane;
 
 /// Neighbors loaded ahead on each side of the selection.
 pub const PREFETCH: usize = 4;
@@ -28,37 +27,17 @@ impl State {
     /// Whether the cloud of an imprint is needed for the 3D views and what lies beside them (with its pose), and
     /// whether it is needed at all.
     pub(super) fn shows_cloud(&self, source: ImprintSource) -> (bool, bool) {
-        let (own, other) = match source {
-            ImprintSource::Measured => (Pane::SceneMeasured, Pane::ScenePredicted),
-            ImprintSource::Predicted => (Pane::ScenePredicted, Pane::SceneMeasured),
+        let other = match source {
+            ImprintSource::Measured => ImprintSource::Predicted,
+            ImprintSource::Predicted => ImprintSource::Measured,
         };
-        let layers = self.is_visible(&[Pane::Layers]) && self.workbench.side == source;
-        let both = self.workbench.both_clouds && self.is_visible(&[other]);
-        let scene = layers || both || self.is_visible(&[own, Pane::Metrics, Pane::Poses]);
-        (scene, scene || (self.is_visible(&INSPECT_PANES) && self.inspect.source == source))
+        let layers = self.needs(Need::Layers) && self.workbench.side == source;
+        let both = self.workbench.both_clouds && self.needs(Need::Scene(other));
+        let scene = layers || both || self.needs(Need::Scene(source)) || self.needs(Need::Poses);
+        let inspected = self.inspect.source == source && (self.needs(Need::Steps) || self.needs(Need::Basin));
+        (scene, scene || inspected)
     }
 }
-
-/// Panes that show something of the selected pair.
-const PAIR_PANES: [Pane; 17] = [
-    Pane::GelRaw,
-    Pane::GelReference,
-    Pane::GelDifference,
-    Pane::Measured,
-    Pane::Predicted,
-    Pane::Error,
-    Pane::SceneMeasured,
-    Pane::ScenePredicted,
-    Pane::TimeMachine,
-    Pane::BasinMap,
-    Pane::Generate,
-    Pane::Seeds,
-    Pane::Masks,
-    Pane::Layers,
-    Pane::Poses,
-    Pane::Ledger,
-    Pane::Metrics,
-];
 
 /// Collects what is missing.
 pub(super) struct Wanted<'a> {
@@ -86,7 +65,7 @@ impl Wanted<'_> {
     fn selection(&mut self) {
         let state = self.state;
         let Some(pair) = state.pair_key() else { return };
-        if !state.is_visible(&PAIR_PANES) {
+        if !state.shows_pair() {
             return;
         }
         self.ask(pair);
@@ -98,8 +77,8 @@ impl Wanted<'_> {
         let shown = state.fingers();
         for finger in state.rig().pads() {
             let on_screen = shown.contains(&finger);
-            let image = state.is_visible(&[Pane::Predicted]) && on_screen;
-            let compared = state.is_visible(&[Pane::Error, Pane::Metrics]) && on_screen;
+            let image = state.needs(Need::Imprint(predicted)) && on_screen;
+            let compared = state.needs(Need::Comparison) && on_screen;
             if image || compared || cloud_predicted {
                 self.stored(finger, pair.finger(finger));
                 self.imprint(finger, pair.finger(finger));
@@ -110,14 +89,14 @@ impl Wanted<'_> {
             if compared {
                 self.comparison(finger, pair.finger(finger));
             }
-            if image || (on_screen && state.is_visible(&[Pane::Metrics])) {
+            if on_screen && state.needs(Need::Ambiguity) {
                 self.ambiguity(finger, pair.finger(finger));
             }
-            let drawn = on_screen && (state.settings.mask_visible || state.is_visible(&[Pane::Masks]));
-            if cloud_measured || (drawn && state.is_visible(&[Pane::Measured])) {
+            let drawn = on_screen && (state.settings.mask_visible || state.needs(Need::Masks));
+            if cloud_measured || (drawn && state.needs(Need::Imprint(measured))) {
                 self.mask(measured, finger);
             }
-            if cloud_predicted || (drawn && state.is_visible(&[Pane::Predicted])) {
+            if cloud_predicted || (drawn && state.needs(Need::Imprint(predicted))) {
                 self.mask(predicted, finger);
             }
         }
@@ -137,7 +116,7 @@ impl Wanted<'_> {
                 self.basin();
             }
         }
-        if state.is_visible(&[Pane::Metrics, Pane::Ledger]) {
+        if state.needs(Need::Ledger) {
             self.ledger(pair.finger(state.selection.finger));
         }
     }
@@ -148,7 +127,7 @@ impl Wanted<'_> {
         if state.tool().ready().is_none() || state.cloud(source).ready().is_none() {
             return;
         }
-        if state.is_visible(&[Pane::Poses]) {
+        if state.needs(Need::FingerPoses) {
             self.pose_table(source);
         }
         if let Some(run) = state.workbench.hand(source).and_then(|hand| hand.icp.clone()) {
@@ -162,7 +141,7 @@ impl Wanted<'_> {
         let (Some(open), Some(selected)) = (state.library.open.as_ref(), state.selection.pair) else {
             return;
         };
-        if !state.is_visible(&PAIR_PANES) {
+        if !state.shows_pair() {
             return;
         }
         let Some(row) = state.library.row_of(selected) else {

@@ -1,6 +1,6 @@
 //! The window: one frame from input to commands.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -10,13 +10,12 @@ use eframe::egui::{self, ThemePreference, ViewportCommand};
 use egui_tiles::Tree;
 use strum::IntoEnumIterator as _;
 
-use super::cx::{Cx, Local, SeenPose};
+use super::cx::{Cx, Shared};
 use super::dialogs::Purpose;
-use super::pane::Docking;
+use super::pane::{Docking, Panes};
 use super::scene_view::Device;
 use super::theme::{DARK, LIGHT};
-use super::widget::image_canvas::ViewTransform;
-use super::{bars, layout, log as log_pane, palette, pane, scene, shortcuts, theme};
+use super::{bars, layout, log as log_pane, palette, pane, shortcuts, theme};
 use crate::app::action::Action;
 use crate::app::command::{
     Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
@@ -24,12 +23,13 @@ use crate::app::command::{
 use crate::app::evaluate::EvaluateCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
+use crate::app::pane::Kind;
 use crate::app::runtime::Runtime;
 use crate::app::services::SharedServices;
 use crate::app::settings::{Theme, Workspace};
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
-use crate::domain::hand::PoseDifference;
+use crate::domain::rig::SensorKind;
 
 /// How the studio is started.
 pub struct Options {
@@ -60,7 +60,11 @@ pub struct StudioApp {
     state: State,
     runtime: Runtime,
     inbox: Vec<Command>,
-    local: Local,
+    shared: Shared,
+    panes: Panes,
+    palette: palette::Memory,
+    /// Time of the last frame, milliseconds.
+    frame_ms: f32,
     trees: BTreeMap<Workspace, Tree<Pane>>,
     device: Result<Device, String>,
     inline: bool,
@@ -102,7 +106,10 @@ impl StudioApp {
             state,
             runtime,
             inbox,
-            local: Local::new(options.native_dialogs),
+            shared: Shared::new(options.native_dialogs),
+            panes: Panes::default(),
+            palette: palette::Memory::default(),
+            frame_ms: 0.0,
             trees: BTreeMap::new(),
             device,
             inline: options.inline,
@@ -128,7 +135,7 @@ impl StudioApp {
 
     /// Pictures sent to the graphics card so far.
     pub fn uploads(&self) -> u64 {
-        self.local.textures.uploads
+        self.shared.textures.uploads
     }
 
     /// Whether nothing runs, nothing waits and nothing is to be executed.
@@ -138,7 +145,7 @@ impl StudioApp {
 
     /// Where a point of the grasp frame (meters) appeared in a 3D pane when it was last drawn. For tests.
     pub fn on_screen(&self, source: ImprintSource, p: [f64; 3]) -> Option<egui::Pos2> {
-        self.local.scenes[source as usize].on_screen(p.into())
+        self.panes.memories.scene.on_screen(source, p.into())
     }
 
     /// The panes of the workspace in front are arranged validly. For tests.
@@ -167,16 +174,7 @@ impl StudioApp {
             )
         }) {
             // The pen is not to be followed into another state.
-            self.local.painting = None;
-        }
-        let other_poses = |c: &Command| {
-            use SettingsCommand::{ResetSettings, SetMask, SetMaskSource, SetPoseEngine, SetShift};
-            let Command::Settings(c) = c else { return false };
-            matches!(c, SetMask(_) | SetMaskSource(_) | SetPoseEngine(_) | SetShift(_) | ResetSettings)
-        };
-        if commands.iter().any(other_poses) {
-            // Figures made in another way do not belong into the same table.
-            self.local.seen.clear();
+            self.panes.memories.images.lift_pen();
         }
         if commands.iter().any(|c| matches!(c, Command::Settings(SettingsCommand::ResetSettings))) {
             self.trees.clear();
@@ -186,7 +184,7 @@ impl StudioApp {
             _ => None,
         });
         if let Some(workspace) = switched {
-            self.local.scrolled_to = None;
+            self.panes.memories.browser.scrolled_to = None;
             commands.push(Command::View(ViewCommand::ShowBothFingers(workspace == Workspace::Label)));
         }
         requests.extend(self.runtime.tick(&mut self.state, commands));
@@ -199,9 +197,8 @@ impl StudioApp {
         for request in requests {
             self.perform(ctx, request);
         }
-        self.local.saved.observe(&self.state.document.unsaved);
+        self.shared.saved.observe(&self.state.document.unsaved);
         self.first_prediction();
-        self.remember_poses();
         let settings = &self.state.settings;
         if self.applied_theme != Some(settings.theme) {
             self.applied_theme = Some(settings.theme);
@@ -238,68 +235,31 @@ impl StudioApp {
         }
     }
 
-    /// Keeps the pose errors of the pair on screen for the table.
-    fn remember_poses(&mut self) {
-        let Some(key) = self.state.pair_key() else { return };
-        let mut seen = self.local.seen.get(&key).copied().unwrap_or_default();
-        for source in ImprintSource::iter() {
-            let at = source as usize;
-            if let Some(pose) = self.state.pose(source).ready() {
-                seen.error_rad[at] = pose.error_rad;
-                seen.angle_rad[at] = Some(pose.angle_rad);
-                // What a person set counts before what was registered.
-                let hand = self.state.by_hand(source);
-                seen.by_hand[at] = hand.is_some();
-                if let Some(hand) = hand {
-                    let off = self.state.truth().map(|truth| PoseDifference::between(hand.planar, truth));
-                    seen.error_rad[at] = off.map(|d| d.angle_rad);
-                    seen.angle_rad[at] = Some(hand.planar.inverse().theta_rad);
-                }
-            }
-        }
-        if seen != SeenPose::default() {
-            self.local.seen.insert(key, seen);
-        }
-    }
-
     /// What only the window can do.
     fn perform(&mut self, ctx: &egui::Context, request: UiRequest) {
         match request {
-            UiRequest::PickFolder => self.local.dialogs.open(Purpose::Folder, ctx),
-            UiRequest::PickFile => self.local.dialogs.open(Purpose::File, ctx),
-            UiRequest::PickTableFolder => self.local.dialogs.open(Purpose::Table, ctx),
-            UiRequest::PickExportFolder => self.local.dialogs.open(Purpose::Export, ctx),
+            UiRequest::PickFolder => self.shared.dialogs.open(Purpose::Folder, ctx),
+            UiRequest::PickFile => self.shared.dialogs.open(Purpose::File, ctx),
+            UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
+            UiRequest::PickExportFolder => self.shared.dialogs.open(Purpose::Export, ctx),
             UiRequest::Camera(preset) => {
                 // The view under the pointer turns; linked cameras turn together.
-                let only = match (self.local.hovered_pane, self.state.settings.cameras_linked) {
-                    (Some(Pane::SceneMeasured), false) => Some(ImprintSource::Measured),
-                    (Some(Pane::ScenePredicted), false) => Some(ImprintSource::Predicted),
-                    _ => None,
-                };
-                for source in ImprintSource::iter().filter(|s| only.is_none_or(|o| o == *s)) {
-                    self.local.scenes[source as usize].camera.look_from(scene::preset(preset));
+                let over = self.panes.hovered.filter(|pane| matches!(pane.kind(), Kind::Scene(_)));
+                let only = over.and_then(Pane::side).filter(|_| !self.state.settings.cameras_linked);
+                self.panes.memories.scene.look_from(only, preset);
+            }
+            UiRequest::Fit => {
+                let memories = &mut self.panes.memories;
+                match self.panes.hovered.map(Pane::kind) {
+                    Some(Kind::Scene(_)) => memories.scene.fit(),
+                    Some(Kind::Color) => memories.images.fit(Some(SensorKind::Color)),
+                    Some(Kind::Imprint(_) | Kind::Error) => memories.images.fit(Some(SensorKind::Depth)),
+                    _ => {
+                        memories.images.fit(None);
+                        memories.scene.fit();
+                    }
                 }
             }
-            UiRequest::Fit => match self.local.hovered_pane {
-                Some(Pane::SceneMeasured | Pane::ScenePredicted) => {
-                    for view in &mut self.local.scenes {
-                        view.placed = false;
-                    }
-                }
-                Some(Pane::GelRaw | Pane::GelReference | Pane::GelDifference) => {
-                    self.local.gel_view = ViewTransform::default();
-                }
-                Some(Pane::Measured | Pane::Predicted | Pane::Error) => {
-                    self.local.bubble_view = ViewTransform::default();
-                }
-                _ => {
-                    self.local.gel_view = ViewTransform::default();
-                    self.local.bubble_view = ViewTransform::default();
-                    for view in &mut self.local.scenes {
-                        view.placed = false;
-                    }
-                }
-            },
             UiRequest::ShowPane(pane) => self.show_pane(pane),
             UiRequest::Screenshot => {
                 let (sender, wake) = (self.shot_sender.clone(), ctx.clone());
@@ -315,23 +275,23 @@ impl StudioApp {
                 ctx.send_viewport_cmd(ViewportCommand::Fullscreen(!full));
             }
             UiRequest::ToggleMaximized => {
-                self.local.maximized = match self.local.maximized {
+                self.panes.maximized = match self.panes.maximized {
                     Some(_) => None,
-                    None => self.local.hovered_pane.or(Some(Pane::Measured)),
+                    None => self.panes.hovered.or(Some(Pane::Measured)),
                 };
             }
             UiRequest::ResetWorkspace => {
                 let workspace = self.state.settings.workspace;
-                self.local.maximized = None;
+                self.panes.maximized = None;
                 self.trees.insert(workspace, layout::default_tree(workspace));
                 self.store_layout(workspace);
             }
             UiRequest::CopyHovered => {
-                if let Some(text) = &self.local.readout {
+                if let Some(text) = &self.shared.readout {
                     ctx.copy_text(text.clone());
                 }
             }
-            UiRequest::FocusFilter => self.local.focus_filter = true,
+            UiRequest::FocusFilter => self.panes.memories.browser.focus_filter = true,
         }
         ctx.request_repaint();
     }
@@ -340,11 +300,11 @@ impl StudioApp {
     fn show_pane(&mut self, pane: Pane) {
         let own = self.state.settings.workspace;
         let all = std::iter::once(own).chain(Workspace::iter());
-        let Some(workspace) = all.into_iter().find(|w| layout::panes_of(*w).contains(&pane)) else { return };
+        let Some(workspace) = all.into_iter().find(|w| pane.dock(*w).is_some()) else { return };
         if workspace != own {
             self.inbox.push(Command::Settings(SettingsCommand::SetWorkspace(workspace)));
         }
-        self.local.maximized = None;
+        self.panes.maximized = None;
         if let Some(tree) = self.trees.get_mut(&workspace)
             && let Some(id) = tree.tiles.find_pane(&pane)
         {
@@ -381,36 +341,32 @@ impl eframe::App for StudioApp {
         let started = Instant::now();
         let ctx = ui.ctx().clone();
         self.outside(&ctx);
-        self.local.textures.begin_frame();
-        self.local.visible_next = BTreeSet::new();
-        self.local.readout = None;
-        self.local.hover_claimed = false;
-        self.local.hovered_before = self.local.hovered_pane.take();
+        self.shared.textures.begin_frame();
+        self.panes.drawn.clear();
+        self.shared.hover_claimed = false;
+        // Keys come before the panes.
+        let over = self.panes.hovered.take();
         let workspace = self.state.settings.workspace;
         let stored = self.state.settings.layouts.get(workspace.name());
         let mut tree = self.trees.remove(&workspace).unwrap_or_else(|| layout::restore(stored, workspace));
-        self.local.hidden = layout::panes_of(workspace)
-            .iter()
-            .copied()
-            .filter(|p| tree.tiles.find_pane(p).is_some_and(|id| !tree.is_visible(id)))
-            .collect();
         let mut out = Vec::new();
         let palette_colors = if ui.visuals().dark_mode { &DARK } else { &LIGHT };
-        let mut edited = false;
+        let mut edited;
+        let readout;
         {
             let mut cx = Cx {
                 state: &self.state,
                 out: &mut out,
-                local: &mut self.local,
+                shared: &mut self.shared,
                 device: self.device.as_ref().map_err(String::as_str),
                 p: palette_colors,
             };
             let covered =
-                cx.state.selection.palette || cx.state.selection.shortcut_sheet || cx.local.dialogs.is_path_box_open();
-            let (state, over) = (cx.state, cx.local.hovered_before);
+                cx.state.selection.palette || cx.state.selection.shortcut_sheet || cx.shared.dialogs.is_path_box_open();
+            let state = cx.state;
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
             for action in shortcuts::pressed(&ctx, covered, possible) {
-                if action == Action::CancelJobs && cx.local.maximized.take().is_some() {
+                if action == Action::CancelJobs && self.panes.maximized.take().is_some() {
                     continue;
                 }
                 match action.command(state) {
@@ -428,27 +384,25 @@ impl eframe::App for StudioApp {
                     _ => cx.act(action),
                 }
             }
-            bars::top(&mut cx, ui);
+            edited = bars::top(&mut cx, ui, &mut tree);
             // Drawn before the panes, so it shows the read-out of the frame before: at rest they are the same.
-            let readout = std::mem::take(&mut cx.local.readout_before);
-            cx.local.readout = readout;
-            bars::bottom(&mut cx, ui);
-            cx.local.readout = None;
+            bars::bottom(&mut cx, ui, self.frame_ms);
+            readout = cx.shared.readout.take();
             let frame = egui::Frame::new().fill(cx.p.frame);
-            egui::CentralPanel::default().frame(frame).show(ui, |ui| match cx.local.maximized {
-                Some(p) => pane::show_maximized(&mut cx, ui, p),
+            egui::CentralPanel::default().frame(frame).show(ui, |ui| match self.panes.maximized {
+                Some(p) => pane::show_maximized(&mut cx, ui, &mut self.panes, p),
                 None => {
-                    let mut docking = Docking { cx: &mut cx, edited: false };
+                    let mut docking = Docking { cx: &mut cx, panes: &mut self.panes, edited: false };
                     tree.ui(&mut docking, ui);
-                    edited = docking.edited;
+                    edited |= docking.edited;
                 }
             });
             bars::hint(&mut cx, &ctx);
             log_pane::notices(&mut cx, &ctx);
-            palette::show(&mut cx, &ctx);
+            palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::sheet(&mut cx, &ctx);
             bars::drop_overlay(&cx, &ctx);
-            if let Some((purpose, path)) = cx.local.dialogs.show(&ctx) {
+            if let Some((purpose, path)) = cx.shared.dialogs.show(&ctx) {
                 cx.push(match purpose {
                     Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
                     Purpose::Export => Command::Labels(LabelsCommand::ExportMasks(path)),
@@ -456,23 +410,16 @@ impl eframe::App for StudioApp {
                 });
             }
         }
-        if let Some(p) = self.local.toggle_pane.take()
-            && let Some(id) = tree.tiles.find_pane(&p)
-        {
-            let shown = tree.is_visible(id);
-            tree.set_visible(id, !shown);
-            edited = true;
-        }
         self.trees.insert(workspace, tree);
         if edited {
             self.store_layout(workspace);
         }
-        self.after_panes(&ctx, &mut out);
+        self.after_panes(&ctx, readout.as_ref(), &mut out);
         self.inbox.append(&mut out);
         if !self.inbox.is_empty() {
             ctx.request_repaint();
         }
-        self.local.frame_ms = started.elapsed().as_secs_f32() * 1e3;
+        self.frame_ms = started.elapsed().as_secs_f32() * 1e3;
     }
 
     fn on_exit(&mut self) {
@@ -488,23 +435,20 @@ impl eframe::App for StudioApp {
 }
 
 impl StudioApp {
-    /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more.
-    fn after_panes(&mut self, ctx: &egui::Context, out: &mut Vec<Command>) {
-        self.local.visible = std::mem::take(&mut self.local.visible_next);
-        if self.local.visible != self.state.selection.panes {
-            out.push(Command::View(ViewCommand::ShowPanes(self.local.visible.clone())));
+    /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more. `readout` is what the
+    /// status bar shows.
+    fn after_panes(&mut self, ctx: &egui::Context, readout: Option<&String>, out: &mut Vec<Command>) {
+        if self.panes.drawn != self.state.selection.panes {
+            out.push(Command::View(ViewCommand::ShowPanes(self.panes.drawn.clone())));
         }
-        if self.state.selection.hover.is_some() && !self.local.hover_claimed {
+        if self.state.selection.hover.is_some() && !self.shared.hover_claimed {
             out.push(Command::View(ViewCommand::HoverPixel(None)));
         }
-        if self.local.readout != self.local.readout_shown {
+        if self.shared.readout.as_ref() != readout {
             // The status bar was drawn before the pane under the pointer: once more, with the number in it.
-            self.local.readout_shown.clone_from(&self.local.readout);
             ctx.request_repaint();
         }
-        self.local.readout_before.clone_from(&self.local.readout);
-        if self.local.painting.is_some() && !ctx.input(|i| i.pointer.any_down()) {
-            self.local.painting = None;
+        if !ctx.input(|i| i.pointer.any_down()) && self.panes.memories.images.lift_pen() {
             out.push(Command::Labels(LabelsCommand::EndStroke));
         }
     }

@@ -1,6 +1,7 @@
 //! The bar at the top (workspaces, search, theme, help) and the one at the bottom (finger, read-out, jobs).
 
 use eframe::egui::{self, Align, Layout, Panel, RichText, Sense, Stroke, Ui, pos2, vec2};
+use egui_tiles::Tree;
 use strum::IntoEnumIterator as _;
 
 use super::cx::Cx;
@@ -8,12 +9,13 @@ use super::dialogs::Purpose;
 use super::theme::{SMALL, caption, medium};
 use super::widget::progress;
 use crate::app::action::Action;
-use crate::app::command::{LibraryCommand, SettingsCommand, TasksCommand, ViewCommand};
+use crate::app::command::{LibraryCommand, Pane, SettingsCommand, TasksCommand, ViewCommand};
 use crate::app::library::Place;
 use crate::app::settings::{Theme, Workspace};
 
-/// The bar at the top.
-pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui) {
+/// The bar at the top; whether it showed or hid a pane of `tree`.
+pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
+    let mut edited = false;
     let frame = egui::Frame::new().fill(cx.p.frame).inner_margin(egui::Margin::symmetric(12, 4));
     Panel::top("top").frame(frame).exact_size(36.0).resizable(false).show(ui, |ui| {
         ui.horizontal_centered(|ui| {
@@ -29,7 +31,7 @@ pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.action_button(ui, Action::ShortcutSheet, "?");
                 let dark = cx.state.settings.theme == Theme::Dark;
                 cx.action_button(ui, Action::SwitchTheme, if dark { "Light" } else { "Dark" });
-                view_menu(cx, ui);
+                edited = view_menu(cx, ui, tree);
                 let width = 190.0;
                 let text = RichText::new("Find anything").color(cx.p.weak);
                 let button = egui::Button::new(text).right_text(caption("Ctrl+P", cx.p)).min_size(vec2(width, 24.0));
@@ -40,6 +42,7 @@ pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui) {
             });
         });
     });
+    edited
 }
 
 fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -56,7 +59,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.act(Action::OpenFolder);
         }
         if ui.button("Path…").on_hover_text("Type or paste a path").clicked() {
-            cx.local.dialogs.type_path(Purpose::Folder, "");
+            cx.shared.dialogs.type_path(Purpose::Folder, "");
         }
         ui.separator();
         for action in [Action::ExportMasks, Action::Save, Action::Reload, Action::Follow] {
@@ -72,15 +75,18 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
     response.on_hover_text("Open a data set, export masks");
 }
 
-/// Shows and hides panes of the workspace.
-fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
+/// Shows and hides panes of the workspace; whether it did.
+fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
+    let mut edited = false;
     let (response, _) = egui::containers::menu::MenuButton::new("View").ui(ui, |ui| {
         ui.set_min_width(200.0);
         ui.label(caption("Panes of this workspace", cx.p));
-        for pane in super::layout::panes_of(cx.state.settings.workspace) {
-            let mut shown = !cx.local.hidden.contains(pane);
-            if ui.checkbox(&mut shown, super::pane::title(*pane)).on_hover_text("Show or hide this pane").changed() {
-                cx.local.toggle_pane = Some(*pane);
+        for pane in Pane::of(cx.state.settings.workspace) {
+            let Some(id) = tree.tiles.find_pane(&pane) else { continue };
+            let mut shown = tree.is_visible(id);
+            if ui.checkbox(&mut shown, pane.title()).on_hover_text("Show or hide this pane").changed() {
+                tree.set_visible(id, shown);
+                edited = true;
             }
         }
         ui.separator();
@@ -95,6 +101,7 @@ fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
     });
     response.on_hover_text("What is shown");
+    edited
 }
 
 /// A workspace's tab.
@@ -119,8 +126,8 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
     }
 }
 
-/// The bar at the bottom.
-pub(super) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
+/// The bar at the bottom. `frame_ms`: time of the last frame, milliseconds.
+pub(super) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui, frame_ms: f32) {
     let frame = egui::Frame::new().fill(cx.p.frame).inner_margin(egui::Margin::symmetric(12, 2));
     Panel::bottom("bottom").frame(frame).exact_size(28.0).resizable(false).show(ui, |ui| {
         ui.horizontal_centered(|ui| {
@@ -128,11 +135,11 @@ pub(super) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui) {
             fingers(cx, ui);
             ui.add_space(12.0);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                engine(cx, ui);
+                engine(cx, ui, frame_ms);
                 following(cx, ui);
                 jobs(cx, ui);
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                    let (text, color) = match &cx.local.readout {
+                    let (text, color) = match &cx.shared.readout {
                         Some(text) => (text.clone(), cx.p.text),
                         None => (cx.state.pair_name().to_owned(), cx.p.weak),
                     };
@@ -203,9 +210,9 @@ fn following(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// The runtime that made what is shown, and in debug builds how long a frame takes.
-fn engine(cx: &Cx<'_>, ui: &mut Ui) {
-    if cfg!(debug_assertions) && cx.local.frame_ms > 0.0 {
-        ui.label(caption(format!("{:.1} ms", cx.local.frame_ms), cx.p)).on_hover_text("Time of the last frame (debug)");
+fn engine(cx: &Cx<'_>, ui: &mut Ui, frame_ms: f32) {
+    if cfg!(debug_assertions) && frame_ms > 0.0 {
+        ui.label(caption(format!("{:.1} ms", frame_ms), cx.p)).on_hover_text("Time of the last frame (debug)");
         ui.add_space(8.0);
     }
     let made = cx.state.chosen(cx.state.selection.finger).and_then(|r| cx.state.results.predictions.get(r));

@@ -13,7 +13,7 @@ use super::timemachine::pose_text;
 use super::widget::colorbar::gradient;
 use super::widget::empty;
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, Pane};
 use crate::app::inspect::{BasinColor, InspectCommand};
 use crate::app::keys::PoseBits;
 use crate::app::state::Lookup;
@@ -40,8 +40,11 @@ const ENDS: [Color32; 4] = [
     Color32::from_rgb(0x9a, 0x6b, 0x3f),
 ];
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     pane_frame(cx.p).show(ui, |ui| {
         let full = ui.available_rect_before_wrap();
         ui.set_min_size(full.size());

@@ -12,7 +12,7 @@ use super::theme::{Palette, SMALL, caption};
 use super::widget::empty;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
-use crate::app::command::{Command, LibraryCommand};
+use crate::app::command::{Command, LibraryCommand, Pane};
 use crate::app::labels::Review;
 use crate::app::library::{Place, Sort};
 use crate::domain::dataset::PairId;
@@ -33,14 +33,25 @@ pub(super) fn review_color(p: &Palette, review: Review) -> Color32 {
     }
 }
 
+/// The filter being typed, and where the list was scrolled to.
+#[derive(Default)]
+pub(super) struct Memory {
+    /// The filter being typed.
+    filter: String,
+    /// Whether the filter wants the keyboard.
+    pub focus_filter: bool,
+    /// The row that the list was last scrolled to; `None` where the list is a new one.
+    pub scrolled_to: Option<Option<usize>>,
+}
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         source_menu(cx, ui);
-        filter_row(cx, ui);
+        filter_row(cx, ui, memory);
         ui.add_space(2.0);
-        list(cx, ui);
+        list(cx, ui, memory);
     });
 }
 
@@ -64,7 +75,7 @@ fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.act(Action::OpenFolder);
         }
         if ui.button("Open path…").on_hover_text("Type or paste a path").clicked() {
-            cx.local.dialogs.type_path(Purpose::Folder, "");
+            cx.shared.dialogs.type_path(Purpose::Folder, "");
         }
         let reload = ui.add_enabled(cx.state.library.open.is_some(), egui::Button::new("Reload").shortcut_text("F5"));
         if reload.on_hover_text(Action::Reload.tooltip()).clicked() {
@@ -92,21 +103,21 @@ fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
     response.on_hover_text("What is open. Click to open something else, or drop a folder on the window");
 }
 
-fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui) {
+fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         let sort_width = 74.0;
-        let edit = egui::TextEdit::singleline(&mut cx.local.filter)
+        let edit = egui::TextEdit::singleline(&mut memory.filter)
             .hint_text("Filter")
             .desired_width(ui.available_width() - sort_width - 12.0);
         let response = ui.add(edit).accessible_name("Filter samples");
-        if std::mem::take(&mut cx.local.focus_filter) {
+        if std::mem::take(&mut memory.focus_filter) {
             response.request_focus();
         }
         if response.changed() {
-            cx.out.push(Command::Library(LibraryCommand::SetFilter(cx.local.filter.clone())));
-        } else if !response.has_focus() && cx.local.filter != cx.state.library.filter {
-            cx.local.filter.clone_from(&cx.state.library.filter);
+            cx.out.push(Command::Library(LibraryCommand::SetFilter(memory.filter.clone())));
+        } else if !response.has_focus() && memory.filter != cx.state.library.filter {
+            memory.filter.clone_from(&cx.state.library.filter);
         }
         response.on_hover_text(
             "Words of the name or tool. tool:rod narrows to tools; is:todo, is:in-progress, is:flagged, is:done and \
@@ -143,7 +154,7 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
+fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     let library = &cx.state.library;
     let total = library.pairs().len();
     let shown = library.order.len();
@@ -194,9 +205,9 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.spacing_mut().item_spacing.y = spacing;
     let mut area = ScrollArea::vertical().auto_shrink(false).id_salt("pairs");
     // A step by key may leave the visible rows: follow it, once.
-    if Some(selected_row) != cx.local.scrolled_to {
-        let fresh = cx.local.scrolled_to.is_none();
-        cx.local.scrolled_to = Some(selected_row);
+    if Some(selected_row) != memory.scrolled_to {
+        let fresh = memory.scrolled_to.is_none();
+        memory.scrolled_to = Some(selected_row);
         if let Some(row) = selected_row {
             let rows = &library.rows;
             let height = ui.available_height();
@@ -289,7 +300,7 @@ fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
     let bits = (range.lo.to_bits(), range.hi.to_bits());
     let map = super::images::map_of(cx.state);
     let picture = cx
-        .local
+        .shared
         .textures
         .get(ui.ctx(), ("thumbnail", key), (bits, map), false, || (depth_image(depth, map, range), None));
     Some(picture.texture.id())

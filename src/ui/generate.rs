@@ -7,7 +7,7 @@ use super::cx::Cx;
 use super::theme::{SMALL, caption, section, value};
 use super::widget::progress;
 use crate::app::action::Action;
-use crate::app::command::{PredictCommand, SettingsCommand, TasksCommand};
+use crate::app::command::{Pane, PredictCommand, SettingsCommand, TasksCommand};
 use crate::app::keys::{ComparisonKey, PredictionKey, Preset, Sampler, ShiftMode};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::domain::diffusion::GUIDANCE;
@@ -29,8 +29,11 @@ fn row(ui: &mut Ui, weak: egui::Color32, name: &str, add: impl FnOnce(&mut Ui)) 
     });
 }
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("generate").show(ui, |ui| {

@@ -1,17 +1,19 @@
 //! The image panes: GelSlim, measured and predicted imprint, error. Linked pan, zoom and cross-hair.
 
+mod paint;
+
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Color32, PointerButton, Rect, TextureId, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{Align2, Color32, Rect, Ui, UiBuilder, pos2, vec2};
 
-use super::cx::{Cx, Painting, side_color};
+use super::cx::{Cx, side_color};
 use super::theme::Palette;
 use super::widget::colorbar::{self, Asked, Colorbar};
-use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, shows_squares};
-use super::widget::texture::{Histogram, depth_image, difference_gain, mask_image, outline, rgb_image};
-use super::widget::{brush_cursor, empty};
-use crate::app::command::{Hover, LabelsCommand, Pane, SettingsCommand, TasksCommand, ViewCommand};
-use crate::app::keys::{ImprintSource, MaskVersion, ShiftMode};
+use super::widget::empty;
+use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, ViewTransform, shows_squares};
+use super::widget::texture::{Histogram, Memo, depth_image, difference_gain, rgb_image};
+use crate::app::command::{Hover, Pane, SettingsCommand, TasksCommand, ViewCommand};
+use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::results::Preview;
 use crate::app::settings::{ColorMap as MapChoice, ColorRange, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
@@ -25,6 +27,44 @@ use crate::work::error::TaskError;
 
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
 pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
+
+/// What part of the images is seen, and what is being painted on them.
+pub(super) struct Memory {
+    /// What part of GelSlim images is seen.
+    gel_view: ViewTransform,
+    /// What part of bubble images is seen.
+    bubble_view: ViewTransform,
+    /// Half the range of the error's colors, millimeters.
+    error_mm: f32,
+    /// The stroke that the pointer is drawing: its pane and finger.
+    painting: Option<(Pane, PadId)>,
+    /// Outlines of masks.
+    outlines: Memo<Vec<[[f32; 2]; 2]>>,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        let view = ViewTransform::default();
+        Self { gel_view: view, bubble_view: view, error_mm: 4.0, painting: None, outlines: Memo::default() }
+    }
+}
+
+impl Memory {
+    /// Shows the images whole: all, or those of one kind of sensor.
+    pub(super) fn fit(&mut self, only: Option<SensorKind>) {
+        if only != Some(SensorKind::Depth) {
+            self.gel_view = ViewTransform::default();
+        }
+        if only != Some(SensorKind::Color) {
+            self.bubble_view = ViewTransform::default();
+        }
+    }
+
+    /// Follows the pen no further; whether it was drawing.
+    pub(super) fn lift_pen(&mut self) -> bool {
+        self.painting.take().is_some()
+    }
+}
 
 /// The shared range of imprints, meters.
 pub(super) fn range_of(state: &State) -> Range {
@@ -95,7 +135,7 @@ fn usual_size(cx: &Cx<'_>, kind: SensorKind) -> [usize; 2] {
 }
 
 /// The pane of one kind of image, for every finger on screen.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane) {
     let bar = matches!(pane, Pane::Measured | Pane::Predicted | Pane::Error);
     let full = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(full);
@@ -119,7 +159,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         let active = n > 1.0 && *finger == cx.state.selection.finger;
         let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt((pane, *finger)));
         child.set_clip_rect(rect.intersect(ui.clip_rect()));
-        let found = finger_image(cx, &mut child, pane, *finger);
+        let found = finger_image(cx, &mut child, memory, pane, *finger);
         if histogram.is_none() || active {
             histogram = found.or(histogram);
         }
@@ -131,11 +171,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
         ui.painter().rect_filled(rect, 0.0, cx.p.panel);
         let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt((pane, "bar")));
-        color_bar(cx, &mut child, pane, histogram.as_ref());
+        color_bar(cx, &mut child, memory, pane, histogram.as_ref());
     }
 }
 
-fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histogram>) {
+fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, histogram: Option<&Histogram>) {
     let note = scale_note(cx.state);
     if pane == Pane::Error {
         let bar = Colorbar {
@@ -147,11 +187,11 @@ fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histog
             locked: None,
             note,
         };
-        match bar.show(ui, Range::symmetric(cx.local.error_mm)) {
-            Some(Asked::Range(range)) => cx.local.error_mm = range.hi.clamp(0.05, 100.0),
+        match bar.show(ui, Range::symmetric(memory.error_mm)) {
+            Some(Asked::Range(range)) => memory.error_mm = range.hi.clamp(0.05, 100.0),
             Some(Asked::Auto) => {
                 if let Some(h) = histogram {
-                    cx.local.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
+                    memory.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
                 }
             }
             Some(Asked::Lock(_)) | None => {}
@@ -180,7 +220,7 @@ fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histog
 }
 
 /// One picture. Returns its histogram, where it has values.
-fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId) -> Option<Histogram> {
+fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, finger: PadId) -> Option<Histogram> {
     let state = cx.state;
     match pane {
         Pane::GelRaw | Pane::GelReference | Pane::GelDifference => {
@@ -193,36 +233,43 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId) -> Opti
                     state.gelslim(finger).and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.reference))
                 }
             };
-            gel_image(cx, ui, pane, finger, image);
+            gel_image(cx, ui, memory, pane, finger, image);
             None
         }
-        Pane::Measured => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Measured, finger)),
+        Pane::Measured => depth_pane(cx, ui, memory, pane, finger, state.imprint(ImprintSource::Measured, finger)),
         Pane::Predicted => match state.preview(finger) {
-            Some(preview) => preview_image(cx, ui, finger, preview),
+            Some(preview) => preview_image(cx, ui, memory, finger, preview),
             None => match state.predicted_color(finger) {
                 Some(picture) => {
-                    gel_image(cx, ui, pane, finger, picture);
+                    gel_image(cx, ui, memory, pane, finger, picture);
                     None
                 }
-                None => depth_pane(cx, ui, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
+                None => depth_pane(cx, ui, memory, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
             },
         },
         _ => {
             let error = state.comparison(finger).and_then(Absent::NoPrediction, |c| Some(&c.error));
-            depth_pane(cx, ui, pane, finger, error)
+            depth_pane(cx, ui, memory, pane, finger, error)
         }
     }
 }
 
 /// What stands where there is no picture: the one before, dimmed, while the next is on its way; else a sentence.
-fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, PadId), lookup: Lookup<'_, T>, size: [usize; 2]) {
+fn placeholder<T: ?Sized>(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    memory: &Memory,
+    slot: (Pane, PadId),
+    lookup: Lookup<'_, T>,
+    size: [usize; 2],
+) {
     match lookup {
         Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
             let rect = ui.available_rect_before_wrap();
             ui.painter().rect_filled(rect, 0.0, cx.p.canvas);
-            if let Some(picture) = cx.local.textures.last(slot) {
+            if let Some(picture) = cx.shared.textures.last(slot) {
                 let gel = matches!(slot.0, Pane::GelRaw | Pane::GelReference | Pane::GelDifference);
-                let view = if gel { cx.local.gel_view } else { cx.local.bubble_view };
+                let view = if gel { memory.gel_view } else { memory.bubble_view };
                 let turned = gel && cx.state.rig().turned();
                 let map = CanvasMap::new(rect, size, view, turned);
                 let uv = if turned {
@@ -300,14 +347,21 @@ pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     }
 }
 
-fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lookup<'_, RgbGrid>) {
+fn gel_image(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    memory: &mut Memory,
+    pane: Pane,
+    finger: PadId,
+    lookup: Lookup<'_, RgbGrid>,
+) {
     let Some(image) = lookup.shown() else {
         let size = usual_size(cx, SensorKind::Color);
-        return placeholder(cx, ui, (pane, finger), lookup, size);
+        return placeholder(cx, ui, memory, (pane, finger), lookup, size);
     };
     let Some(touch) = cx.state.touch_key(finger) else { return };
-    let mut view = cx.local.gel_view;
-    let label = format!("{} {}", super::pane::title(pane), cx.state.finger_name(finger));
+    let mut view = memory.gel_view;
+    let label = format!("{} {}", pane.title(), cx.state.finger_name(finger));
     let canvas = ImageCanvas {
         label: &label,
         size: image.size(),
@@ -316,10 +370,10 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lo
         background: cx.p.canvas,
     };
     let output = canvas.show(ui, &mut view);
-    cx.local.gel_view = view;
+    memory.gel_view = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let recipe = cx.state.chosen(finger).filter(|_| pane == Pane::Predicted);
-    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), (touch, pane, recipe), squares, || {
+    let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), (touch, pane, recipe), squares, || {
         let picture = if matches!(pane, Pane::GelDifference | Pane::Predicted) {
             rgb_image(image, difference_gain(image), 128.0)
         } else {
@@ -331,9 +385,9 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lo
     if let Some(px) = output.hovered {
         let value = output.map.pixel(px).and_then(|(x, y)| image.get(x, y));
         if let (Some(v), Some((x, y))) = (value, output.map.pixel(px)) {
-            cx.local.readout = Some(format!(
+            cx.shared.readout = Some(format!(
                 "{} {} ({x}, {y})   R {:.1}  G {:.1}  B {:.1} of 255",
-                super::pane::title(pane),
+                pane.title(),
                 cx.state.finger_name(finger),
                 v[0],
                 v[1],
@@ -376,7 +430,7 @@ fn finger_text(state: &State, finger: PadId) -> String {
 
 /// Tells the other panes where the pointer is.
 fn hover(cx: &mut Cx<'_>, finger: PadId, at_px: [f32; 2]) {
-    cx.local.hover_claimed = true;
+    cx.shared.hover_claimed = true;
     let hover = Some(Hover { finger, at_px });
     if cx.state.selection.hover != hover {
         cx.push(ViewCommand::HoverPixel(hover));
@@ -386,13 +440,14 @@ fn hover(cx: &mut Cx<'_>, finger: PadId, at_px: [f32; 2]) {
 fn depth_pane(
     cx: &mut Cx<'_>,
     ui: &mut Ui,
+    memory: &mut Memory,
     pane: Pane,
     finger: PadId,
     lookup: Lookup<'_, DepthMap>,
 ) -> Option<Histogram> {
     let Some(depth) = lookup.shown() else {
         let size = usual_size(cx, SensorKind::Depth);
-        placeholder(cx, ui, (pane, finger), lookup, size);
+        placeholder(cx, ui, memory, (pane, finger), lookup, size);
         return None;
     };
     let stale = matches!(lookup, Lookup::Stale(_));
@@ -403,28 +458,28 @@ fn depth_pane(
         _ => cx.state.imprint_key(source, finger).ok()?,
     };
     let paintable = pane != Pane::Error
-        && cx.local.visible.contains(&Pane::Masks)
+        && cx.state.selection.panes.contains(&Pane::Masks)
         && cx.state.settings.mask.tool != MaskTool::Pan
         && cx.state.document.is_editable(cx.state.pair_name());
     let primary = if paintable { Primary::Caller } else { Primary::Pan };
-    let mut view = cx.local.bubble_view;
-    let label = format!("{} {}", super::pane::title(pane), cx.state.finger_name(finger));
+    let mut view = memory.bubble_view;
+    let label = format!("{} {}", pane.title(), cx.state.finger_name(finger));
     let canvas = ImageCanvas { label: &label, size: depth.size(), rotated: false, primary, background: cx.p.canvas };
     let output = canvas.show(ui, &mut view);
-    cx.local.bubble_view = view;
+    memory.bubble_view = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let (map, range) = match pane {
-        Pane::Error => (ColorMap::Diverging, Range::symmetric(cx.local.error_mm * 1e-3)),
+        Pane::Error => (ColorMap::Diverging, Range::symmetric(memory.error_mm * 1e-3)),
         _ => (map_of(cx.state), range_of(cx.state)),
     };
     let key = (&recipe, map, range.lo.to_bits(), range.hi.to_bits());
-    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), key, squares, || {
+    let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), key, squares, || {
         (depth_image(depth, map, range), Histogram::of(depth.as_slice()))
     });
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
     output.paint(texture, if stale { Color32::from_gray(130) } else { Color32::WHITE });
     if pane != Pane::Error {
-        paint_mask(cx, ui, &output, source, finger);
+        paint::mask(cx, ui, memory, &output, source, finger);
     }
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
         output.dashed_rect(link.window, Color32::from_gray(235));
@@ -447,17 +502,23 @@ fn depth_pane(
         output.painter.circle_stroke(at, 6.0, eframe::egui::Stroke::new(1.5, cx.p.accent));
     }
     if paintable {
-        paint_stroke(cx, ui, &output, pane, source, finger);
+        paint::stroke(cx, ui, memory, &output, (pane, source, finger));
     }
     captions(cx, &output, pane, finger);
     histogram
 }
 
 /// A prediction on its way, in the colors and the place of the result: nothing can be painted or measured on it.
-fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Preview>) -> Option<Histogram> {
+fn preview_image(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    memory: &mut Memory,
+    finger: PadId,
+    preview: &Arc<Preview>,
+) -> Option<Histogram> {
     let pane = Pane::Predicted;
-    let mut view = cx.local.bubble_view;
-    let label = format!("{} {}, preview", super::pane::title(pane), cx.state.finger_name(finger));
+    let mut view = memory.bubble_view;
+    let label = format!("{} {}, preview", pane.title(), cx.state.finger_name(finger));
     let canvas = ImageCanvas {
         label: &label,
         size: preview.picture.depth.size(),
@@ -466,11 +527,11 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Prev
         background: cx.p.canvas,
     };
     let output = canvas.show(ui, &mut view);
-    cx.local.bubble_view = view;
+    memory.bubble_view = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let (map, range) = (map_of(cx.state), range_of(cx.state));
     let key = (&preview.recipe, preview.picture.step, map, range.lo.to_bits(), range.hi.to_bits());
-    let picture = cx.local.textures.get(ui.ctx(), (pane, finger), key, squares, || {
+    let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), key, squares, || {
         (depth_image(&preview.picture.depth, map, range), Histogram::of(preview.picture.depth.as_slice()))
     });
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
@@ -524,10 +585,10 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
 fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, depth: &DepthMap, px: [f32; 2]) {
     let Some((x, y)) = output.map.pixel(px) else { return };
     let Some(v) = depth.get(x, y).copied() else { return };
-    let name = super::pane::title(pane);
+    let name = pane.title();
     let note = scale_note(cx.state);
     let note = if note.is_empty() { String::new() } else { format!(" ({note})") };
-    cx.local.readout = Some(if v.is_finite() {
+    cx.shared.readout = Some(if v.is_finite() {
         format!(
             "{name} {} ({x}, {y})   {}{note}   {v:.6} m",
             cx.state.finger_name(finger),
@@ -536,78 +597,6 @@ fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, de
     } else {
         format!("{name} {} ({x}, {y})   no measurement", cx.state.finger_name(finger))
     });
-}
-
-/// The mask in force as a veil with an outline, or the outline alone.
-fn paint_mask(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: ImprintSource, finger: PadId) {
-    let settings = &cx.state.settings;
-    if !settings.mask_visible || ui.input(|i| i.key_down(eframe::egui::Key::X)) && !ui.ctx().egui_wants_keyboard_input()
-    {
-        return;
-    }
-    let Ok(in_force) = cx.state.mask_in_force(source, finger) else { return };
-    let key: (&MaskVersion, _) = (&in_force.version, cx.state.imprint_key(source, finger).ok());
-    // Where nobody paints the data itself is what counts: the outline says enough.
-    if !settings.mask_outline && cx.local.visible.contains(&Pane::Masks) {
-        let mask = in_force.mask;
-        let slot = ("mask", source, finger);
-        let picture = cx.local.textures.get(ui.ctx(), slot, &key, true, || (mask_image(mask, Color32::WHITE), None));
-        let texture: TextureId = picture.texture.id();
-        output.paint(texture, CONTACT.gamma_multiply(settings.mask_opacity));
-    }
-    let mask = in_force.mask;
-    let segments = cx.local.outlines.get(&("mask", source, finger), &key, || outline(mask));
-    output.segments(segments, Color32::from_black_alpha(110), 2.5);
-    output.segments(segments, CONTACT, 1.25);
-}
-
-/// Walks every pointer event of the frame: at a low frame rate one frame holds many moves, and a stroke must follow
-/// all of them.
-fn paint_stroke(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, pane: Pane, source: ImprintSource, finger: PadId) {
-    use eframe::egui::Event;
-    let here = Painting { pane, finger };
-    let tool = cx.state.settings.mask.tool;
-    let events = ui.input(|i| i.events.clone());
-    let on_top = output.response.contains_pointer() || output.response.is_pointer_button_down_on();
-    for event in events {
-        match event {
-            Event::PointerButton { pos, button, pressed: true, modifiers }
-                if matches!(button, PointerButton::Primary | PointerButton::Secondary)
-                    && on_top
-                    && !output.panning
-                    && cx.local.painting.is_none()
-                    && output.painter.clip_rect().contains(pos) =>
-            {
-                let erase = button == PointerButton::Secondary || modifiers.ctrl || modifiers.command;
-                cx.local.painting = Some(here);
-                if cx.state.selection.finger != finger {
-                    cx.push(ViewCommand::SelectFinger(finger));
-                }
-                let at_px = output.map.to_image(pos);
-                cx.push(LabelsCommand::BeginStroke { finger, source, at_px, erase });
-            }
-            Event::PointerMoved(pos) if cx.local.painting == Some(here) => {
-                cx.push(LabelsCommand::StrokeTo(output.map.to_image(pos)));
-            }
-            Event::PointerButton { pressed: false, .. } | Event::PointerGone if cx.local.painting == Some(here) => {
-                cx.local.painting = None;
-                cx.push(LabelsCommand::EndStroke);
-            }
-            _ => {}
-        }
-    }
-    if let Some(pos) = output.response.hover_pos() {
-        let scroll = ui.input(|i| if i.modifiers.shift { i.smooth_scroll_delta() } else { vec2(0.0, 0.0) });
-        let amount = scroll.x + scroll.y;
-        let radius = cx.state.settings.mask.radius_px;
-        if amount != 0.0 {
-            cx.push(SettingsCommand::SetBrushRadius(radius * (amount * 0.005).exp()));
-        }
-        let ctrl = ui.input(|i| i.modifiers.ctrl || i.pointer.secondary_down());
-        let erase = (tool == MaskTool::Eraser) != ctrl;
-        brush_cursor::paint(output, output.map.to_image(pos), radius, erase, Color32::WHITE);
-        ui.ctx().set_cursor_icon(eframe::egui::CursorIcon::None);
-    }
 }
 
 /// The small square in the color of a side, beside the pane's title.

@@ -9,8 +9,9 @@ use strum::IntoEnumIterator as _;
 use super::cx::Cx;
 use super::images;
 use super::theme::{SMALL, caption, section};
+use super::widget::line::Line;
 use crate::app::action::Action;
-use crate::app::command::Command;
+use crate::app::command::{Command, Pane};
 use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
 use crate::app::workbench::{Layer, WorkbenchCommand};
@@ -49,8 +50,11 @@ fn reason_tip(reason: Reason) -> &'static str {
     }
 }
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("layers").show(ui, |ui| {
@@ -163,24 +167,9 @@ fn histogram(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
     response.on_hover_text(format!("{info}. Heights by the square root of the counts"));
 }
 
-/// One line: a swatch or none, a name at the left, numbers in columns at the right.
-fn row(ui: &mut Ui, swatch: Option<Color32>, name: (&str, Color32), numbers: &[(String, Color32)], width: f32) {
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 14.0), Sense::hover());
-    let all: Vec<&str> = numbers.iter().map(|n| n.0.as_str()).collect();
-    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{} {}", name.0, all.join(" "))));
-    let painter = ui.painter_at(rect);
-    let font = FontId::proportional(SMALL);
-    let y = rect.center().y;
-    let mut x = rect.left();
-    if let Some(color) = swatch {
-        painter.rect_filled(Rect::from_center_size(pos2(x + 5.0, y), vec2(9.0, 9.0)), 2.0, color);
-        x += 15.0;
-    }
-    painter.text(pos2(x, y), Align2::LEFT_CENTER, name.0, font.clone(), name.1);
-    for (i, (number, color)) in numbers.iter().rev().enumerate() {
-        let x = rect.right() - 2.0 - width * i as f32;
-        painter.text(pos2(x, y), Align2::RIGHT_CENTER, number, font.clone(), *color);
-    }
+/// Lines with `column` points from one number to the next.
+fn line(column: f32) -> Line {
+    Line { height: 14.0, size: SMALL, column, swatch: None }
 }
 
 fn reasons(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
@@ -189,7 +178,7 @@ fn reasons(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
     let rig = cx.state.rig();
     let heads: Vec<_> = rig.pads().map(|finger| (rig.pad_key(finger).into_owned(), cx.p.weak)).collect();
     ui.spacing_mut().item_spacing.y = 0.0;
-    row(ui, None, ("", cx.p.weak), &heads, 56.0);
+    line(56.0).show(ui, ("", cx.p.weak), &heads);
     // What did not happen is said in one line.
     let happened = |reason: &Reason| layers.counts.iter().flatten().any(|counts| counts[*reason as usize] > 0);
     for reason in Reason::iter().filter(happened) {
@@ -201,14 +190,12 @@ fn reasons(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
             (if there { count.to_string() } else { "–".to_owned() }, color)
         });
         let numbers: Vec<_> = numbers.collect();
-        let response = ui.scope(|ui| {
-            row(ui, Some(Color32::from_rgb(r, g, b)), (&reason.to_string(), cx.p.text), &numbers, 56.0);
-        });
-        response.response.on_hover_text(reason_tip(reason));
+        let line = Line { swatch: Some(Color32::from_rgb(r, g, b)), ..line(56.0) };
+        line.show(ui, (&reason.to_string(), cx.p.text), &numbers).on_hover_text(reason_tip(reason));
     }
     let none: Vec<String> = Reason::iter().filter(|r| !happened(r)).map(|r| r.to_string()).collect();
     if !none.is_empty() {
-        row(ui, None, (&format!("none {}", none.join(", ")), cx.p.weak), &[], 56.0);
+        line(56.0).show(ui, (&format!("none {}", none.join(", ")), cx.p.weak), &[]);
     }
     ui.spacing_mut().item_spacing.y = 2.0;
 }
@@ -217,7 +204,7 @@ fn directions(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
     let Some(both) = layers.directions else { return };
     ui.add_space(2.0);
     let heads = ["rms", "overlap"].map(|h| (h.to_owned(), cx.p.weak));
-    row(ui, None, ("Both directions", cx.p.weak), &heads, 62.0);
+    line(62.0).show(ui, ("Both directions", cx.p.weak), &heads);
     for (name, d, tip) in [
         ("Touch to model", both.scene_to_model, "Contact points to the nearest model point: how well the touch fits"),
         (
@@ -227,8 +214,9 @@ fn directions(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
         ),
     ] {
         let numbers = [units::text_mm(d.rms_m), format!("{:.0} %", d.overlap * 100.0)].map(|text| (text, cx.p.strong));
-        let response = ui.scope(|ui| row(ui, None, (name, cx.p.text), &numbers, 62.0));
-        response.response.on_hover_text(format!("{tip}. Overlap: share within 1 mm, in the plane of the tool"));
+        line(62.0)
+            .show(ui, (name, cx.p.text), &numbers)
+            .on_hover_text(format!("{tip}. Overlap: share within 1 mm, in the plane of the tool"));
     }
 }
 

@@ -8,134 +8,68 @@ use std::collections::BTreeMap;
 use eframe::egui::Id;
 use egui_tiles::{Container, Linear, LinearDir, Tile, TileId, Tiles, Tree};
 
-use crate::app::command::Pane;
+use crate::app::pane::{Dock, Pane};
 use crate::app::settings::Workspace;
 
 /// Part of the stored text: a layout of another version is not even tried.
 const FORMAT: &str = "touch2touch-layout-2";
 
-/// The panes of a workspace.
-pub(super) fn panes_of(workspace: Workspace) -> &'static [Pane] {
-    use Pane::*;
+/// How a workspace divides the window among its docks; of rows with fewer docks the first shares count.
+struct Shares {
+    /// Left column, middle, right column.
+    columns: [f32; 3],
+    /// Upper and lower row of the middle.
+    middle: [f32; 2],
+    /// The docks of the lower row; those of the upper one are equally wide.
+    bottom: [f32; 3],
+    /// The docks of the right column.
+    right: [f32; 2],
+}
+
+fn shares(workspace: Workspace) -> Shares {
+    let (columns, bottom) = ([0.165, 0.625, 0.21], [1.0, 1.0, 1.0]);
     match workspace {
-        Workspace::Inspect => &[
-            Browser,
-            GelDifference,
-            GelRaw,
-            GelReference,
-            Measured,
-            Predicted,
-            Error,
-            Ledger,
-            Seeds,
-            ScenePredicted,
-            SceneMeasured,
-            Generate,
-            Settings,
-            Metrics,
-            Log,
-        ],
-        Workspace::Align => &[
-            Browser,
-            ScenePredicted,
-            SceneMeasured,
-            TimeMachine,
-            BasinMap,
-            Measured,
-            Predicted,
-            Layers,
-            Poses,
-            Metrics,
-            Generate,
-            Log,
-        ],
-        Workspace::Label => {
-            &[Browser, Masks, Measured, Predicted, SceneMeasured, ScenePredicted, GelDifference, Metrics, Log]
-        }
-        Workspace::Evaluate => {
-            &[Browser, Results, Table, Measured, Predicted, Error, Ledger, SceneMeasured, Metrics, Generate, Log]
-        }
+        Workspace::Inspect => Shares { columns, middle: [0.86, 1.14], bottom, right: [1.0, 1.0] },
+        Workspace::Align => Shares { columns: [0.13, 0.64, 0.23], middle: [1.15, 0.85], bottom, right: [1.2, 0.8] },
+        Workspace::Label => Shares { columns, middle: [1.25, 0.75], bottom: [1.0, 1.4, 1.0], right: [1.25, 0.75] },
+        Workspace::Evaluate => Shares { columns, middle: [1.2, 0.9], bottom, right: [1.0, 1.0] },
     }
 }
 
-struct Builder(Tiles<Pane>);
-
-impl Builder {
-    fn tabs(&mut self, panes: &[Pane]) -> TileId {
-        let tiles: Vec<TileId> = panes.iter().map(|p| self.0.insert_pane(*p)).collect();
-        self.0.insert_tab_tile(tiles)
+/// Parts side by side or one below the other; one part alone is itself.
+fn line(tiles: &mut Tiles<Pane>, dir: LinearDir, parts: impl IntoIterator<Item = TileId>, shares: &[f32]) -> TileId {
+    let parts: Vec<TileId> = parts.into_iter().collect();
+    if let [only] = parts[..] {
+        return only;
     }
-
-    fn line(&mut self, dir: LinearDir, children: &[(TileId, f32)]) -> TileId {
-        let mut linear = Linear::new(dir, children.iter().map(|(id, _)| *id).collect());
-        for (id, share) in children {
-            linear.shares.set_share(*id, *share);
-        }
-        self.0.insert_new(Tile::Container(Container::Linear(linear)))
+    let mut linear = Linear::new(dir, parts.clone());
+    for (part, share) in parts.into_iter().zip(shares) {
+        linear.shares.set_share(part, *share);
     }
-
-    fn row(&mut self, children: &[(TileId, f32)]) -> TileId {
-        self.line(LinearDir::Horizontal, children)
-    }
-
-    fn column(&mut self, children: &[(TileId, f32)]) -> TileId {
-        self.line(LinearDir::Vertical, children)
-    }
+    tiles.insert_new(Tile::Container(Container::Linear(linear)))
 }
 
-/// The arrangement that a workspace starts with.
+/// The arrangement that a workspace starts with: what the table of panes says, divided by its shares.
 pub(super) fn default_tree(workspace: Workspace) -> Tree<Pane> {
-    use Pane::*;
-    let mut b = Builder(Tiles::default());
-    let root = match workspace {
-        Workspace::Inspect => {
-            let browser = b.tabs(&[Browser]);
-            let gel = b.tabs(&[GelDifference, GelRaw, GelReference]);
-            let (measured, predicted) = (b.tabs(&[Measured]), b.tabs(&[Predicted]));
-            let error = b.tabs(&[Error, Ledger, Seeds]);
-            let (scene_p, scene_m) = (b.tabs(&[ScenePredicted]), b.tabs(&[SceneMeasured]));
-            let generate = b.tabs(&[Generate, Settings]);
-            let metrics = b.tabs(&[Metrics, Log]);
-            let top = b.row(&[(gel, 1.0), (measured, 1.0), (predicted, 1.0)]);
-            let bottom = b.row(&[(error, 1.0), (scene_p, 1.0), (scene_m, 1.0)]);
-            let center = b.column(&[(top, 0.86), (bottom, 1.14)]);
-            let right = b.column(&[(generate, 1.0), (metrics, 1.0)]);
-            b.row(&[(browser, 0.165), (center, 0.625), (right, 0.21)])
+    use LinearDir::{Horizontal, Vertical};
+    let mut tiles = Tiles::default();
+    let mut docks: BTreeMap<Dock, Vec<TileId>> = BTreeMap::new();
+    for pane in Pane::of(workspace) {
+        if let Some(dock) = pane.dock(workspace) {
+            docks.entry(dock).or_default().push(tiles.insert_pane(pane));
         }
-        Workspace::Align => {
-            let browser = b.tabs(&[Browser]);
-            let (scene_m, scene_p) = (b.tabs(&[SceneMeasured, Measured]), b.tabs(&[ScenePredicted, Predicted]));
-            let steps = b.tabs(&[TimeMachine]);
-            let basin = b.tabs(&[BasinMap, Layers, Poses]);
-            let metrics = b.tabs(&[Metrics, Generate, Log]);
-            let scenes = b.row(&[(scene_m, 1.0), (scene_p, 1.0)]);
-            let center = b.column(&[(scenes, 1.15), (steps, 0.85)]);
-            let right = b.column(&[(basin, 1.2), (metrics, 0.8)]);
-            b.row(&[(browser, 0.13), (center, 0.64), (right, 0.23)])
-        }
-        Workspace::Label => {
-            let browser = b.tabs(&[Browser]);
-            let images = b.tabs(&[Measured, Predicted]);
-            let scene = b.tabs(&[SceneMeasured, ScenePredicted]);
-            let gel = b.tabs(&[GelDifference]);
-            let masks = b.tabs(&[Masks]);
-            let metrics = b.tabs(&[Metrics, Log]);
-            let below = b.row(&[(gel, 1.0), (scene, 1.4)]);
-            let center = b.column(&[(images, 1.25), (below, 0.75)]);
-            let right = b.column(&[(masks, 1.25), (metrics, 0.75)]);
-            b.row(&[(browser, 0.165), (center, 0.625), (right, 0.21)])
-        }
-        Workspace::Evaluate => {
-            let left = b.tabs(&[Browser]);
-            let table = b.tabs(&[Results, Table]);
-            let (measured, predicted, error) = (b.tabs(&[Measured]), b.tabs(&[Predicted]), b.tabs(&[Error, Ledger]));
-            let right = b.tabs(&[Metrics, Generate, SceneMeasured, Log]);
-            let images = b.row(&[(measured, 1.0), (predicted, 1.0), (error, 1.0)]);
-            let center = b.column(&[(table, 1.2), (images, 0.9)]);
-            b.row(&[(left, 0.165), (center, 0.625), (right, 0.21)])
-        }
-    };
-    Tree::new(tree_id(workspace), root, b.0)
+    }
+    let docks: Vec<(Dock, TileId)> =
+        docks.into_iter().map(|(dock, panes)| (dock, tiles.insert_tab_tile(panes))).collect();
+    let of = |part: fn(Dock) -> bool| docks.iter().filter(move |(dock, _)| part(*dock)).map(|(_, id)| *id);
+    let shares = shares(workspace);
+    let left = line(&mut tiles, Vertical, of(|dock| dock == Dock::Left), &[]);
+    let top = line(&mut tiles, Horizontal, of(|dock| matches!(dock, Dock::Top(_))), &[1.0; 3]);
+    let bottom = line(&mut tiles, Horizontal, of(|dock| matches!(dock, Dock::Bottom(_))), &shares.bottom);
+    let right = line(&mut tiles, Vertical, of(|dock| matches!(dock, Dock::Right(_))), &shares.right);
+    let middle = line(&mut tiles, Vertical, [top, bottom], &shares.middle);
+    let root = line(&mut tiles, Horizontal, [left, middle, right], &shares.columns);
+    Tree::new(tree_id(workspace), root, tiles)
 }
 
 fn tree_id(workspace: Workspace) -> Id {
@@ -159,9 +93,10 @@ pub(super) fn is_valid(tree: &Tree<Pane>, workspace: Workspace) -> bool {
             None => return false,
         }
     }
+    let panes = Pane::of(workspace);
     seen.len() == tree.tiles.len()
-        && counts.len() == panes_of(workspace).len()
-        && panes_of(workspace).iter().all(|p| counts.get(p) == Some(&1))
+        && counts.len() == panes.len()
+        && panes.iter().all(|pane| counts.get(pane) == Some(&1))
 }
 
 /// The tree as text for the settings.

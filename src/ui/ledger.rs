@@ -15,7 +15,7 @@ use super::theme::{SMALL, caption, medium, pane_frame, section};
 use super::widget::progress;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
-use crate::app::command::{Command, SettingsCommand, TasksCommand, ViewCommand};
+use crate::app::command::{Command, Pane, SettingsCommand, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode, shift_tooltip};
 use crate::app::state::Lookup;
 use crate::domain::colormap::{ColorMap, Range};
@@ -33,8 +33,11 @@ const THUMB: egui::Vec2 = vec2(60.0, 48.0);
 /// Width of a column of figures.
 const FIGURE: f32 = 46.0;
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     let finger = cx.state.selection.finger;
     let lookup = cx.state.ledger(finger);
     let Some(found) = lookup.shown() else {
@@ -182,7 +185,7 @@ fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: PadId) {
     let thumb = Rect::from_min_size(rect.min + vec2(0.0, 2.0), THUMB);
     let key = (cx.state.chosen(finger), cx.state.settings.shift, record.stage);
     let range = Range { lo: s.min as f32, hi: s.max as f32 };
-    let picture = cx.local.textures.get(ui.ctx(), ("stage", record.stage), key, false, || {
+    let picture = cx.shared.textures.get(ui.ctx(), ("stage", record.stage), key, false, || {
         (depth_image(&record.image, ColorMap::Viridis, range), None)
     });
     let painter = ui.painter_at(rect);
@@ -253,7 +256,7 @@ fn against(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
             let key = (cx.state.chosen(finger), cx.state.settings.shift, cx.p.canvas);
             let canvas = cx.p.canvas;
             let picture = cx
-                .local
+                .shared
                 .textures
                 .get(ui.ctx(), "joint", key, true, || (plots::joint_image(&joint.counts, canvas), None))
                 .texture

@@ -4,7 +4,7 @@ use eframe::egui::{self, Align2, Color32, RichText, ScrollArea, Ui, vec2};
 
 use super::cx::Cx;
 use super::theme::{Palette, SMALL, caption};
-use crate::app::command::TasksCommand;
+use crate::app::command::{Pane, TasksCommand};
 use crate::app::tasks::{Entry, Level};
 
 /// Notices on screen at once.
@@ -31,8 +31,11 @@ fn entry_ui(p: &Palette, ui: &mut Ui, entry: &Entry) {
     }
 }
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         if cx.state.log.entries.is_empty() {

@@ -7,14 +7,17 @@ use super::browser::review_color;
 use super::cx::Cx;
 use super::theme::{SMALL, caption, section};
 use crate::app::action::Action;
-use crate::app::command::{Command, LabelsCommand, SettingsCommand};
+use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Review;
 use crate::app::settings::{BRUSH_RADIUS_PX, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use crate::app::state::Lookup;
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         if let Some(err) = cx.state.document.blocked(cx.state.pair_name()) {

@@ -1,15 +1,15 @@
 //! The figures of the selected pair: image metrics, the ledger of the prediction, the pose.
 
-use eframe::egui::{
-    Align, Align2, Color32, FontId, Layout, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2,
-};
+use eframe::egui::{Align, Color32, Layout, RichText, ScrollArea, Sense, Ui};
 
 use super::cx::{Cx, side_color};
 use super::images;
 use super::scene;
 use super::theme::{SMALL, caption, section, value};
+use super::widget::line::Line;
+use super::widget::texture::Memo;
 use crate::app::action::Action;
-use crate::app::command::{Command, LabelsCommand, SettingsCommand};
+use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand};
 use crate::app::keys::{ImprintSource, PoseEngine};
 use crate::app::state::{Absent, Lookup};
 use crate::domain::hand::{HandPose, PoseDifference};
@@ -19,15 +19,22 @@ use crate::domain::units;
 use crate::work::compare::Comparison;
 use strum::IntoEnumIterator as _;
 
+/// Figures that only this pane shows.
+#[derive(Default)]
+pub(super) struct Memory {
+    /// Of the error and of the measured imprint.
+    stats: Memo<Stats>,
+}
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("metrics").show(ui, |ui| {
             pair(cx, ui);
             pose(cx, ui);
             comparison(cx, ui);
-            ledger(cx, ui);
+            ledger(cx, ui, memory);
         });
     });
 }
@@ -158,7 +165,7 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
                     (ssim, number(c.ssim, 3, "")),
                     ("Mean |error|", units::text_mm(c.mae_m)),
                 ] {
-                    line(ui, (name, cx.p.weak), &[(number, cx.p.strong)], 0.0);
+                    line(0.0).show(ui, (name, cx.p.weak), &[(number, cx.p.strong)]);
                 }
                 parts(cx, ui, c);
                 if let Some(warning) = cx.state.ambiguity(finger).and_then(|a| a.warning()) {
@@ -185,7 +192,7 @@ fn parts(cx: &Cx<'_>, ui: &mut Ui, c: &Comparison) {
     let spacing = std::mem::replace(&mut ui.spacing_mut().item_spacing.y, 0.0);
     let width = ((ui.available_width() - 60.0) / 4.0).clamp(34.0, 64.0);
     let heads = ["dB", "SSIM", "err mm", "bias mm"].map(|h| (h.to_owned(), cx.p.weak));
-    line(ui, ("", cx.p.weak), &heads, width);
+    line(width).show(ui, ("", cx.p.weak), &heads);
     for (name, f, tip) in [
         ("Seen", split.seen, "Inside the dashed window: the GelSlim saw this part. err: mean |error|"),
         ("Invented", split.invented, "Outside the dashed window: the model made this part up. err: mean |error|"),
@@ -197,29 +204,19 @@ fn parts(cx: &Cx<'_>, ui: &mut Ui, c: &Comparison) {
             number(f.bias.map(units::mm), 2),
         ]
         .map(|text| (text, cx.p.strong));
-        let row = ui.scope(|ui| line(ui, (name, cx.p.text), &numbers, width));
-        row.response.on_hover_text(format!("{tip}. {} pixels; bias is predicted minus measured", f.pixels));
+        let tip = format!("{tip}. {} pixels; bias is predicted minus measured", f.pixels);
+        line(width).show(ui, (name, cx.p.text), &numbers).on_hover_text(tip);
     }
     ui.spacing_mut().item_spacing.y = spacing;
 }
 
-/// A name at the left, numbers at the right, in columns that never move.
-fn line(ui: &mut Ui, name: (&str, Color32), numbers: &[(String, Color32)], width: f32) {
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 17.0), Sense::hover());
-    let all: Vec<&str> = numbers.iter().map(|n| n.0.as_str()).collect();
-    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{} {}", name.0, all.join(" "))));
-    let painter = ui.painter_at(rect);
-    let font = FontId::proportional(12.0);
-    let y = rect.center().y;
-    painter.text(pos2(rect.left(), y), Align2::LEFT_CENTER, name.0, font.clone(), name.1);
-    for (i, (number, color)) in numbers.iter().rev().enumerate() {
-        let x = rect.right() - 2.0 - width * i as f32;
-        painter.text(pos2(x, y), Align2::RIGHT_CENTER, number, font.clone(), *color);
-    }
+/// Lines with `column` points from one number to the next.
+fn line(column: f32) -> Line {
+    Line { height: 17.0, size: 12.0, column, swatch: None }
 }
 
 /// The stages that a prediction went through, with the figures of each.
-fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
+fn ledger(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     let finger = cx.state.selection.finger;
     let shift = cx.state.settings.shift;
     let mut rows: Vec<(&str, Option<Color32>, Stats, bool)> = Vec::new();
@@ -239,14 +236,14 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
         if let Lookup::Ready(c) = cx.state.comparison(finger) {
-            let stats = *cx.local.stats.get("error", (&recipe, shift), || Stats::of(&c.error));
+            let stats = *memory.stats.get("error", (&recipe, shift), || Stats::of(&c.error));
             rows.push(("Error", None, stats, true));
         }
     }
     if let (Lookup::Ready(imprint), Some(touch)) =
         (cx.state.imprint(ImprintSource::Measured, finger), cx.state.touch_key(finger))
     {
-        let stats = *cx.local.stats.get("measured", touch, || Stats::of(imprint));
+        let stats = *memory.stats.get("measured", touch, || Stats::of(imprint));
         let at = rows.len().saturating_sub(usize::from(rows.last().is_some_and(|r| r.0 == "Error")));
         rows.insert(at, ("Measured", Some(side_color(cx.p, ImprintSource::Measured)), stats, true));
     }
@@ -271,12 +268,12 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.spacing_mut().item_spacing.y = 0.0;
     let width = ((ui.available_width() - 76.0) / 4.0).clamp(34.0, 64.0);
     let heads = ["min", "mean", "std", "max"].map(|h| (h.to_owned(), cx.p.weak));
-    line(ui, ("mm", cx.p.weak), &heads, width);
+    line(width).show(ui, ("mm", cx.p.weak), &heads);
     for (name, color, stats, meters) in rows {
         let numbers = [stats.min, stats.mean, stats.std, stats.max].map(|v| {
             let v = if meters { units::mm(v) } else { v };
             (if v.is_finite() { format!("{v:.2}") } else { "–".to_owned() }, cx.p.strong)
         });
-        line(ui, (name, color.unwrap_or(cx.p.text)), &numbers, width);
+        line(width).show(ui, (name, color.unwrap_or(cx.p.text)), &numbers);
     }
 }

@@ -25,7 +25,7 @@ enum Entry {
 
 /// What is being typed.
 #[derive(Debug, Default)]
-pub(super) struct PaletteState {
+pub(super) struct Memory {
     query: String,
     selected: usize,
     /// The entries for a query, made again when it changes.
@@ -34,20 +34,20 @@ pub(super) struct PaletteState {
 }
 
 /// The palette, if it is open.
-pub(super) fn show(cx: &mut Cx<'_>, ctx: &egui::Context) {
+pub(super) fn show(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
     if !cx.state.selection.palette {
-        cx.local.palette.open = false;
+        memory.open = false;
         return;
     }
-    if !std::mem::replace(&mut cx.local.palette.open, true) {
-        cx.local.palette = PaletteState { open: true, ..PaletteState::default() };
+    if !std::mem::replace(&mut memory.open, true) {
+        *memory = Memory { open: true, ..Memory::default() };
     }
-    search(cx);
+    search(cx, memory);
     let area = egui::Modal::default_area(egui::Id::unique("palette")).anchor(Align2::CENTER_TOP, vec2(0.0, 72.0));
     let mut chosen = None;
     let modal = egui::Modal::new(egui::Id::unique("palette")).area(area).show(ctx, |ui| {
         ui.set_width(520.0);
-        let count = cx.local.palette.found.as_ref().map_or(0, |f| f.1.len());
+        let count = memory.found.as_ref().map_or(0, |f| f.1.len());
         let (down, up, enter) = ui.input_mut(|i| {
             (
                 i.count_and_consume_key(egui::Modifiers::NONE, Key::ArrowDown),
@@ -55,20 +55,20 @@ pub(super) fn show(cx: &mut Cx<'_>, ctx: &egui::Context) {
                 i.consume_key(egui::Modifiers::NONE, Key::Enter),
             )
         });
-        let edit = egui::TextEdit::singleline(&mut cx.local.palette.query)
+        let edit = egui::TextEdit::singleline(&mut memory.query)
             .hint_text("Find an action, a sample or a tool")
             .font(FontId::proportional(15.0))
             .desired_width(520.0);
         let response = ui.add(edit).accessible_name("Find anything");
         response.request_focus();
         if response.changed() {
-            cx.local.palette.selected = 0;
+            memory.selected = 0;
         }
-        let selected = (cx.local.palette.selected + down).saturating_sub(up).min(count.saturating_sub(1));
-        let moved = selected != cx.local.palette.selected;
-        cx.local.palette.selected = selected;
+        let selected = (memory.selected + down).saturating_sub(up).min(count.saturating_sub(1));
+        let moved = selected != memory.selected;
+        memory.selected = selected;
         ui.add_space(4.0);
-        let entries = cx.local.palette.found.as_ref().map(|f| f.1.clone()).unwrap_or_default();
+        let entries = memory.found.as_ref().map(|f| f.1.clone()).unwrap_or_default();
         ScrollArea::vertical().max_height(ROW * 12.0).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 0.0;
             for (i, entry) in entries.iter().enumerate() {
@@ -99,9 +99,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ctx: &egui::Context) {
 }
 
 /// Fills the list for the query, if it is another one.
-fn search(cx: &mut Cx<'_>) {
-    let query = cx.local.palette.query.clone();
-    if cx.local.palette.found.as_ref().is_some_and(|(q, _)| *q == query) {
+fn search(cx: &Cx<'_>, memory: &mut Memory) {
+    let query = memory.query.clone();
+    if memory.found.as_ref().is_some_and(|(q, _)| *q == query) {
         return;
     }
     let mut found: Vec<(i32, Entry)> = Vec::new();
@@ -124,7 +124,7 @@ fn search(cx: &mut Cx<'_>) {
         found.sort_by_key(|(s, _)| std::cmp::Reverse(*s));
     }
     found.truncate(MOST);
-    cx.local.palette.found = Some((query, found.into_iter().map(|(_, e)| e).collect()));
+    memory.found = Some((query, found.into_iter().map(|(_, e)| e).collect()));
 }
 
 fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Response {

@@ -1,132 +1,74 @@
-//! The docked panes: titles, title bars, and which function draws which.
+//! The docked panes: their memories, title bars, and how they behave in their tree.
+
+use std::collections::BTreeSet;
 
 use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetText, vec2};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles, UiResponse};
 
-use super::cx::Cx;
+use super::cx::{Cx, side_color};
 use super::theme::{SMALL, medium};
-use super::timemachine;
 use super::widget::help;
-use super::{
-    basin, browser, generate, images, layers, ledger, log, masks, metrics, poses, results, scene, seeds, settings_pane,
-    table,
-};
-use crate::app::command::Pane;
-use crate::app::keys::ImprintSource;
+use crate::app::pane::{Kind, Pane, panes};
 
-/// The title of a pane.
-pub(super) fn title(pane: Pane) -> &'static str {
-    match pane {
-        Pane::Browser => "Samples",
-        Pane::GelRaw => "GelSlim raw",
-        Pane::GelReference => "GelSlim reference",
-        Pane::GelDifference => "GelSlim difference",
-        Pane::Measured => "Measured imprint",
-        Pane::Predicted => "Predicted imprint",
-        Pane::Error => "Error",
-        Pane::SceneMeasured => "3D measured",
-        Pane::ScenePredicted => "3D predicted",
-        Pane::TimeMachine => "Time machine",
-        Pane::BasinMap => "Basin map",
-        Pane::Generate => "Generate",
-        Pane::Seeds => "Seeds",
-        Pane::Masks => "Mask",
-        Pane::Layers => "Layers",
-        Pane::Poses => "Poses",
-        Pane::Ledger => "Depth chain",
-        Pane::Metrics => "Figures",
-        Pane::Table => "All figures",
-        Pane::Results => "Results",
-        Pane::Log => "Log",
-        Pane::Settings => "Settings",
-    }
+macro_rules! views {
+    ($( $file:ident { $( $pane:ident $row:tt )* } )*) => {
+        /// What each file that draws panes keeps from one frame to the next.
+        #[derive(Default)]
+        pub(super) struct Memories {
+            $( pub $file: super::$file::Memory, )*
+        }
+
+        /// Draws a pane.
+        fn draw(cx: &mut Cx<'_>, ui: &mut Ui, memories: &mut Memories, pane: Pane) {
+            match pane {
+                $( $( Pane::$pane )|* => super::$file::show(cx, ui, &mut memories.$file, pane), )*
+            }
+        }
+    };
 }
+panes!(views);
 
-/// What a pane shows, for the tooltip of its title.
-fn tooltip(pane: Pane) -> &'static str {
-    match pane {
-        Pane::Browser => "The pairs of what is open",
-        Pane::GelRaw => "The GelSlim image during the touch, rotated to line up with the bubble",
-        Pane::GelReference => "The GelSlim image without contact, rotated to line up with the bubble",
-        Pane::GelDifference => "Touched minus untouched, around mid gray: what the generator sees",
-        Pane::Measured => "What the Soft Bubble measured; dashed: what the GelSlim sees of it",
-        Pane::Predicted => "What the generator predicts from the GelSlim image, in the same colors",
-        Pane::Error => "Predicted minus measured: blue too shallow, red too deep",
-        Pane::SceneMeasured => "The measured surface on the CAD model, grasp frame",
-        Pane::ScenePredicted => "The predicted surface on the CAD model, grasp frame",
-        Pane::TimeMachine => "The steps of a registration, forwards and backwards",
-        Pane::BasinMap => "Where starts lead; a click on one loads its run into the time machine",
-        Pane::Generate => "Predicts the Soft Bubble imprint",
-        Pane::Seeds => "Several predictions of the touch: where they disagree, and how their poses fan out",
-        Pane::Masks => "Corrects the contact mask",
-        Pane::Layers => "Residuals, drop reasons, distances both ways and the weak direction of a registration",
-        Pane::Poses => "Truth, measurement and prediction against each other, per finger and joint",
-        Pane::Ledger => "Everything between the decoder and the meters, stage by stage",
-        Pane::Metrics => "The figures of this pair",
-        Pane::Table => "The figures of all pairs so far",
-        Pane::Results => "The paper's results table of the open data set",
-        Pane::Log => "What happened",
-        Pane::Settings => "Preferences",
-    }
-}
-
-fn side(pane: Pane) -> Option<ImprintSource> {
-    match pane {
-        Pane::Measured | Pane::SceneMeasured => Some(ImprintSource::Measured),
-        Pane::Predicted | Pane::ScenePredicted => Some(ImprintSource::Predicted),
-        _ => None,
-    }
+/// The panes of the window.
+#[derive(Default)]
+pub(super) struct Panes {
+    /// What each of them remembers.
+    pub memories: Memories,
+    /// The pane that fills the window.
+    pub maximized: Option<Pane>,
+    /// The pane under the pointer.
+    pub hovered: Option<Pane>,
+    /// The panes drawn in this frame, so far.
+    pub drawn: BTreeSet<Pane>,
 }
 
 /// Draws a pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
-    cx.local.visible_next.insert(pane);
+fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
+    panes.drawn.insert(pane);
     if ui.rect_contains_pointer(ui.max_rect()) {
-        cx.local.hovered_pane = Some(pane);
+        panes.hovered = Some(pane);
     }
-    match pane {
-        Pane::Browser => browser::show(cx, ui),
-        Pane::GelRaw | Pane::GelReference | Pane::GelDifference | Pane::Measured | Pane::Predicted | Pane::Error => {
-            images::show(cx, ui, pane)
-        }
-        Pane::SceneMeasured => scene::show(cx, ui, ImprintSource::Measured),
-        Pane::ScenePredicted => scene::show(cx, ui, ImprintSource::Predicted),
-        Pane::TimeMachine => timemachine::show(cx, ui),
-        Pane::BasinMap => basin::show(cx, ui),
-        Pane::Generate => generate::show(cx, ui),
-        Pane::Seeds => seeds::show(cx, ui),
-        Pane::Masks => masks::show(cx, ui),
-        Pane::Layers => layers::show(cx, ui),
-        Pane::Poses => poses::show(cx, ui),
-        Pane::Ledger => ledger::show(cx, ui),
-        Pane::Metrics => metrics::show(cx, ui),
-        Pane::Table => table::show(cx, ui),
-        Pane::Results => results::show(cx, ui),
-        Pane::Log => log::show(cx, ui),
-        Pane::Settings => settings_pane::show(cx, ui),
-    }
+    draw(cx, ui, &mut panes.memories, pane);
 }
 
 /// The help mark of a pane, if it has mouse controls of its own.
 fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
-    match pane {
-        Pane::Measured | Pane::Predicted if cx.local.visible.contains(&Pane::Masks) => {
-            help::mark(ui, title(pane), help::PAINT);
-        }
-        Pane::GelRaw | Pane::GelReference | Pane::GelDifference | Pane::Measured | Pane::Predicted | Pane::Error => {
-            help::mark(ui, title(pane), help::IMAGE);
-        }
-        Pane::SceneMeasured | Pane::ScenePredicted => help::mark(ui, title(pane), help::SCENE),
-        Pane::TimeMachine => help::mark(ui, title(pane), help::STEPS),
-        Pane::BasinMap => help::mark(ui, title(pane), help::BASIN),
-        _ => {}
-    }
+    let controls = match pane.kind() {
+        Kind::Form => return,
+        Kind::Imprint(_) if cx.state.selection.panes.contains(&Pane::Masks) => help::PAINT,
+        Kind::Color | Kind::Imprint(_) | Kind::Error => help::IMAGE,
+        Kind::Scene(_) => help::SCENE,
+        Kind::Steps => help::STEPS,
+        Kind::Map => help::BASIN,
+    };
+    help::mark(ui, pane.title(), controls);
 }
 
 /// How the panes behave in their tree.
 pub(super) struct Docking<'a, 'b> {
     /// What the panes get.
     pub cx: &'b mut Cx<'a>,
+    /// The panes.
+    pub panes: &'b mut Panes,
     /// Whether a person moved something.
     pub edited: bool,
 }
@@ -135,29 +77,22 @@ impl Behavior<Pane> for Docking<'_, '_> {
     fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
         let rect = ui.max_rect();
         ui.painter().rect_filled(rect, 0.0, self.cx.p.panel);
-        show(self.cx, ui, *pane);
+        show(self.cx, ui, self.panes, *pane);
         UiResponse::None
     }
 
     fn tab_title_for_pane(&mut self, pane: &Pane) -> WidgetText {
-        let title = match pane {
-            // Three tabs have to fit side by side into the narrowest column.
-            Pane::GelDifference => "GelSlim diff",
-            Pane::GelRaw => "raw",
-            Pane::GelReference => "reference",
-            pane => title(*pane),
-        };
-        let color = side(*pane).map_or(self.cx.p.text, |s| super::cx::side_color(self.cx.p, s));
-        RichText::new(title).family(medium()).size(12.0).color(color).into()
+        let color = pane.side().map_or(self.cx.p.text, |side| side_color(self.cx.p, side));
+        RichText::new(pane.tab()).family(medium()).size(12.0).color(color).into()
     }
 
     fn on_tab_button(&mut self, tiles: &mut Tiles<Pane>, tile: TileId, response: egui::Response) -> egui::Response {
         match tiles.get(tile) {
             Some(Tile::Pane(pane)) => {
                 if response.double_clicked() {
-                    self.cx.local.maximized = Some(*pane);
+                    self.panes.maximized = Some(*pane);
                 }
-                response.on_hover_text(format!("{}. Drag to move, double-click to maximize", tooltip(*pane)))
+                response.on_hover_text(format!("{}. Drag to move, double-click to maximize", pane.tip()))
             }
             _ => response,
         }
@@ -176,12 +111,12 @@ impl Behavior<Pane> for Docking<'_, '_> {
         ui.add_space(4.0);
         let response = ui
             .add(egui::Button::new("").frame(false).min_size(vec2(16.0, 16.0)))
-            .accessible_name(format!("Maximize {}", title(*pane)));
+            .accessible_name(format!("Maximize {}", pane.title()));
         let color = if response.hovered() { self.cx.p.strong } else { self.cx.p.weak };
         let square = egui::Rect::from_center_size(response.rect.center(), vec2(8.0, 8.0));
         ui.painter().rect_stroke(square, 1.0, Stroke::new(1.25, color), egui::StrokeKind::Inside);
         if response.on_hover_text("Let this pane fill the window (`)").clicked() {
-            self.cx.local.maximized = Some(*pane);
+            self.panes.maximized = Some(*pane);
         }
         help_mark(self.cx, ui, *pane);
     }
@@ -236,16 +171,16 @@ impl Behavior<Pane> for Docking<'_, '_> {
 }
 
 /// One pane over the whole window, with the way back.
-pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
+pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
     let full = ui.available_rect_before_wrap();
     ui.painter().rect_filled(full, 0.0, cx.p.frame);
     let bar = egui::Rect::from_min_size(full.min, vec2(full.width(), 26.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(bar.shrink2(vec2(8.0, 0.0))), |ui| {
         ui.horizontal_centered(|ui| {
-            ui.label(super::theme::title(title(pane)));
+            ui.label(super::theme::title(pane.title()));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.button(RichText::new("Back to all panes").size(SMALL)).on_hover_text("` or Esc").clicked() {
-                    cx.local.maximized = None;
+                    panes.maximized = None;
                 }
                 help_mark(cx, ui, pane);
             });
@@ -255,7 +190,7 @@ pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
     ui.scope_builder(egui::UiBuilder::new().max_rect(rest), |ui| {
         ui.set_clip_rect(rest);
         ui.painter().rect_filled(rest, 0.0, cx.p.panel);
-        show(cx, ui, pane);
+        show(cx, ui, panes, pane);
     });
     ui.advance_cursor_after_rect(full);
 }

@@ -6,6 +6,7 @@ use eframe::egui::{Align2, Color32, FontId, Role, ScrollArea, Sense, Ui, WidgetI
 use super::cx::{Cx, side_color};
 use super::scene::error_color;
 use super::theme::{SMALL, caption};
+use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
 use crate::app::workbench::PoseOf;
@@ -16,8 +17,11 @@ use crate::domain::units;
 /// Height of a row: two lines of small type.
 const ROW: f32 = 32.0;
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("poses").show(ui, |ui| {

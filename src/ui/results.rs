@@ -8,7 +8,7 @@ use super::cx::Cx;
 use super::theme::{SMALL, caption, medium, section};
 use super::widget::{empty, progress};
 use crate::app::action::Action;
-use crate::app::command::{Command, TasksCommand};
+use crate::app::command::{Command, Pane, TasksCommand};
 use crate::app::evaluate::{EvaluateCommand, GRASPS};
 use crate::domain::evaluation::{Column, Figures, Group, Row, columns};
 
@@ -21,8 +21,11 @@ const NARROW: f32 = 900.0;
 /// The columns that can be missed.
 const MINOR: [&str; 2] = ["SSIM 22.5", "FID"];
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         choices(cx, ui);

@@ -39,7 +39,7 @@ pub(super) fn text(cx: &Cx<'_>) -> (String, Color32) {
     if cx.state.document.unsaved.contains(cx.state.pair_name()) {
         return ("saving…".into(), cx.p.caution);
     }
-    match cx.local.saved.at {
+    match cx.shared.saved.at {
         Some(at) => (format!("saved {}", clock(at)), cx.p.good),
         None => (String::new(), cx.p.weak),
     }

@@ -9,13 +9,19 @@ mod overlay;
 mod steps;
 
 use eframe::egui::{self, Ui};
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
+use strum::IntoEnumIterator as _;
+
+use build::{SceneCloud, SceneMesh};
+use gizmo::Gizmo;
+use layers::LayerColors;
+use steps::StepLines;
 
 use super::cx::Cx;
 use super::images;
-use super::scene_view::SceneOutput;
+use super::scene_view::{SceneOutput, SceneView};
 use super::widget::empty;
-use crate::app::command::{CameraPreset, Command, Hover, ViewCommand};
+use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
 use crate::app::workbench::WorkbenchCommand;
@@ -25,16 +31,59 @@ use crate::gpu::pick::nearest_point;
 use crate::gpu::view::{Camera, Preset};
 use crate::work::cloud::Clouds;
 
-pub(super) use gizmo::Gizmo;
-pub(super) use layers::LayerColors;
 pub(super) use overlay::{angle_text, error_color, pose_details};
-pub(super) use steps::StepLines;
 
 /// How near the pointer must be to a point to mean it, physical pixels.
 const PICK_PX: f64 = 9.0;
 
+/// The views of both sides, and what the renderer holds of the results; lists are by [`ImprintSource`].
+#[derive(Default)]
+pub(super) struct Memory {
+    /// Cameras and pictures.
+    views: [SceneView; 2],
+    /// Points on the device.
+    clouds: [Option<SceneCloud>; 2],
+    /// Colors of the contact points.
+    layer_colors: [Option<LayerColors>; 2],
+    /// The handles of the pose tool.
+    gizmo: Gizmo,
+    /// The CAD model on the device.
+    mesh: Option<SceneMesh>,
+    /// Correspondences of the step that the time machine shows.
+    step_lines: Option<StepLines>,
+    /// Counts what was made for the renderer.
+    revision: u64,
+}
+
+impl Memory {
+    /// Turns the cameras of all sides, or of `only` one.
+    pub(super) fn look_from(&mut self, only: Option<ImprintSource>, preset: CameraPreset) {
+        for source in ImprintSource::iter().filter(|source| only.is_none_or(|only| only == *source)) {
+            self.views[source as usize].camera.look_from(match preset {
+                CameraPreset::Left => Preset::Left,
+                CameraPreset::Right => Preset::Right,
+                CameraPreset::Front => Preset::Front,
+                CameraPreset::Top => Preset::Top,
+            });
+        }
+    }
+
+    /// Fits the views to their panes when they are drawn next.
+    pub(super) fn fit(&mut self) {
+        for view in &mut self.views {
+            view.placed = false;
+        }
+    }
+
+    /// Where a point of the grasp frame (meters) appeared when a side was last drawn.
+    pub(super) fn on_screen(&self, source: ImprintSource, point: DVec3) -> Option<egui::Pos2> {
+        self.views[source as usize].on_screen(point)
+    }
+}
+
 /// The pane of one side.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane) {
+    let source = if pane == Pane::SceneMeasured { ImprintSource::Measured } else { ImprintSource::Predicted };
     let device = match cx.device {
         Ok(device) => device,
         Err(why) => {
@@ -48,31 +97,31 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
         (Lookup::Failed(err), _) => return images::failed(cx, ui, err),
         (Lookup::Absent(absent), _) => return images::absent_text(cx, ui, absent),
         // Without any cloud yet, the view itself would be empty: say that it is on its way.
-        (Lookup::Waiting, _) if cx.local.scene_clouds[source as usize].is_none() => {
+        (Lookup::Waiting, _) if memory.clouds[source as usize].is_none() => {
             empty::show(ui, "Loading…", "", None);
             return;
         }
         _ => {}
     }
     if let (Lookup::Ready(clouds), Ok(Some(key))) = (lookup, state.cloud_key(source)) {
-        build::update_cloud(cx, source, key, clouds);
+        build::update_cloud(memory, source, key, clouds);
     }
     if state.workbench.both_clouds {
         let other = other_side(source);
         if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(other), state.cloud_key(other)) {
-            build::update_cloud(cx, other, key, clouds);
+            build::update_cloud(memory, other, key, clouds);
         }
     }
-    build::update_mesh(cx);
-    layers::update(cx, source);
-    steps::update(cx, source);
+    build::update_mesh(cx, memory);
+    layers::update(cx, memory, source);
+    steps::update(cx, memory, source);
     let label = match source {
         ImprintSource::Measured => "3D view, measured",
         ImprintSource::Predicted => "3D view, predicted",
     };
-    let held = cx.local.gizmo.holds(source);
-    let output = cx.local.scenes[source as usize].interact(ui, label, held);
-    if output.pointer.is_some() && state.workbench.side != source && cx.local.gizmo.is_free() {
+    let held = memory.gizmo.holds(source);
+    let output = memory.views[source as usize].interact(ui, label, held);
+    if output.pointer.is_some() && state.workbench.side != source && memory.gizmo.is_free() {
         cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
     }
     let seconds = ui.input(|i| i.time);
@@ -80,36 +129,36 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
         // The only thing that moves by itself, and only while a person asked for it.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
     }
-    let mut scene = build::scene_of(cx, source, seconds);
-    let place = output.fit || !cx.local.scenes[source as usize].placed;
+    let mut scene = build::scene_of(cx, memory, source, seconds);
+    let place = output.fit || !memory.views[source as usize].placed;
     if place && let Some(bounds) = scene.bounds() {
-        let view = &mut cx.local.scenes[source as usize];
+        let view = &mut memory.views[source as usize];
         view.camera.fit(bounds, output.size);
         view.placed = true;
     }
     if (output.moved || place) && state.settings.cameras_linked {
-        let camera = cx.local.scenes[source as usize].camera;
-        let other = &mut cx.local.scenes[1 - source as usize];
+        let camera = memory.views[source as usize].camera;
+        let other = &mut memory.views[1 - source as usize];
         other.camera = camera;
-        other.placed |= cx.local.scene_clouds[1 - source as usize].is_some();
+        other.placed |= memory.clouds[1 - source as usize].is_some();
     }
     scene.moving = output.moved;
     if output.moved {
         // Points were thinned out while moving: draw all of them once it rests.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(120));
     }
-    cx.local.scenes[source as usize].draw(ui, device, &output, &scene);
+    memory.views[source as usize].draw(ui, device, &output, &scene);
     if matches!(lookup, Lookup::Stale(_) | Lookup::Waiting) {
         ui.painter().rect_filled(output.response.rect, 0.0, cx.p.canvas.gamma_multiply(0.45));
     }
     if let Lookup::Ready(clouds) = lookup {
-        pick(cx, ui, source, &output, clouds);
-        measure::click(cx, source, &output, clouds);
+        pick(cx, ui, memory, source, &output, clouds);
+        measure::click(cx, memory, source, &output, clouds);
     }
-    overlay::show(cx, ui, source, &output);
+    overlay::show(cx, ui, memory, source, &output);
     let rect = output.response.rect;
-    measure::marks(cx, ui, source, &output);
-    gizmo::show(cx, ui, source, &output);
+    measure::marks(cx, ui, memory, source, &output);
+    gizmo::show(cx, ui, memory, source, &output);
     hands::tools(cx, ui, source, rect);
     hands::strip(cx, ui, source, rect);
     if let Lookup::Ready(clouds) = lookup {
@@ -142,14 +191,14 @@ fn nearest(clouds: &Clouds, camera: &Camera, size: [u32; 2], pointer: glam::DVec
 }
 
 /// The point under the pointer becomes the pixel under the pointer of all images.
-fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
+fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let Some(pointer) = output.pointer else { return };
     if ui.input(|i| i.pointer.delta() == egui::Vec2::ZERO) || output.moved {
         // At rest, or while the view turns, the mark stays where it is.
-        cx.local.hover_claimed = true;
+        cx.shared.hover_claimed = true;
         return;
     }
-    let camera = &cx.local.scenes[source as usize].camera;
+    let camera = &memory.views[source as usize].camera;
     let Some((finger, index)) = nearest(clouds, camera, output.size, pointer) else {
         if cx.state.selection.hover_point.is_some() {
             cx.push(ViewCommand::HoverPoint(None));
@@ -160,13 +209,13 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, c
     else {
         return;
     };
-    cx.local.hover_claimed = true;
+    cx.shared.hover_claimed = true;
     let hover = Some(Hover { finger, at_px: [f32::from(pixel[0]), f32::from(pixel[1])] });
     if cx.state.selection.hover != hover {
         cx.push(ViewCommand::HoverPixel(hover));
         cx.push(ViewCommand::HoverPoint(Some(point)));
     }
-    cx.local.readout = Some(format!(
+    cx.shared.readout = Some(format!(
         "3D {} ({}, {})   x {:.2}  y {:.2}  z {:.2} mm in the grasp frame",
         cx.state.finger_name(finger),
         pixel[0],
@@ -175,14 +224,4 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput, c
         units::mm(point.y),
         units::mm(point.z)
     ));
-}
-
-/// The side that a request of the action table means.
-pub(super) fn preset(preset: CameraPreset) -> Preset {
-    match preset {
-        CameraPreset::Left => Preset::Left,
-        CameraPreset::Right => Preset::Right,
-        CameraPreset::Front => Preset::Front,
-        CameraPreset::Top => Preset::Top,
-    }
 }

@@ -10,7 +10,7 @@ use super::theme::{SMALL, caption, section};
 use super::widget::colorbar::gradient;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
-use crate::app::command::{Command, PredictCommand};
+use crate::app::command::{Command, Pane, PredictCommand};
 use crate::app::keys::{EnsembleKey, ImprintSource, PredictionKey};
 use crate::app::seeds::{COUNT, SeedsCommand};
 use crate::app::state::Lookup;
@@ -28,8 +28,11 @@ const BAR: f32 = 24.0;
 /// Height of the dial, points.
 const DIAL: f32 = 132.0;
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     let state = cx.state;
     let finger = state.selection.finger;
     let recipes = match state.seed_recipes(finger) {
@@ -138,7 +141,7 @@ fn picture(
     (image, map, range): (&DepthMap, ColorMap, Range),
 ) {
     let key = (recipe, cx.state.settings.shift, map, range.lo.to_bits(), range.hi.to_bits());
-    let texture = cx.local.textures.get(ui.ctx(), slot, key, false, || (depth_image(image, map, range), None));
+    let texture = cx.shared.textures.get(ui.ctx(), slot, key, false, || (depth_image(image, map, range), None));
     painter.image(texture.texture.id(), rect, Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)), Color32::WHITE);
 }
 
@@ -196,7 +199,7 @@ fn maps(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], ensemble: &Ense
             let [w, h] = map.size();
             let (x, y) = ((share.x * w as f32) as usize, (share.y * h as f32) as usize);
             if let Some(value) = map.get(x, y).filter(|v| v.is_finite()) {
-                cx.local.readout = Some(format!("{name} ({x}, {y})   {}", units::text_mm(f64::from(*value))));
+                cx.shared.readout = Some(format!("{name} ({x}, {y})   {}", units::text_mm(f64::from(*value))));
             }
         }
     }

@@ -6,12 +6,15 @@ use strum::IntoEnumIterator as _;
 use super::cx::Cx;
 use super::theme::{caption, section};
 use crate::app::action::Action;
-use crate::app::command::{Command, SettingsCommand};
+use crate::app::command::{Command, Pane, SettingsCommand};
 use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
 use crate::infer::engine::EngineChoice;
 
+/// Nothing is kept between frames.
+pub(super) type Memory = ();
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("settings").show(ui, |ui| body(cx, ui));

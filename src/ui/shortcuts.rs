@@ -6,7 +6,8 @@ use strum::IntoEnumIterator as _;
 use super::cx::Cx;
 use super::theme::{Palette, SMALL, section};
 use crate::app::action::{Action, Group, Key, Shortcut};
-use crate::app::command::{Pane, ViewCommand};
+use crate::app::command::ViewCommand;
+use crate::app::pane::{Kind, Pane};
 
 /// The toolkit's name of a key.
 fn key_of(key: Key) -> EKey {
@@ -71,8 +72,7 @@ pub(super) fn pressed(ctx: &egui::Context, covered: bool, possible: impl Fn(Acti
 
 /// Whether an action's keys mean it while the pointer is over a pane. Space presses what has the focus elsewhere.
 pub(super) fn fits_pane(action: Action, over: Option<Pane>) -> bool {
-    const PLAYERS: [Pane; 3] = [Pane::TimeMachine, Pane::SceneMeasured, Pane::ScenePredicted];
-    action != Action::PlaySteps || over.is_some_and(|pane| PLAYERS.contains(&pane))
+    action != Action::PlaySteps || over.is_some_and(|pane| matches!(pane.kind(), Kind::Steps | Kind::Scene(_)))
 }
 
 /// The window with all actions and their keys.

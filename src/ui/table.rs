@@ -5,14 +5,16 @@ use eframe::egui::{self, Align2, Color32, FontId, RichText, Role, ScrollArea, Se
 use super::browser::review_color;
 use super::cx::Cx;
 use super::scene::error_color;
-use super::theme::{SMALL, caption};
+use super::theme::{Palette, SMALL, caption};
 use super::widget::empty;
 use crate::app::action::Action;
-use crate::app::command::{LibraryCommand, ViewCommand};
-use crate::app::keys::{ComparisonKey, ImprintSource};
+use crate::app::command::{LibraryCommand, Pane, ViewCommand};
+use crate::app::figures::PairFigures;
 use crate::app::labels::Review;
+use crate::app::state::State;
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
+use crate::domain::units;
 
 /// Height of a row, points.
 const ROW: f32 = 24.0;
@@ -40,11 +42,23 @@ struct Row {
     by_hand: [bool; 2],
 }
 
+/// The order of the rows.
+pub(super) struct Memory {
+    /// The column sorted by, and whether downwards.
+    sort: (usize, bool),
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self { sort: (4, false) }
+    }
+}
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
-        let mut rows = rows(cx);
+        let mut rows = rows(cx.state);
         if rows.is_empty() {
             let action = Action::Generate.command(cx.state).map(|_| ("Generate (Ctrl+G)", Action::Generate.tooltip()));
             if empty::show(
@@ -57,10 +71,10 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
             return;
         }
-        let (column, down) = cx.local.table_sort;
+        let (column, down) = memory.sort;
         sort(&mut rows, column, down);
         summary(cx, ui, &rows);
-        header(cx, ui);
+        header(cx.p, ui, memory);
         ui.spacing_mut().item_spacing.y = 0.0;
         let n = rows.len();
         ScrollArea::vertical().auto_shrink(false).id_salt("table").show_rows(ui, ROW, n, |ui, range| {
@@ -71,42 +85,29 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
 }
 
-/// One row per prediction that is shown for a touch, and one per pair that only has a pose.
-fn rows(cx: &Cx<'_>) -> Vec<Row> {
-    let state = cx.state;
-    let Some(open) = &state.library.open else { return Vec::new() };
-    let mut out = Vec::new();
-    let mut with_prediction = std::collections::BTreeSet::new();
-    let row = |pair: PairId, finger: Option<PadId>, image: [Option<f64>; 3]| {
-        let entry = state.library.entry(pair)?;
-        let seen = cx.local.seen.get(&open.key(pair)).copied().unwrap_or_default();
-        let angle = |source: ImprintSource| seen.error_rad[source as usize].map(f64::to_degrees);
+/// The rows, in the order of the results.
+fn rows(state: &State) -> Vec<Row> {
+    let row = |f: &PairFigures<'_>| {
+        let entry = state.library.entry(f.pair)?;
+        let [measured, predicted] = f.poses.map(|pose| pose.error_rad.map(f64::to_degrees));
+        let c = f.comparison;
         Some(Row {
-            pair,
+            pair: f.pair,
             name: entry.name.rsplit('/').next().unwrap_or(&entry.name).to_owned(),
             tool: entry.tool.as_deref().unwrap_or("").trim_start_matches("pattern_").replace('_', " "),
-            finger,
+            finger: f.finger,
             review: state.document.review(&entry.name),
-            numbers: [image[0], image[1], image[2], angle(ImprintSource::Measured), angle(ImprintSource::Predicted)],
-            by_hand: seen.by_hand,
+            numbers: [
+                c.and_then(|c| c.psnr_db),
+                c.and_then(|c| c.ssim),
+                c.map(|c| units::mm(c.mae_m)),
+                measured,
+                predicted,
+            ],
+            by_hand: f.poses.map(|pose| pose.by_hand),
         })
     };
-    for (touch, recipe) in &state.results.chosen {
-        if touch.pair.dataset != open.seq {
-            continue;
-        }
-        // A finger that was not on screen was not compared.
-        let Some(c) = state.results.comparisons.get(&ComparisonKey(recipe.clone(), state.settings.shift)) else {
-            continue;
-        };
-        let image = [c.psnr_db, c.ssim, Some(c.mae_m * 1e3)];
-        with_prediction.insert(touch.pair);
-        out.extend(row(touch.pair.pair, Some(touch.finger), image));
-    }
-    for key in cx.local.seen.keys().filter(|k| k.dataset == open.seq && !with_prediction.contains(*k)) {
-        out.extend(row(key.pair, None, [None; 3]));
-    }
-    out
+    state.figures_so_far().iter().filter_map(row).collect()
 }
 
 /// Sorts by a column; rows without a number come last either way.
@@ -165,15 +166,15 @@ fn columns(left: f32, width: f32) -> [(f32, f32); 8] {
     })
 }
 
-fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
+fn header(p: &Palette, ui: &mut Ui, memory: &mut Memory) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
-    ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, cx.p.line));
-    let (column, down) = cx.local.table_sort;
+    ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, p.line));
+    let (column, down) = memory.sort;
     for (i, ((name, _, number, tip), (x, w))) in COLUMNS.iter().zip(columns(rect.left(), rect.width())).enumerate() {
         let cell = egui::Rect::from_min_size(pos2(x, rect.top()), vec2(w, ROW));
         let response = ui.interact(cell, ui.scope_id().with(("column", i)), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Sort by {name}")));
-        let color = if i == column || response.hovered() { cx.p.strong } else { cx.p.weak };
+        let color = if i == column || response.hovered() { p.strong } else { p.weak };
         let font = FontId::new(SMALL, super::theme::medium());
         let (at, anchor) = if *number {
             (pos2(cell.right() - 14.0, cell.center().y), Align2::RIGHT_CENTER)
@@ -189,7 +190,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         if response.on_hover_text(format!("{tip}. Click to sort; again to turn round")).clicked() {
             // Worst first: small PSNR and SSIM, large errors.
-            cx.local.table_sort = if i == column { (i, !down) } else { (i, i >= 5) };
+            memory.sort = if i == column { (i, !down) } else { (i, i >= 5) };
         }
     }
 }

@@ -13,7 +13,7 @@ use super::images;
 use super::theme::{SMALL, caption, pane_frame};
 use super::widget::empty;
 use crate::app::action::Action;
-use crate::app::command::{Command, SettingsCommand};
+use crate::app::command::{Command, Pane, SettingsCommand};
 use crate::app::inspect::{InspectCommand, Inspected};
 use crate::app::keys::{ImprintSource, PoseBits, PoseEngine};
 use crate::app::state::Lookup;
@@ -27,9 +27,16 @@ const TABLE: f32 = 292.0;
 /// Height of the rows of controls, points.
 const ROW: f32 = 26.0;
 
+/// The clock of what plays.
+#[derive(Default)]
+pub(super) struct Memory {
+    /// When the last step went by while playing, seconds.
+    played_at: Option<f64>,
+}
+
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
-    play(cx, ui);
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
+    play(cx, ui, memory);
     pane_frame(cx.p).inner_margin(egui::Margin::symmetric(8, 4)).show(ui, |ui| {
         let full = ui.available_rect_before_wrap();
         ui.set_min_size(full.size());
@@ -87,15 +94,15 @@ fn row(ui: &mut Ui, rect: Rect, add: impl FnOnce(&mut Ui)) {
 }
 
 /// Lets the next step come when its time is there. Nothing is painted for it while nothing plays.
-fn play(cx: &mut Cx<'_>, ui: &Ui) {
+fn play(cx: &mut Cx<'_>, ui: &Ui, memory: &mut Memory) {
     if !cx.state.inspect.playing {
-        cx.local.played_at = None;
+        memory.played_at = None;
         return;
     }
     let now = ui.input(|i| i.time);
-    let since = now - *cx.local.played_at.get_or_insert(now);
+    let since = now - *memory.played_at.get_or_insert(now);
     if since >= 1.0 / PACE {
-        cx.local.played_at = Some(now);
+        memory.played_at = Some(now);
         cx.push(Command::Inspect(InspectCommand::By(1)));
     }
     let wait = (1.0 / PACE - since).clamp(0.001, 1.0 / PACE);

@@ -5,5 +5,6 @@ pub mod colorbar;
 pub mod empty;
 pub mod help;
 pub mod image_canvas;
+pub mod line;
 pub mod progress;
 pub mod texture;

@@ -138,7 +138,7 @@ mod tests {
         let mut imprints: PerPad<DepthMap> = sample.rig.pads().map(imprint).collect();
         // Holes within the mask have no point, in either way.
         imprints[lab::LEFT].as_mut().unwrap().as_mut_slice()[5000..9000].fill(f32::NAN);
-        let masks: PerPad<Mask> = imprints.clone().map(|i| i.map(|i| i.map(|&d| !(d < 0.004))));
+        let masks: PerPad<Mask> = imprints.clone().map(|i| i.map(|i| i.map(|&d| d.is_nan() || d >= 0.004)));
         let parts = sample.rig.pads().map(|pad| Some((imprints[pad].as_ref()?, masks[pad].as_ref()))).collect();
         let surface = clouds(&sample, &parts).unwrap();
         let points = contact_points(&sample, &imprints.as_ref(), &masks.as_ref()).unwrap();

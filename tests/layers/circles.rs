@@ -227,9 +227,9 @@ fn the_modules_of_a_layer_form_no_circle() {
 }
 
 /// What of `app` knows each other by its nature, and so counts as one part, beside each room's `state.rs`: the state
-/// holds the results and what the rooms keep, a recipe says how its result is computed from the state, and the data
-/// behind the state is one of the services.
-const MODEL: &[&str] = &["history", "keys", "results", "services", "state", "wanted"];
+/// holds the results and what the rooms keep, a recipe says how its result is computed from the state, the data behind
+/// the state is one of the services, and a pane's row says what is computed for it.
+const MODEL: &[&str] = &["history", "keys", "pane", "results", "services", "state", "wanted"];
 
 /// The part of `app` that a module or an item lies in: the model, or the module that acts on it.
 fn part_of_app(path: &[String]) -> Option<String> {

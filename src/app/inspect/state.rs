@@ -3,16 +3,13 @@
 use std::sync::Arc;
 
 use super::super::keys::{ImprintSource, PairKey, PoseBits, PoseEngine};
+use super::super::pane::Need;
 pub use super::super::results::inspection::Inspection;
 use super::super::state::State;
-use super::super::view::state::Pane;
 use super::super::workbench::state::Layer;
 use crate::domain::align::TraceStep;
 use crate::domain::align::basin::Plane;
 use crate::domain::frames::PlanarPose;
-
-/// Panes that show a recorded run or the map of starts.
-pub const INSPECT_PANES: [Pane; 2] = [Pane::TimeMachine, Pane::BasinMap];
 
 /// What of a registration is looked at. Not kept between runs of the program.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,12 +127,8 @@ impl State {
 
     /// Whether something on screen shows a step of an imprint's registration.
     pub fn shows_steps(&self, source: ImprintSource) -> bool {
-        let scene = match source {
-            ImprintSource::Measured => Pane::SceneMeasured,
-            ImprintSource::Predicted => Pane::ScenePredicted,
-        };
-        let lines = self.workbench.layer == Layer::Correspondences && self.selection.panes.contains(&scene);
-        self.inspect.source == source && (lines || self.selection.panes.contains(&Pane::TimeMachine))
+        let lines = self.workbench.layer == Layer::Correspondences && self.needs(Need::Scene(source));
+        self.inspect.source == source && (lines || self.needs(Need::Steps))
     }
 
     /// The step that the 3D view of a side shows instead of the registered pose.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::view::state::Pane;
+use super::super::pane::Need;
 use super::pose::{PoseKey, Registered};
 use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, Wanted};
 use crate::domain::align::basin::{Basin, Plane};
@@ -64,7 +64,7 @@ impl State {
 
 impl Wanted<'_> {
     pub(crate) fn basin(&mut self) {
-        if let (true, Ok(Some(key))) = (self.state.is_visible(&[Pane::BasinMap]), self.state.basin_key()) {
+        if let (true, Ok(Some(key))) = (self.state.needs(Need::Basin), self.state.basin_key()) {
             self.ask(key);
         }
     }

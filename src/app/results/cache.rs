@@ -35,6 +35,11 @@ impl<K: Ord + Clone, V> Cache<K, V> {
         Some(&entry.value)
     }
 
+    /// All values with their keys; none of them counts as used.
+    pub fn iter(&self) -> impl Iterator<Item = (&K, &Arc<V>)> {
+        self.entries.iter().map(|(key, entry)| (key, &entry.value))
+    }
+
     /// Whether `key` has a value.
     pub fn contains(&self, key: &K) -> bool {
         self.entries.contains_key(key)

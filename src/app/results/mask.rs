@@ -118,13 +118,21 @@ pub struct MaskInForce<'a> {
 }
 
 impl State {
-    /// The recipe of the automatic mask that the settings ask for.
+    /// The recipe of the automatic masks that the settings ask for, of whatever pair.
     ///
     /// # Errors
-    /// Why this source cannot give one for this finger.
-    pub fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
+    /// Why the source that the settings ask for cannot give one.
+    pub(crate) fn automatic_recipe(&self) -> Result<MaskRecipe, Absent> {
         let model = self.bundle(BundleKind::Mask).map(|bundle| &bundle.id);
-        let recipe = self.settings.mask.choice.recipe(model.ok()).ok_or(Absent::NoMaskModel)?;
+        self.settings.mask.choice.recipe(model.ok()).ok_or(Absent::NoMaskModel)
+    }
+
+    /// The recipe of a finger's automatic mask.
+    ///
+    /// # Errors
+    /// Why the source that the settings ask for cannot give one for this finger.
+    pub fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
+        let recipe = self.automatic_recipe()?;
         match recipe {
             MaskRecipe::Cad(_) => {
                 self.tool_name()?;

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::super::keys::ShiftMode;
-use super::super::view::state::Pane;
+use super::super::pane::Need;
 use super::prediction::PredictionKey;
-use super::{State, TouchKey};
+use super::{ImprintSource, State, TouchKey};
 use crate::domain::rig::PadId;
 use crate::work::job::{PreviewPicture, Previews};
 
@@ -82,7 +82,7 @@ impl State {
 
     /// What of a prediction under way would be looked at: the predicted imprints on screen, unless a pen is on them.
     pub fn preview_wish(&self) -> PreviewWish {
-        let shown = self.is_visible(&[Pane::Predicted]) && self.document.stroke.is_none();
+        let shown = self.needs(Need::Imprint(ImprintSource::Predicted)) && self.document.stroke.is_none();
         let touches = match self.pair_key().filter(|_| shown) {
             Some(pair) => self.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
             None => Default::default(),

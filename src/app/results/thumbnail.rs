@@ -1,6 +1,6 @@
 //! The small pictures of the list.
 
-use super::super::view::state::Pane;
+use super::super::pane::Need;
 use super::{Computes, Job, Lane, PairKey, SharedServices, State, Wanted};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::DepthMap;
@@ -40,7 +40,7 @@ impl Wanted<'_> {
     /// The pictures of the rows on screen.
     pub(crate) fn thumbnails(&mut self) {
         let state = self.state;
-        let Some(open) = state.library.open.as_ref().filter(|_| state.is_visible(&[Pane::Browser])) else {
+        let Some(open) = state.library.open.as_ref().filter(|_| state.needs(Need::Thumbnails)) else {
             return;
         };
         let end = state.library.rows.end.min(state.library.order.len());

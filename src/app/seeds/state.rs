@@ -1,9 +1,9 @@
 //! Several seeds of one touch: which, what is there of them, and what is missing.
 
 use super::super::keys::{CloudKey, ImprintKey, MaskKey, MaskVersion, MetersKey, PoseKey, PredictionKey, Request};
+use super::super::pane::Need;
 use super::super::results::prediction::SeedKey;
 use super::super::state::{Absent, State};
-use super::super::view::state::Pane;
 use super::super::wanted::Wanted;
 use crate::domain::ensemble::seeds;
 use crate::domain::grid::DepthMap;
@@ -114,7 +114,7 @@ impl Wanted<'_> {
     /// What the pane of the seeds shows and is not there, most urgent first.
     pub(in crate::app) fn seeds(&mut self) {
         let state = self.state;
-        if !state.is_visible(&[Pane::Seeds]) || state.sample().ready().is_none() {
+        if !state.needs(Need::Seeds) || state.sample().ready().is_none() {
             return;
         }
         let posed = state.seed_pose_absent().is_none();

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
+use super::super::pane::Pane;
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
 
@@ -26,58 +27,6 @@ pub struct Selection {
     pub palette: bool,
     /// Whether the shortcut sheet is open.
     pub shortcut_sheet: bool,
-}
-
-/// A pane of the window. What is visible decides what is computed.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter, serde::Serialize, serde::Deserialize,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Pane {
-    /// The list of pairs.
-    Browser,
-    /// The GelSlim image during the touch.
-    GelRaw,
-    /// The GelSlim image without contact.
-    GelReference,
-    /// Touched minus untouched.
-    GelDifference,
-    /// The measured imprint.
-    Measured,
-    /// The predicted imprint.
-    Predicted,
-    /// Predicted minus measured.
-    Error,
-    /// The measured cloud on the CAD model.
-    SceneMeasured,
-    /// The predicted cloud on the CAD model.
-    ScenePredicted,
-    /// The steps of a registration.
-    TimeMachine,
-    /// Where starts lead.
-    BasinMap,
-    /// The generator.
-    Generate,
-    /// Several seeds of one touch.
-    Seeds,
-    /// The mask tools.
-    Masks,
-    /// Residuals, reasons, distances and observability of a registration.
-    Layers,
-    /// Poses of truth, measurement and prediction, per finger and joint.
-    Poses,
-    /// The depth chain: from the decoder to meters, stage by stage.
-    Ledger,
-    /// The figures of the selected pair.
-    Metrics,
-    /// The figures of all pairs so far.
-    Table,
-    /// The paper's results table of the whole data set.
-    Results,
-    /// What happened.
-    Log,
-    /// Preferences.
-    Settings,
 }
 
 /// A pixel under the pointer, in raw bubble pixels of one finger.

@@ -6,8 +6,8 @@ use glam::DVec3;
 use strum::EnumIter;
 
 use super::super::keys::{ImprintSource, PairKey, RunKey};
+use super::super::pane::Need;
 use super::super::state::State;
-use super::super::view::state::Pane;
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::{AcceptedPose, HandCost, HandPose, PoseDifference};
 use crate::domain::rig::{PadId, Rig};
@@ -212,15 +212,11 @@ impl State {
 
     /// Whether something on screen shows the layers of an imprint.
     pub fn shows_layers(&self, source: ImprintSource) -> bool {
-        let scene = match source {
-            ImprintSource::Measured => Pane::SceneMeasured,
-            ImprintSource::Predicted => Pane::ScenePredicted,
-        };
         let bench = &self.workbench;
-        let in_scene = self.selection.panes.contains(&scene)
+        let in_scene = self.needs(Need::Scene(source))
             && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
                 || bench.picked.is_some_and(|picked| picked.source == source));
-        in_scene || (self.selection.panes.contains(&Pane::Layers) && bench.side == source)
+        in_scene || (self.needs(Need::Layers) && bench.side == source)
     }
 
     /// How far the registered poses of measurement and prediction are apart, where both are there.

@@ -5,25 +5,47 @@ use std::sync::Arc;
 use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
-use super::{layers, steps};
-use crate::app::keys::{CloudKey, ImprintSource};
+use super::{Memory, layers, steps};
+use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource};
+use crate::domain::mesh::TriMesh;
+use crate::domain::rig::PerPad;
 use crate::gpu::guides;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
-use crate::ui::cx::{Cx, SceneCloud, SceneMesh, side_color};
+use crate::ui::cx::{Cx, side_color};
 use crate::ui::images::CONTACT;
 use crate::ui::theme::{self, Palette};
 use crate::work::cloud::{Clouds, FingerCloud};
+
+/// Points as the renderer takes them, made once per cloud.
+pub(super) struct SceneCloud {
+    /// The cloud.
+    pub key: CloudKey,
+    /// Counts up with every new cloud.
+    pub revision: u64,
+    /// Per finger: the membrane and the contact.
+    pub fingers: PerPad<[Arc<[DVec3]>; 2]>,
+}
+
+/// A CAD model as the renderer takes it.
+pub(super) struct SceneMesh {
+    /// The data set and the tool.
+    pub key: (DatasetSeq, String),
+    /// Counts up with every new model.
+    pub revision: u64,
+    /// The model.
+    pub mesh: Arc<TriMesh>,
+}
 
 pub(super) fn rgb(c: Color32) -> [f32; 3] {
     [f32::from(c.r()) / 255.0, f32::from(c.g()) / 255.0, f32::from(c.b()) / 255.0]
 }
 
 /// Points for the renderer, made again only for another cloud.
-pub(super) fn update_cloud(cx: &mut Cx<'_>, source: ImprintSource, key: CloudKey, clouds: &Clouds) {
-    let held = &mut cx.local.scene_clouds[source as usize];
+pub(super) fn update_cloud(memory: &mut Memory, source: ImprintSource, key: CloudKey, clouds: &Clouds) {
+    let held = &mut memory.clouds[source as usize];
     if held.as_ref().is_some_and(|h| h.key == key) {
         return;
     }
@@ -34,38 +56,38 @@ pub(super) fn update_cloud(cx: &mut Cx<'_>, source: ImprintSource, key: CloudKey
         indices.into_iter().filter(kept).filter_map(|i| f.points.get(i).copied()).collect::<Arc<[DVec3]>>()
     };
     let convert = |f: &FingerCloud| [part(f, false), part(f, true)];
-    cx.local.revision += 1;
+    memory.revision += 1;
     let fingers = clouds.fingers.as_ref().map(|cloud| cloud.map(convert));
-    *held = Some(SceneCloud { key, revision: cx.local.revision, fingers });
+    *held = Some(SceneCloud { key, revision: memory.revision, fingers });
 }
 
-pub(super) fn update_mesh(cx: &mut Cx<'_>) {
+pub(super) fn update_mesh(cx: &Cx<'_>, memory: &mut Memory) {
     let Some(tool) = cx.state.tool().shown() else { return };
     let Some(open) = &cx.state.library.open else { return };
-    if cx.local.mesh.as_ref().is_some_and(|m| m.key.0 == open.seq && m.key.1 == tool.name) {
+    if memory.mesh.as_ref().is_some_and(|m| m.key.0 == open.seq && m.key.1 == tool.name) {
         return;
     }
-    cx.local.revision += 1;
+    memory.revision += 1;
     let key = (open.seq, tool.name.clone());
-    cx.local.mesh = Some(SceneMesh { key, revision: cx.local.revision, mesh: Arc::new(tool.model.mesh.clone()) });
+    memory.mesh = Some(SceneMesh { key, revision: memory.revision, mesh: Arc::new(tool.model.mesh.clone()) });
 }
 
 /// Everything one side shows at time `seconds`.
-pub(super) fn scene_of(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> SceneData {
+pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64) -> SceneData {
     let mut scene = SceneData { background: rgb(cx.p.canvas), ..SceneData::default() };
-    clouds(cx, source, &mut scene);
+    clouds(cx, memory, source, &mut scene);
     pointed(cx, source, &mut scene);
     picked(cx, source, &mut scene);
-    meshes(cx, source, seconds, &mut scene);
+    meshes(cx, memory, source, seconds, &mut scene);
     scene.lines.extend(layers::ellipse(cx, source));
-    steps::add(cx, source, &mut scene);
+    steps::add(cx, memory, source, &mut scene);
     guides(cx, &mut scene);
     scene
 }
 
 /// Membrane and contact points of both fingers.
-fn clouds(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
-    if let Some(cloud) = &cx.local.scene_clouds[source as usize] {
+fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
+    if let Some(cloud) = &memory.clouds[source as usize] {
         for (finger, parts) in cloud.fingers.entries() {
             // The membrane recedes, the contact stands out.
             let rest = theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
@@ -79,20 +101,20 @@ fn clouds(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
                     style: CloudStyle { color: rgb(color), size, ..CloudStyle::default() },
                 };
                 if name == "contact" {
-                    layers::paint(cx, source, finger, &mut item);
+                    layers::paint(memory, source, finger, &mut item);
                 }
                 scene.clouds.push(item);
             }
         }
     }
     if cx.state.workbench.both_clouds {
-        other_cloud(cx, super::other_side(source), scene);
+        other_cloud(cx, memory, super::other_side(source), scene);
     }
 }
 
 /// The contact points of the other side, in its color, where both are shown in one view.
-fn other_cloud(cx: &Cx<'_>, other: ImprintSource, scene: &mut SceneData) {
-    let Some(cloud) = &cx.local.scene_clouds[other as usize] else { return };
+fn other_cloud(cx: &Cx<'_>, memory: &Memory, other: ImprintSource, scene: &mut SceneData) {
+    let Some(cloud) = &memory.clouds[other as usize] else { return };
     // What is of another pair is no comparison.
     if cx.state.cloud_key(other) != Ok(Some(cloud.key.clone())) {
         return;
@@ -149,10 +171,10 @@ fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
 }
 
 /// The CAD model at the registered and at the true pose.
-fn meshes(cx: &Cx<'_>, source: ImprintSource, seconds: f64, scene: &mut SceneData) {
+fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64, scene: &mut SceneData) {
     let state = cx.state;
     let tool_now = state.tool().ready().map(|t| t.name.as_str());
-    if let Some(mesh) = cx.local.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) {
+    if let Some(mesh) = memory.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) {
         let item = |name: &str, style: MeshStyle| MeshItem {
             name: name.into(),
             revision: mesh.revision,
@@ -179,7 +201,7 @@ fn meshes(cx: &Cx<'_>, source: ImprintSource, seconds: f64, scene: &mut SceneDat
             (None, Some(registered)) => {
                 let pose = layers::swayed(cx, source, registered, seconds);
                 // Colored points are what is looked at: the model lets them through.
-                let colored = cx.local.layer_colors[source as usize].is_some();
+                let colored = memory.layer_colors[source as usize].is_some();
                 show("CAD", pose.to_affine(), cx.p.cad, if colored { Look::XRay } else { Look::Solid });
             }
             (None, None) => {}

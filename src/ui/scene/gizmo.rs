@@ -6,6 +6,7 @@
 use eframe::egui::{PointerButton, Pos2, Shape, Stroke, Ui, vec2};
 use glam::{DVec2, DVec3};
 
+use super::Memory;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::workbench::{SceneTool, WorkbenchCommand};
@@ -28,7 +29,7 @@ const EDGE_ON: f64 = 0.12;
 
 /// What is dragged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::ui) enum Handle {
+enum Handle {
     /// y and z.
     Disc,
     /// A turn about x, y or z.
@@ -50,7 +51,7 @@ struct Drag {
 
 /// The handles' state between frames.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::ui) struct Gizmo {
+pub(super) struct Gizmo {
     /// The handle under the pointer.
     hot: Option<(ImprintSource, Handle)>,
     drag: Option<Drag>,
@@ -190,23 +191,23 @@ fn dragged(camera: &Camera, size: [u32; 2], from: HandPose, handle: Handle, bega
 }
 
 /// Follows the pointer and paints the handles.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &Ui, memory: &mut Memory, source: ImprintSource, output: &SceneOutput) {
     let bench = &cx.state.workbench;
     let elsewhere = bench.hand.as_ref().is_some_and(|hand| hand.source != source);
     if bench.tool != SceneTool::Pose || elsewhere || cx.state.tool().ready().is_none() {
-        if cx.local.gizmo.holds(source) {
-            cx.local.gizmo = Gizmo::default();
+        if memory.gizmo.holds(source) {
+            memory.gizmo = Gizmo::default();
         }
         return;
     }
     let pose = bench.hand(source).map_or_else(|| cx.state.hand_begins(source), |hand| hand.pose);
     let six_dof = bench.six_dof;
-    let camera = cx.local.scenes[source as usize].camera;
+    let camera = memory.views[source as usize].camera;
     let ppp = ui.pixels_per_point();
     let Some(placed) = place(&camera, output, ppp, pose, six_dof) else { return };
     let pointer = output.response.hover_pos().or_else(|| output.response.interact_pointer_pos());
     let response = &output.response;
-    let gizmo = &mut cx.local.gizmo;
+    let gizmo = &mut memory.gizmo;
     let to_px = |pos: Pos2| {
         let p = (pos - response.rect.min) * ppp;
         DVec2::new(f64::from(p.x), f64::from(p.y))

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use eframe::egui::Color32;
 use glam::{DAffine3, DVec2, DVec3};
 
+use super::Memory;
 use crate::app::command::Pane;
 use crate::app::keys::{ImprintSource, PoseKey};
 use crate::app::workbench::Layer;
@@ -26,7 +27,7 @@ const ELLIPSE_LIMIT_M: f64 = 0.012;
 const SWAY_S: f64 = 2.0;
 
 /// Colors of the contact points of one registration, made once.
-pub(in crate::ui) struct LayerColors {
+pub(super) struct LayerColors {
     key: (PoseKey, Layer),
     revision: u64,
     range: Range,
@@ -34,9 +35,9 @@ pub(in crate::ui) struct LayerColors {
 }
 
 /// Makes the colors of a side's contact points, where a layer is on and its figures are there.
-pub(super) fn update(cx: &mut Cx<'_>, source: ImprintSource) {
+pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let layer = cx.state.workbench.layer;
-    let held = &mut cx.local.layer_colors[source as usize];
+    let held = &mut memory.layer_colors[source as usize];
     let layers = cx.state.layers(source).ready();
     let (Some(layers), Ok(Some(key)), Layer::Residuals | Layer::Reasons) = (layers, cx.state.pose_key(source), layer)
     else {
@@ -51,19 +52,19 @@ pub(super) fn update(cx: &mut Cx<'_>, source: ImprintSource) {
         Layer::Residuals => PointColors::Scalar(fits.iter().map(|fit| fit.residual_m).collect::<Arc<[f32]>>()),
         _ => PointColors::PerPoint(fits.iter().map(|fit| reason_rgb(Reason::from(fit.fate))).collect()),
     };
-    cx.local.revision += 1;
+    memory.revision += 1;
     *held = Some(LayerColors {
         key,
-        revision: cx.local.revision,
+        revision: memory.revision,
         range: Range { lo: 0.0, hi: layers.range_m as f32 },
         fingers: layers.fits.as_ref().map(|fits| fits.map(colors)),
     });
 }
 
 /// Colors the contact points of one finger, if the layer is of this very cloud.
-pub(super) fn paint(cx: &Cx<'_>, source: ImprintSource, finger: PadId, item: &mut CloudItem) {
-    let Some(colors) = &cx.local.layer_colors[source as usize] else { return };
-    let same = cx.local.scene_clouds[source as usize].as_ref().is_some_and(|cloud| cloud.key == colors.key.0.cloud);
+pub(super) fn paint(memory: &Memory, source: ImprintSource, finger: PadId, item: &mut CloudItem) {
+    let Some(colors) = &memory.layer_colors[source as usize] else { return };
+    let same = memory.clouds[source as usize].as_ref().is_some_and(|cloud| cloud.key == colors.key.0.cloud);
     if !same {
         return;
     }
@@ -93,7 +94,7 @@ pub(super) fn swayed(cx: &Cx<'_>, source: ImprintSource, pose: PlanarPose, secon
 
 /// The ellipse of shifts that change the fit equally, with the weakest direction as a line through it.
 pub(super) fn ellipse(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesItem> {
-    let shown = cx.state.workbench.animate_weakest || cx.local.visible.contains(&Pane::Layers);
+    let shown = cx.state.workbench.animate_weakest || cx.state.selection.panes.contains(&Pane::Layers);
     let o = observability(cx, source).filter(|_| shown)?;
     let ellipse = o.ellipse(ELLIPSE_TOLERANCE_M, ELLIPSE_LIMIT_M);
     let color = if o.degenerate { cx.p.caution } else { cx.p.accent };

@@ -1,9 +1,9 @@
 //! Clicks in a 3D view: a point is read, or measured to.
 
-use eframe::egui::{Align2, Color32, FontId, Pos2, Rect, Stroke, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{Color32, FontId, Pos2, Rect, Stroke, Ui, UiBuilder, pos2, vec2};
 use glam::DVec3;
 
-use super::nearest;
+use super::{Memory, nearest};
 use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::workbench::{Picked, SceneTool, WorkbenchCommand};
@@ -12,16 +12,17 @@ use crate::ui::cx::Cx;
 use crate::ui::layers::reason_rgb;
 use crate::ui::scene_view::SceneOutput;
 use crate::ui::theme::{SMALL, caption};
+use crate::ui::widget::line::Line;
 use crate::work::cloud::Clouds;
 
 /// What a click does.
-pub(super) fn click(cx: &mut Cx<'_>, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
+pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let tool = cx.state.workbench.tool;
     if !output.response.clicked() || tool == SceneTool::Pose {
         return;
     }
     let Some(pointer) = output.pointer else { return };
-    let camera = &cx.local.scenes[source as usize].camera;
+    let camera = &memory.views[source as usize].camera;
     let hit = nearest(clouds, camera, output.size, pointer).and_then(|(finger, index)| {
         let cloud = clouds.finger(finger)?;
         Some((finger, *cloud.points.get(index)?, *cloud.pixels.get(index)?))
@@ -39,7 +40,7 @@ pub(super) fn click(cx: &mut Cx<'_>, source: ImprintSource, output: &SceneOutput
 }
 
 /// The measurement: its points, the lines between them, and the number.
-pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneOutput) {
+pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput) {
     let bench = &cx.state.workbench;
     let rect = output.response.rect;
     let painter = ui.painter_at(rect);
@@ -55,7 +56,7 @@ pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, output: &SceneO
         label(pos2(rect.center().x - 90.0, rect.bottom() - 34.0), text, cx.p.text);
     }
     let points: Vec<DVec3> = bench.marks.iter().filter(|(of, _)| *of == source).map(|(_, p)| *p).collect();
-    let camera = &cx.local.scenes[source as usize].camera;
+    let camera = &memory.views[source as usize].camera;
     let places: Vec<Option<Pos2>> = points.iter().map(|p| output.on_screen(camera, *p)).collect();
     let color = cx.p.strong;
     for pair in places.windows(2) {
@@ -124,27 +125,17 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
                     }
                 });
             });
+            let line = Line { height: 15.0, size: SMALL, column: 0.0, swatch: None };
             for (name, value) in lines {
-                line(ui, cx.p.weak, name, &value, cx.p.strong);
+                line.show(ui, (name, cx.p.weak), &[(value, cx.p.strong)]);
             }
-            match layer {
-                Some((reason, _)) => {
-                    let [r, g, b] = reason_rgb(reason);
-                    line(ui, cx.p.weak, "Reason", &reason.to_string(), Color32::from_rgb(r, g, b));
-                }
-                None => line(ui, cx.p.weak, "Reason", "…", cx.p.weak),
-            }
+            let reason = layer.map_or(("…".to_owned(), cx.p.weak), |(reason, _)| {
+                let [r, g, b] = reason_rgb(reason);
+                (reason.to_string(), Color32::from_rgb(r, g, b))
+            });
+            line.show(ui, ("Reason", cx.p.weak), &[reason]);
         });
     });
-}
-
-fn line(ui: &mut Ui, weak: Color32, name: &str, value: &str, color: Color32) {
-    use eframe::egui::{Role, Sense, WidgetInfo};
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 15.0), Sense::hover());
-    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{name} {value}")));
-    let font = FontId::proportional(SMALL);
-    ui.painter().text(rect.left_center(), Align2::LEFT_CENTER, name, font.clone(), weak);
-    ui.painter().text(rect.right_center(), Align2::RIGHT_CENTER, value, font, color);
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use strum::IntoEnumIterator as _;
 
+use super::Memory;
 use super::build::{AXIS, axes_origin};
 use super::hands;
 use crate::app::action::Action;
@@ -25,10 +26,10 @@ use crate::ui::theme::Palette;
 use crate::work::pose::PoseResult;
 
 /// What is written over the picture: angle, stop reason, legend, scale bar, names of the axes.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, output: &SceneOutput) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput) {
     let rect = output.response.rect;
     let painter = ui.painter_at(rect);
-    let camera = cx.local.scenes[source as usize].camera;
+    let camera = memory.views[source as usize].camera;
     axes_and_scale(cx.p, &painter, &camera, output, rect);
     let mut y = rect.top() + 8.0;
     let x = rect.left() + 10.0;
@@ -77,8 +78,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, output: 
         }
         write(text, 11.0, cx.p.weak);
     }
-    legend(cx, ui, source, rect);
-    super::steps::show_legend(cx, ui, source, rect);
+    legend(cx, ui, memory, source, rect);
+    super::steps::show_legend(cx, ui, memory, source, rect);
     sides(cx, ui, source, rect);
 }
 
@@ -235,11 +236,11 @@ fn residual_bar(cx: &Cx<'_>, painter: &egui::Painter, source: ImprintSource, rec
 }
 
 /// What the colors mean, and buttons for the sides.
-fn legend(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
+fn legend(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, rect: Rect) {
     let p = cx.p;
     let painter = ui.painter_at(rect);
     let mut entries = vec![(side_color(p, source), "membrane")];
-    match cx.local.layer_colors[source as usize].as_ref().map(|_| cx.state.workbench.layer) {
+    match memory.layer_colors[source as usize].as_ref().map(|_| cx.state.workbench.layer) {
         Some(Layer::Reasons) => {}
         Some(_) => residual_bar(cx, &painter, source, rect),
         None => entries.push((CONTACT, "contact")),
@@ -257,12 +258,12 @@ fn legend(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
     if cx.state.pose(source).shown().is_some() {
         entries.push((p.cad, "CAD, aligned"));
     }
-    if cx.state.sample().ready().is_some_and(|s| s.grasp_from_object.is_some()) && cx.local.mesh.is_some() {
+    if cx.state.sample().ready().is_some_and(|s| s.grasp_from_object.is_some()) && memory.mesh.is_some() {
         entries.push((p.truth, "CAD, true pose"));
     }
     let mut entries: Vec<(Color32, String)> = entries.into_iter().map(|(c, text)| (c, text.to_owned())).collect();
     if cx.state.workbench.layer == Layer::Reasons
-        && cx.local.layer_colors[source as usize].is_some()
+        && memory.layer_colors[source as usize].is_some()
         && let Some(layers) = cx.state.layers(source).ready()
     {
         // The reasons of the points that are drawn, with their counts.

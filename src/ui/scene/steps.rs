@@ -5,6 +5,7 @@ use std::sync::Arc;
 use eframe::egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 use glam::{DAffine3, DVec3};
 
+use super::Memory;
 use super::build::rgb;
 use crate::app::inspect::{Inspected, Inspection};
 use crate::app::keys::ImprintSource;
@@ -27,7 +28,7 @@ const RESIDUAL_MM: f32 = 4.0;
 const OPACITY: [f64; 2] = [0.2, 0.8];
 
 /// The correspondences of one step as the renderer takes them.
-pub(in crate::ui) struct StepLines {
+pub(super) struct StepLines {
     of: Arc<Inspection>,
     run: usize,
     at: usize,
@@ -46,12 +47,12 @@ pub(super) fn pose(cx: &Cx<'_>, source: ImprintSource) -> Option<PlanarPose> {
 }
 
 /// Makes the lines of the step shown, once per step.
-pub(super) fn update(cx: &mut Cx<'_>, source: ImprintSource) {
+pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let Some(Inspected { inspection, run, at, step }) = cx.state.inspected_in(source) else { return };
     let Some(tool) = cx.state.tool().ready() else { return };
     let dark = *cx.p == DARK;
     let same = |l: &StepLines| Arc::ptr_eq(&l.of, inspection) && (l.run, l.at, l.dark) == (run, at, dark);
-    if cx.local.step_lines.as_ref().is_some_and(same) {
+    if memory.step_lines.as_ref().is_some_and(same) {
         return;
     }
     let matches = inspection.counterparts.at(&inspection.points, &tool.model, step, MOST_LINES);
@@ -62,13 +63,13 @@ pub(super) fn update(cx: &mut Cx<'_>, source: ImprintSource) {
         // The registration is planar: the counterpart has the point's own x.
         Some(Segment { ends: [from, DVec3::new(from.x, m.foot_yz.x, m.foot_yz.y)], rgba: [r, g, b, alpha] })
     });
-    cx.local.revision += 1;
-    cx.local.step_lines = Some(StepLines {
+    memory.revision += 1;
+    memory.step_lines = Some(StepLines {
         of: inspection.clone(),
         run,
         at,
         dark,
-        revision: cx.local.revision,
+        revision: memory.revision,
         segments: segments.collect(),
         shown: [matches.list.len(), matches.of],
         residual_m: matches.median_and_max_m(),
@@ -76,15 +77,15 @@ pub(super) fn update(cx: &mut Cx<'_>, source: ImprintSource) {
 }
 
 /// The lines of a side, if they are to be drawn.
-fn lines<'a>(cx: &'a Cx<'_>, source: ImprintSource) -> Option<&'a StepLines> {
+fn lines<'a>(cx: &Cx<'_>, memory: &'a Memory, source: ImprintSource) -> Option<&'a StepLines> {
     let on = cx.state.inspect.lines || cx.state.workbench.layer == Layer::Correspondences;
     let shown = cx.state.inspected_in(source).filter(|_| on)?;
-    cx.local.step_lines.as_ref().filter(|l| Arc::ptr_eq(&l.of, shown.inspection))
+    memory.step_lines.as_ref().filter(|l| Arc::ptr_eq(&l.of, shown.inspection))
 }
 
 /// Adds correspondences and pinned steps.
-pub(super) fn add(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
-    if let Some(lines) = lines(cx, source) {
+pub(super) fn add(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
+    if let Some(lines) = lines(cx, memory, source) {
         scene.lines.push(LinesItem {
             name: "correspondences".into(),
             revision: lines.revision,
@@ -92,7 +93,7 @@ pub(super) fn add(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
             style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.5, opacity: 1.0, overlay: true },
         });
     }
-    let Some(mesh) = &cx.local.mesh else { return };
+    let Some(mesh) = &memory.mesh else { return };
     for (i, pin) in pins(cx, source) {
         scene.meshes.push(MeshItem {
             name: format!("CAD at pin {i}"),
@@ -132,8 +133,8 @@ fn color_at(p: &Palette, share: f32) -> Color32 {
 }
 
 /// What the colors of the lines mean, and how many there are.
-pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, source: ImprintSource, rect: Rect) {
-    let Some(lines) = lines(cx, source) else { return };
+pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, rect: Rect) {
+    let Some(lines) = lines(cx, memory, source) else { return };
     let painter = ui.painter_at(rect);
     let font = FontId::proportional(11.0);
     let (width, left) = (110.0, rect.left() + 122.0);

@@ -10,6 +10,7 @@ use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::scene;
 use crate::ui::theme::{SMALL, caption};
+use crate::ui::widget::line::Line;
 
 /// Height of a line, points.
 const LINE: f32 = 16.0;
@@ -60,7 +61,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         }
         columns.push(("B − A", cx.p.strong, difference));
     }
-    heads(cx, ui, &columns, pins);
+    let column = ((ui.available_width() - NAMES) / columns.len() as f32).min(52.0);
+    let line = Line { height: LINE, size: 12.0, column, swatch: None };
+    heads(cx, ui, &columns, pins, column);
     for (i, (name, tip)) in [
         ("Angle °", "Of object from grasp: the angle that the lab reports"),
         ("y mm", "Of the object's origin in the grasp frame"),
@@ -83,7 +86,10 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
                 (text, color)
             })
             .collect();
-        line(ui, (name, cx.p.weak), &numbers).on_hover_text(tip);
+        ui.scope(|ui| {
+            ui.set_max_width(NAMES + column * columns.len() as f32);
+            line.show(ui, (name, cx.p.weak), &numbers).on_hover_text(tip);
+        });
     }
     ui.add_space(3.0);
     let kernel = if step.kernel_m.is_finite() {
@@ -123,11 +129,10 @@ fn text(cx: &Cx<'_>, ui: &mut Ui, text: &str, tip: &str) {
 }
 
 /// The names of the columns; those of pins let them go.
-fn heads(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[(&str, Color32, Column)], pins: [Option<Pin>; 2]) {
+fn heads(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[(&str, Color32, Column)], pins: [Option<Pin>; 2], width: f32) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), LINE), Sense::hover());
-    let width = column_width(rect.width(), columns.len());
     for (i, (name, color, _)) in columns.iter().enumerate() {
-        let right = rect.left() + NAMES + width * (i + 1) as f32;
+        let right = rect.left() + NAMES + width * (i + 1) as f32 - 2.0;
         let pin = ["A", "B"].iter().position(|n| n == name);
         let text = if pin.is_some() { format!("{name} ×") } else { (*name).to_owned() };
         let place = egui::Rect::from_min_max(pos2(right - width, rect.top()), pos2(right, rect.bottom()));
@@ -144,24 +149,4 @@ fn heads(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[(&str, Color32, Column)], pins
             }
         }
     }
-}
-
-fn column_width(width: f32, columns: usize) -> f32 {
-    ((width - NAMES) / columns.max(1) as f32).min(52.0)
-}
-
-/// A name and its numbers, in columns that never move.
-fn line(ui: &mut Ui, name: (&str, Color32), numbers: &[(String, Color32)]) -> egui::Response {
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), LINE), Sense::hover());
-    let all: Vec<&str> = numbers.iter().map(|n| n.0.as_str()).collect();
-    response.widget_info(|| WidgetInfo::labeled(Role::Label, true, format!("{} {}", name.0, all.join(" "))));
-    let font = FontId::proportional(12.0);
-    let y = rect.center().y;
-    ui.painter().text(pos2(rect.left(), y), Align2::LEFT_CENTER, name.0, font.clone(), name.1);
-    let width = column_width(rect.width(), numbers.len());
-    for (i, (number, color)) in numbers.iter().enumerate() {
-        let x = rect.left() + NAMES + width * (i + 1) as f32;
-        ui.painter().text(pos2(x, y), Align2::RIGHT_CENTER, number, font.clone(), *color);
-    }
-    response
 }

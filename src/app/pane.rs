@@ -1,0 +1,301 @@
+//! [`Pane`]: the panes of the window, one row each. Titles, menus, default places, what is drawn by which file of the
+//! window and what is computed while a pane is on screen all follow from its row.
+
+use super::keys::ImprintSource;
+use super::settings::state::Workspace;
+
+/// What a pane shows, as far as mouse, colors and links between panes depend on it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A list, a table or controls.
+    Form,
+    /// Pictures of color sensors.
+    Color,
+    /// Imprints of one side.
+    Imprint(ImprintSource),
+    /// Differences of imprints.
+    Error,
+    /// A 3D view of one side.
+    Scene(ImprintSource),
+    /// Steps that can be played.
+    Steps,
+    /// A map that is clicked.
+    Map,
+}
+
+/// Where a pane lies in a workspace at first. Panes of one dock are its tabs, the one of the earlier row in front.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Dock {
+    /// The column at the left.
+    Left,
+    /// In the upper row of the middle, counted from the left.
+    Top(u8),
+    /// In the lower row of the middle, counted from the left.
+    Bottom(u8),
+    /// In the column at the right, counted from the top.
+    Right(u8),
+}
+
+/// What is computed while a pane is on screen. Everything but [`Need::Thumbnails`] is of the selected pair and begins
+/// with its tensors and labels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Need {
+    /// Nothing besides the tensors and labels.
+    Pair,
+    /// The imprint of a side, with its mask where masks are drawn.
+    Imprint(ImprintSource),
+    /// Masks, even where they are not drawn.
+    Masks,
+    /// The prediction against the measurement.
+    Comparison,
+    /// What the GelSlim image leaves open.
+    Ambiguity,
+    /// The depth chain.
+    Ledger,
+    /// Several seeds.
+    Seeds,
+    /// Cloud and pose of a side, in 3D.
+    Scene(ImprintSource),
+    /// The poses of both sides.
+    Poses,
+    /// The poses from each finger alone.
+    FingerPoses,
+    /// The layers of the registration that the workbench is about.
+    Layers,
+    /// The recorded registration that is looked at.
+    Steps,
+    /// The map of its starts.
+    Basin,
+    /// Small pictures of the pairs in the list.
+    Thumbnails,
+}
+
+/// The table, given to the macro `$with`: for each file of `ui` the panes that it draws.
+macro_rules! panes {
+    ($with:ident) => {
+        $with! {
+            browser {
+                Browser {
+                    "Samples", "The pairs of what is open", Form, needs [Thumbnails],
+                    at [Inspect Left, Align Left, Label Left, Evaluate Left]
+                }
+            }
+            metrics {
+                Metrics {
+                    "Figures", "The figures of this pair", Form, needs [Comparison, Ambiguity, Ledger, Poses],
+                    at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
+                }
+            }
+            generate {
+                Generate {
+                    "Generate", "Predicts the Soft Bubble imprint", Form, needs [Pair],
+                    at [Inspect Right(1), Align Right(2), Evaluate Right(1)]
+                }
+            }
+            scene {
+                SceneMeasured {
+                    "3D measured", "The measured surface on the CAD model, grasp frame",
+                    Scene(Measured), needs [Scene(Measured)],
+                    at [Inspect Bottom(3), Align Top(1), Label Bottom(2), Evaluate Right(1)]
+                }
+                ScenePredicted {
+                    "3D predicted", "The predicted surface on the CAD model, grasp frame",
+                    Scene(Predicted), needs [Scene(Predicted)],
+                    at [Inspect Bottom(2), Align Top(2), Label Bottom(2)]
+                }
+            }
+            images {
+                GelDifference {
+                    "GelSlim difference" as "GelSlim diff",
+                    "Touched minus untouched, around mid gray: what the generator sees",
+                    Color, needs [Pair], at [Inspect Top(1), Label Bottom(1)]
+                }
+                GelRaw {
+                    "GelSlim raw" as "raw", "The GelSlim image during the touch, rotated to line up with the bubble",
+                    Color, needs [Pair], at [Inspect Top(1)]
+                }
+                GelReference {
+                    "GelSlim reference" as "reference",
+                    "The GelSlim image without contact, rotated to line up with the bubble",
+                    Color, needs [Pair], at [Inspect Top(1)]
+                }
+                Measured {
+                    "Measured imprint", "What the Soft Bubble measured; dashed: what the GelSlim sees of it",
+                    Imprint(Measured), needs [Imprint(Measured)],
+                    at [Inspect Top(2), Align Top(1), Label Top(1), Evaluate Bottom(1)]
+                }
+                Predicted {
+                    "Predicted imprint", "What the generator predicts from the GelSlim image, in the same colors",
+                    Imprint(Predicted), needs [Imprint(Predicted), Ambiguity],
+                    at [Inspect Top(3), Align Top(2), Label Top(1), Evaluate Bottom(2)]
+                }
+                Error {
+                    "Error", "Predicted minus measured: blue too shallow, red too deep", Error, needs [Comparison],
+                    at [Inspect Bottom(1), Evaluate Bottom(3)]
+                }
+            }
+            ledger {
+                Ledger {
+                    "Depth chain", "Everything between the decoder and the meters, stage by stage",
+                    Form, needs [Ledger], at [Inspect Bottom(1), Evaluate Bottom(3)]
+                }
+            }
+            seeds {
+                Seeds {
+                    "Seeds", "Several predictions of the touch: where they disagree, and how their poses fan out",
+                    Form, needs [Seeds], at [Inspect Bottom(1)]
+                }
+            }
+            timemachine {
+                TimeMachine {
+                    "Time machine", "The steps of a registration, forwards and backwards",
+                    Steps, needs [Steps], at [Align Bottom(1)]
+                }
+            }
+            basin {
+                BasinMap {
+                    "Basin map", "Where starts lead; a click on one loads its run into the time machine",
+                    Map, needs [Basin], at [Align Right(1)]
+                }
+            }
+            layers {
+                Layers {
+                    "Layers", "Residuals, drop reasons, distances both ways and the weak direction of a registration",
+                    Form, needs [Layers], at [Align Right(1)]
+                }
+            }
+            poses {
+                Poses {
+                    "Poses", "Truth, measurement and prediction against each other, per finger and joint",
+                    Form, needs [Poses, FingerPoses], at [Align Right(1)]
+                }
+            }
+            masks {
+                Masks { "Mask", "Corrects the contact mask", Form, needs [Masks], at [Label Right(1)] }
+            }
+            results {
+                Results {
+                    "Results", "The paper's results table of the open data set", Form, needs [],
+                    at [Evaluate Top(1)]
+                }
+            }
+            table {
+                Table { "All figures", "The figures of all pairs so far", Form, needs [], at [Evaluate Top(1)] }
+            }
+            log {
+                Log {
+                    "Log", "What happened", Form, needs [],
+                    at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
+                }
+            }
+            settings_pane {
+                Settings { "Settings", "Preferences", Form, needs [], at [Inspect Right(1)] }
+            }
+        }
+    };
+}
+#[cfg(feature = "gui")]
+pub(crate) use panes;
+
+macro_rules! define {
+    ($( $file:ident { $( $pane:ident {
+        $title:literal $(as $tab:literal)?, $tip:literal, $kind:expr, needs [$($need:expr),*],
+        at [$($workspace:ident $dock:expr),*]
+    } )* } )*) => {
+        /// A pane of the window. What is on screen decides what is computed.
+        #[derive(
+            Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter, serde::Serialize, serde::Deserialize,
+        )]
+        #[serde(rename_all = "snake_case")]
+        pub enum Pane {
+            $($( #[doc = $tip] $pane, )*)*
+        }
+
+        impl Pane {
+            /// The title.
+            pub fn title(self) -> &'static str {
+                match self { $($( Self::$pane => $title, )*)* }
+            }
+
+            /// The title where several tabs have to fit side by side into the narrowest column.
+            pub fn tab(self) -> &'static str {
+                match self { $($( Self::$pane => [$title $(, $tab)?].last().unwrap_or(&$title), )*)* }
+            }
+
+            /// What it shows, for the tooltip of its title.
+            pub fn tip(self) -> &'static str {
+                match self { $($( Self::$pane => $tip, )*)* }
+            }
+
+            /// What kind of thing that is.
+            pub fn kind(self) -> Kind {
+                use ImprintSource::{Measured, Predicted};
+                use Kind::{Color, Error, Form, Imprint, Map, Scene, Steps};
+                match self { $($( Self::$pane => $kind, )*)* }
+            }
+
+            /// What is computed for it.
+            pub fn needs(self) -> &'static [Need] {
+                use ImprintSource::{Measured, Predicted};
+                use Need::{
+                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Seeds, Steps,
+                    Thumbnails,
+                };
+                match self { $($( Self::$pane => &[$($need),*], )*)* }
+            }
+
+            /// Where it lies at first in the workspaces that have it.
+            fn places(self) -> &'static [(Workspace, Dock)] {
+                use Dock::{Bottom, Left, Right, Top};
+                match self { $($( Self::$pane => &[$((Workspace::$workspace, $dock)),*], )*)* }
+            }
+        }
+    };
+}
+panes!(define);
+
+impl Pane {
+    /// The panes of a workspace, dock by dock.
+    pub fn of(workspace: Workspace) -> Vec<Self> {
+        use strum::IntoEnumIterator as _;
+        let mut panes: Vec<Self> = Self::iter().filter(|pane| pane.dock(workspace).is_some()).collect();
+        panes.sort_by_key(|pane| pane.dock(workspace));
+        panes
+    }
+
+    /// Where it lies at first in a workspace that has it.
+    pub fn dock(self, workspace: Workspace) -> Option<Dock> {
+        self.places().iter().find(|(of, _)| *of == workspace).map(|(_, dock)| *dock)
+    }
+
+    /// The side that it is about.
+    pub fn side(self) -> Option<ImprintSource> {
+        match self.kind() {
+            Kind::Imprint(side) | Kind::Scene(side) => Some(side),
+            _ => None,
+        }
+    }
+
+    /// Whether it shows something of the selected pair.
+    pub fn is_of_pair(self) -> bool {
+        self.needs().iter().any(|need| *need != Need::Thumbnails)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use strum::IntoEnumIterator as _;
+
+    #[test]
+    fn every_pane_can_be_found() {
+        for workspace in Workspace::iter() {
+            assert_eq!(Pane::of(workspace)[0], Pane::Browser, "{workspace:?} begins at the left");
+        }
+        for pane in Pane::iter() {
+            assert!(!pane.places().is_empty(), "{pane:?} lies in no workspace");
+            let same = Pane::iter().filter(|other| other.title() == pane.title()).count();
+            assert_eq!(same, 1, "{pane:?} shares its title with another");
+        }
+    }
+}
