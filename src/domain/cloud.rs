@@ -54,15 +54,6 @@ pub struct Lifted {
     pub outside_mask: usize,
 }
 
-/// [`Lifted`] with the finger it belongs to.
-#[derive(Clone, Debug, PartialEq)]
-pub struct FingerCloud {
-    /// The finger that felt it.
-    pub finger: PadId,
-    /// Its points.
-    pub lifted: Lifted,
-}
-
 /// Where a point of a [`ContactCloud`] came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PointSource {
@@ -155,14 +146,9 @@ pub fn project(camera: &DepthCamera, in_grasp: DVec3) -> Option<DVec2> {
 ///
 /// # Errors
 /// [`CloudError::NoCamera`] for a touch of an image folder; otherwise as [`lift`].
-pub fn lift_finger(
-    touch: &DepthTouch,
-    rig: &Rig,
-    finger: PadId,
-    mask: Option<&Mask>,
-) -> Result<FingerCloud, CloudError> {
+pub fn lift_finger(touch: &DepthTouch, rig: &Rig, finger: PadId, mask: Option<&Mask>) -> Result<Lifted, CloudError> {
     let camera = touch.camera.as_ref().ok_or_else(|| CloudError::NoCamera { finger: rig.pad_key(finger) })?;
-    Ok(FingerCloud { finger, lifted: lift(&touch.imprint, camera, mask)? })
+    lift(&touch.imprint, camera, mask)
 }
 
 impl ContactCloud {
@@ -176,15 +162,14 @@ impl ContactCloud {
         let mut cloud = Self::default();
         for (finger, touch) in sample.pads.entries() {
             if let Some(bubble) = touch.depth() {
-                cloud.push(lift_finger(bubble, &sample.rig, finger, masks[finger])?);
+                cloud.push(finger, lift_finger(bubble, &sample.rig, finger, masks[finger])?);
             }
         }
         Ok(cloud)
     }
 
     /// Adds a finger's points.
-    pub fn push(&mut self, part: FingerCloud) {
-        let FingerCloud { finger, lifted } = part;
+    pub fn push(&mut self, finger: PadId, lifted: Lifted) {
         self.counts[finger] = Some(FingerCounts {
             points: lifted.points.len(),
             invalid: lifted.invalid,

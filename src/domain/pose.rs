@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::align::{
     AlignConfig, AlignError, AlignReport, Ask, Directions, IcpConfig, LabIcpConfig, RefineConfig, Register, Scene, icp,
 };
-use super::cloud::{CloudError, ContactCloud, FingerCloud, lift};
+use super::cloud::{CloudError, ContactCloud, lift};
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Mask};
 use super::rig::{PadId, PerPad, Rig, Text};
@@ -207,7 +207,7 @@ pub fn contact_cloud(fingers: &Fingers<'_>) -> Result<ContactCloud, PoseError> {
     for (finger, input) in fingers.inputs.entries() {
         let lifted = lift(input.imprint, input.camera, input.mask)
             .map_err(|source| PoseError::Cloud { finger: fingers.rig.pad_key(finger), source })?;
-        cloud.push(FingerCloud { finger, lifted });
+        cloud.push(finger, lifted);
     }
     if cloud.counts.is_empty() { Err(PoseError::NoFinger) } else { Ok(cloud) }
 }
