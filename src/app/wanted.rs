@@ -1,6 +1,7 @@
 //! Views ask for what they show: the recipes behind the selection, what is there of it, and what is missing.
 
 mod chain;
+mod generator;
 
 use std::sync::Arc;
 
@@ -13,8 +14,8 @@ use super::keys::{
 use super::settings::MaskSource;
 use super::state::{Absent, Lookup, State};
 use super::workbench::PoseOf;
-use crate::domain::grid::{DepthMap, Mask, RgbGrid};
-use crate::domain::rig::{PadId, PerPad, SensorKind};
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use crate::domain::units;
 use crate::work::bundles::{BundleInfo, BundleKind};
@@ -135,50 +136,6 @@ impl State {
         let others = self.library.bundles.iter().any(|bundle| bundle.kind == kind && !bundle.fits(&rig));
         let absent = if others { Absent::OtherSensors } else { absent };
         self.library.bundle_named(kind, name, &rig).ok_or(absent)
-    }
-
-    /// Whether something can be generated for the selected pair.
-    ///
-    /// # Errors
-    /// Why not.
-    pub fn can_generate(&self) -> Result<(), Absent> {
-        self.pair_key().ok_or(if self.library.open.is_none() {
-            Absent::NothingOpen
-        } else {
-            Absent::NothingSelected
-        })?;
-        self.bundle(BundleKind::Generator)?;
-        // While the sample loads, the job loads it itself.
-        let Some(sample) = self.sample().ready() else {
-            return Ok(());
-        };
-        if sample.rig.pads().any(|finger| self.has_input(sample, finger)) { Ok(()) } else { Err(Absent::NoInput) }
-    }
-
-    /// Whether a finger has a reading of the sensor that the generator starts from.
-    fn has_input(&self, sample: &Sample, finger: PadId) -> bool {
-        let ends = self.bundle(BundleKind::Generator).ok().and_then(|bundle| bundle.ends(&sample.rig)?.ok());
-        ends.is_some_and(|ends| sample.pad(finger).is_some_and(|touch| touch.reading(ends.input).is_some()))
-    }
-
-    /// Whether something can be generated for a finger of the selected pair, which is loaded.
-    pub fn can_start(&self, finger: PadId) -> bool {
-        self.sample().ready().is_some_and(|sample| self.has_input(sample, finger))
-    }
-
-    /// Whether a prediction is a color picture.
-    pub(super) fn is_color(&self, recipe: &PredictionKey) -> bool {
-        let bundle = self.library.bundle(&recipe.bundle).and_then(|bundle| bundle.generator.as_ref());
-        bundle.is_some_and(|generator| generator.sensors.output.kind == SensorKind::Color)
-    }
-
-    /// The predicted color picture shown for one finger, where that is what the model predicts.
-    pub fn predicted_color(&self, finger: PadId) -> Option<Lookup<'_, RgbGrid>> {
-        let recipe = self.chosen(finger).filter(|recipe| self.is_color(recipe))?;
-        Some(match self.results.colors.get(recipe) {
-            Some(picture) => Lookup::Ready(picture),
-            None => self.missing(&Request::Imprint(recipe.clone(), self.settings.shift)),
-        })
     }
 
     /// The recipe of the automatic mask that the settings ask for.
