@@ -52,7 +52,18 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
     ),
     (
         "work",
-        &["eframe", "egui", "wgpu", "rten::", "ort::", "crate::app", "crate::gpu", "crate::ui", "crate::headless"],
+        &[
+            "eframe",
+            "egui",
+            "wgpu",
+            "rten::",
+            "ort::",
+            "clap",
+            "crate::app",
+            "crate::gpu",
+            "crate::ui",
+            "crate::headless",
+        ],
         "the job knows neither the studio nor the command line",
     ),
     (

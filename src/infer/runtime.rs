@@ -8,8 +8,8 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::engine::{self, EngineChoice, EngineKind};
-use super::library::Searched;
 
+pub use super::library::Searched;
 pub use fetch::{FetchError, VERSION, fetch_runtime};
 
 /// Which engine runs the models, and why.

@@ -126,8 +126,8 @@ fn names(sources: &Sources) -> (BTreeMap<Name, BTreeSet<Name>>, BTreeMap<Name, N
             let mut paths = Vec::new();
             leaves("", tree.trim_end().trim_end_matches(';'), &mut paths);
             for (path, name) in paths {
-                assert_ne!(name, "*", "{}: a glob hides what is named", module.join("::"));
                 if let Some(path) = absolute(module, &path, sources) {
+                    assert_ne!(name, "*", "{}: a glob hides what is named", module.join("::"));
                     imported.insert([module.clone(), vec![name]].concat(), path.clone());
                     own.insert(path);
                 }

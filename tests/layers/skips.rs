@@ -47,7 +47,8 @@ fn a_test_that_cannot_be_tried_says_so() {
     rust_files(&root.join("tests"), &mut files);
     let mut all = 0;
     let mut silent = Vec::new();
-    for file in files {
+    // This file has examples of what it refuses.
+    for file in files.into_iter().filter(|file| !file.ends_with("layers/skips.rs")) {
         let text = std::fs::read_to_string(&file).unwrap();
         for (name, body) in tests(&text) {
             all += 1;
@@ -59,7 +60,7 @@ fn a_test_that_cannot_be_tried_says_so() {
         for (at, _) in text.match_indices(") -> Option<Self> {").chain(text.match_indices(") -> Option<(Self,")) {
             let body = text[at..].split("\n    }\n").next().unwrap_or_default();
             let asks = ["support::gpu()?", "Self::new(", "Self::live("].iter().any(|ask| body.contains(ask));
-            if file.starts_with(root.join("tests")) && !asks && !file.ends_with("layers/skips.rs") {
+            if file.starts_with(root.join("tests")) && !asks {
                 silent.push(format!("{}: an Option<Self> that did not ask support::gpu()", file.display()));
             }
         }

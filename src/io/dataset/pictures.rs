@@ -26,6 +26,7 @@ use crate::domain::rig::{Rig, Sensor, SensorId, SensorKind, lab};
 use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample, Scale};
 use crate::domain::turn::Turn;
 use crate::domain::upright;
+use crate::io::files;
 use crate::io::images;
 
 use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};
@@ -84,15 +85,19 @@ fn suffixes(rig: &Rig) -> [String; KINDS] {
 /// The sensors that the folder declares, else the lab's.
 fn rig_of(folder: &Path, problems: &mut Vec<Problem>) -> Arc<Rig> {
     let file = folder.join(RIG_JSON);
-    let Ok(text) = std::fs::read(&file) else { return Rig::lab() };
-    match Rig::parse(&text) {
-        Ok(rig) => Arc::new(rig),
-        Err(why) => {
+    let rig = match files::read(&file, files::SMALL) {
+        Ok(text) => Rig::parse(&text).map_err(|why| format!("does not declare a rig: {why}")),
+        Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Rig::lab(),
+        Err(err) => Err(format!("cannot be read: {err}")),
+    };
+    rig.map_or_else(
+        |why| {
             let hint = "correct it, or remove it to take the pictures for the lab's sensors";
-            problems.push(problem(file, format!("does not declare a rig: {why}"), hint));
+            problems.push(problem(file, why, hint));
             Rig::lab()
-        }
-    }
+        },
+        Arc::new,
+    )
 }
 
 /// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
