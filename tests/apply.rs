@@ -2,10 +2,10 @@
 //! thread, so that every order of events can be had on purpose.
 
 mod double;
-mod figures;
 mod generating;
 mod inspect;
 mod masks;
+mod metrics;
 mod random;
 mod whole;
 

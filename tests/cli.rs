@@ -10,7 +10,7 @@ use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::hand::{AcceptedPose, HandPose};
-use touch2touch::domain::pose::Engine;
+use touch2touch::domain::pose::Registration;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::{MaskStore, StoredReview};
 
@@ -56,7 +56,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     assert!(pose.status.success(), "{}", error_text(&pose));
     let report = json(&pose);
     let cases = report["cases"].as_array().unwrap();
-    assert_eq!(cases.len(), 4 * Engine::iter().count(), "four pairs, all engines");
+    assert_eq!(cases.len(), 4 * Registration::iter().count(), "four pairs, all engines");
     for case in cases {
         for key in ["name", "angle_deg", "truth_deg", "error_deg", "y_m", "z_m", "ms", "stop"] {
             assert!(!case[key].is_null(), "{key} is missing in {case}");
@@ -143,7 +143,7 @@ fn every_engine_is_measured_on_fresh_cases_and_drawn() {
     let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
     let engines = report["engines"].as_array().unwrap();
     assert!(engines.iter().any(|e| e["name"] == report["default"]), "{report}");
-    assert_eq!(engines.len(), <touch2touch::domain::pose::Engine as strum::IntoEnumIterator>::iter().count());
+    assert_eq!(engines.len(), <touch2touch::domain::pose::Registration as strum::IntoEnumIterator>::iter().count());
     for engine in engines {
         for key in ["mean_deg", "median_deg", "success_5", "success_10", "gross_20", "median_ms", "p95_ms"] {
             assert!(engine[key].is_number(), "{key} of {engine}");

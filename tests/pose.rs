@@ -13,7 +13,7 @@ use touch2touch::domain::contact::{
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::field::DistanceField;
 use touch2touch::domain::grid::Mask;
-use touch2touch::domain::pose::{Engine, ToolModel, register};
+use touch2touch::domain::pose::{Registration, ToolModel, register};
 use touch2touch::domain::rig::{PerPad, lab};
 use touch2touch::domain::units::angle_error;
 use touch2touch::io::cases::{Case, CaseSet};
@@ -61,10 +61,10 @@ fn forty_known_grasps_with_spoilt_masks() {
         median(&build_ms),
         build_ms.iter().copied().fold(0.0, f64::max)
     );
-    for engine in Engine::iter() {
+    for engine in Registration::iter() {
         let (mut errors, mut shifts, mut ms, mut flags, mut lookups) = (vec![], vec![], vec![], vec![], vec![]);
         // The peers take a hundred times as long: a quarter of the cases shows that they work.
-        let every = if matches!(engine, Engine::DistanceField | Engine::LabIcp) { 1 } else { 4 };
+        let every = if matches!(engine, Registration::DistanceField | Registration::LabIcp) { 1 } else { 4 };
         for (name, case) in set.cases.iter().step_by(every) {
             let tool = &tools[&case.tool];
             let begin = Instant::now();
@@ -100,12 +100,12 @@ fn forty_known_grasps_with_spoilt_masks() {
             median(&ms),
             median(&lookups),
         );
-        if engine == Engine::DistanceField {
+        if engine == Registration::DistanceField {
             // A prototype of the same method reached mean 0.93, median 0.58, 100 % on these cases.
             assert!(mean <= 0.75 && median(&errors) <= 0.5 && s5 >= 100.0, "mean {mean} deg, within 5 deg {s5} %");
             assert!(median(&shifts) <= 0.5, "position {} mm", median(&shifts));
             assert!(flags.iter().all(|f| *f), "degenerate grasps are flagged, others are not");
-        } else if engine == Engine::LabIcp {
+        } else if engine == Registration::LabIcp {
             // One start at the identity and a squared cost: worse, as it should be, but no nonsense.
             assert!(s5 >= 50.0, "within 5 deg {s5} %");
         } else {
@@ -153,7 +153,7 @@ fn the_labs_files_with_the_mask_from_the_cad_give_the_stored_angle() {
         });
         let masks: PerPad<Mask> = masks.collect();
         let points = contact_points(&sample, &measured(&sample).as_ref(), &masks.as_ref()).unwrap();
-        let registration = Engine::DistanceField.registration();
+        let registration = Registration::DistanceField.method();
         let pose = work::pose::pose(&points, &tool, &*registration, Ask::default(), Some(truth)).unwrap();
         let error = pose.error_rad.unwrap().to_degrees();
         eprintln!(
@@ -185,7 +185,7 @@ fn error_by_depth(dataset: &Dataset, id: PairId, share: Option<f32>) -> (f64, us
     };
     let masks: PerPad<Mask> = sample.rig.pads().map(mask).collect();
     let points = contact_points(&sample, &measured(&sample).as_ref(), &masks.as_ref()).unwrap();
-    let (registration, truth) = (Engine::DistanceField.registration(), sample.grasp_from_object);
+    let (registration, truth) = (Registration::DistanceField.method(), sample.grasp_from_object);
     let pose = work::pose::pose(&points, &tool, &*registration, Ask::default(), truth);
     pose.map_or((f64::NAN, 0), |pose| (pose.error_rad.unwrap().to_degrees(), pose.num_points))
 }

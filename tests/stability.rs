@@ -20,7 +20,7 @@ use touch2touch::domain::field::{DistanceField, FieldError};
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::mesh::TriMesh;
-use touch2touch::domain::pose::{Engine, register};
+use touch2touch::domain::pose::{Registration, register};
 use touch2touch::domain::tool::{ToolError, ToolModel};
 use touch2touch::domain::units::{angle_error, scale_to_meters};
 use touch2touch::io::cases::{self, Case};
@@ -90,7 +90,12 @@ fn lifted(case: &Case, imprints: &[DepthMap; 2], masks: &[Mask; 2]) -> [Lifted; 
     [0, 1].map(|f| lift(&imprints[f], &case.cameras[f], Some(&masks[f])).unwrap())
 }
 
-fn solve(case: &Case, imprints: &[DepthMap; 2], masks: &[Mask; 2], engine: Engine) -> Result<AlignReport, AlignError> {
+fn solve(
+    case: &Case,
+    imprints: &[DepthMap; 2],
+    masks: &[Mask; 2],
+    engine: Registration,
+) -> Result<AlignReport, AlignError> {
     let points = lifted(case, imprints, masks).map(|pad| pad.points).concat();
     register(&points, case_tool(), engine, false)
 }
@@ -152,7 +157,7 @@ fn e02_the_angle_of_a_rod_is_read_in_the_plane() {
 fn e03_coincident_points_and_too_few_have_no_pose() {
     let model = tool(angle_mesh());
     let same = vec![DVec3::new(0.0, 0.001, 0.002); 50];
-    for engine in Engine::iter() {
+    for engine in Registration::iter() {
         let result = register(&same, &model, engine, false);
         assert!(matches!(result, Err(AlignError::Coincident { .. })), "{engine}: {result:?}");
         for few in 0..3 {
@@ -273,7 +278,7 @@ fn e06_a_tool_in_another_unit_is_refused_and_after_the_offer_the_same() {
     let truth = pose(9.0, -1.0, 2.0);
     let scene = contacts(&meters, 600, truth, 1e-4, 5);
     let reference: Vec<AlignReport> =
-        Engine::iter().map(|e| register(&scene, &tool(meters.clone()), e, false).unwrap()).collect();
+        Registration::iter().map(|e| register(&scene, &tool(meters.clone()), e, false).unwrap()).collect();
     for unit in [1e-2, 1e-3] {
         let stored = scaled_mesh(&meters, 1.0 / unit);
         let model = match ToolModel::new(stored.clone()).map(|_| ()) {
@@ -285,7 +290,7 @@ fn e06_a_tool_in_another_unit_is_refused_and_after_the_offer_the_same() {
             }
             other => panic!("{unit}: {other:?}"),
         };
-        for (engine, reference) in Engine::iter().zip(&reference) {
+        for (engine, reference) in Registration::iter().zip(&reference) {
             let report = register(&scene, &model, engine, false).unwrap();
             let (a, b) = (report.grasp_from_object, reference.grasp_from_object);
             assert!(angle_error(a.theta_rad, b.theta_rad) < 1e-6, "{engine} {unit}");
@@ -342,7 +347,8 @@ fn e07_what_is_not_observable_is_flagged_and_stays_where_it_was() {
     let disc = disc_mesh(0.015, 96);
     let model = tool(disc.clone());
     for seed in 0..10 {
-        let report = register(&contacts(&disc, 800, pose(4.0, 1.0, 2.0), 1e-4, seed), &model, Engine::default(), false);
+        let report =
+            register(&contacts(&disc, 800, pose(4.0, 1.0, 2.0), 1e-4, seed), &model, Registration::default(), false);
         let report = report.unwrap();
         let o = report.observability.unwrap();
         assert!(o.degenerate && o.weakest[0].abs() > 0.95, "a disc turns freely: {o:?}");
@@ -367,12 +373,12 @@ fn e08_disjoint_clouds_do_not_match() {
     let model = tool(angle_mesh());
     for away in [0.1, 1.0, 1000.0] {
         let scene = contacts(&model.mesh, 400, pose(0.0, 1e3 * away, 1e3 * away), 1e-4, 1);
-        for engine in Engine::iter() {
+        for engine in Registration::iter() {
             match register(&scene, &model, engine, false) {
                 Err(AlignError::NoOverlap { share }) => assert!(share < 0.05, "{engine} at {away} m: {share}"),
                 // The paper's loop has no limit of distance: it carries the tool over to the points, which is a match,
                 // but not one that a gripper can hold, and it says so. It must not be an empty match with error 0.
-                Ok(report) if matches!(engine, Engine::LabIcp) => {
+                Ok(report) if matches!(engine, Registration::LabIcp) => {
                     assert!(!report.within_prior, "{engine} at {away} m");
                     assert!(report.inlier_share > 0.05 && report.inlier_rms_m > 0.0, "{engine} at {away} m");
                 }
@@ -408,7 +414,7 @@ fn e09_pixels_without_depth_are_dropped_and_counted() {
                 }
             }
         }
-        for engine in Engine::iter() {
+        for engine in Registration::iter() {
             let with = solve(case, &imprints, &case.masks_clean, engine);
             if percent == 100 {
                 let error = with.unwrap_err();
@@ -441,7 +447,7 @@ fn e10_zero_depth_is_no_point_at_the_camera() {
     for i in 0..200 {
         without[0][(80 + i % 20, 60 + i / 20)] = false;
     }
-    for engine in Engine::iter() {
+    for engine in Registration::iter() {
         let a = solve(case, &imprints, &masks, engine).unwrap().grasp_from_object;
         let b = solve(case, &case.imprints, &without, engine).unwrap().grasp_from_object;
         assert!(angle_error(a.theta_rad, b.theta_rad) <= 1e-9, "{engine}");
@@ -454,7 +460,7 @@ fn e11_axis_aligned_and_equal_model_points_do_not_panic() {
     let square = cuboid(DVec3::ZERO, DVec3::new(0.004, 0.004, 0.03));
     let model = tool(square.clone());
     let scene = contacts(&square, 5000, pose(3.0, 0.5, 0.0), 0.0, 2);
-    for engine in Engine::iter() {
+    for engine in Registration::iter() {
         let report = register(&scene, &model, engine, false).unwrap();
         assert!(report.grasp_from_object.is_finite(), "{engine}");
     }
@@ -474,7 +480,7 @@ fn e12_infinite_input_ends_within_a_second() {
     let bad = [f64::INFINITY, f64::NEG_INFINITY, f64::NAN, 1e300, -1e300, f64::MAX];
     let all_bad: Vec<DVec3> = bad.iter().cycle().take(600).map(|&v| DVec3::new(0.0, v, -v)).collect();
     let mixed: Vec<DVec3> = good.iter().chain(&all_bad).copied().collect();
-    for engine in Engine::iter() {
+    for engine in Registration::iter() {
         for (name, points, solvable) in [("all", &all_bad, false), ("some", &mixed, true)] {
             let (send, answer) = std::sync::mpsc::channel();
             let (points, model) = (points.clone(), model.clone());

@@ -7,7 +7,7 @@ use super::command::{
     PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand, WorkbenchCommand,
 };
 use super::inspect::state::Inspected;
-use super::keys::{ImprintSource, PoseEngine, Request, ShiftMode};
+use super::keys::{ImprintSource, Registration, Request, ShiftMode};
 use super::labels::state::Review;
 use super::library::state::Place;
 use super::settings::state::{ColorRange, MaskTool, Theme, Workspace};
@@ -320,7 +320,7 @@ actions! {
     InspectWorkspace, View, "Inspect", "Truth and prediction side by side", [];
     AlignWorkspace, View, "Align", "The cloud on the CAD model", [];
     LabelWorkspace, View, "Label", "Correcting masks", [];
-    EvaluateWorkspace, View, "Evaluate", "The figures", [];
+    EvaluateWorkspace, View, "Evaluate", "The metrics", [];
     ResetWorkspace, View, "Reset workspace", "Puts the panes back where they were", [];
     MaximizePane, View, "Maximize pane", "Lets one pane fill the window", [plain(K::Backtick)];
     Fullscreen, View, "Full screen", "Fills the screen", [plain(K::F11)];
@@ -493,9 +493,8 @@ impl Action {
             Self::PinStep => inspect(state, |_| true, InspectCommand::Pin),
             Self::OwnStarts => when(state.inspect.start.is_some(), InspectCommand::Start(None)),
             Self::Correspondences => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines)),
-            Self::NextPoseEngine => {
-                next_of::<PoseEngine>(&settings.pose_engine).and_then(|next| does(SettingsCommand::SetPoseEngine(next)))
-            }
+            Self::NextPoseEngine => next_of::<Registration>(&settings.pose_engine)
+                .and_then(|next| does(SettingsCommand::SetPoseEngine(next))),
 
             Self::LockRange => {
                 does(SettingsCommand::SetRange(ColorRange { locked: !settings.range.locked, ..settings.range }))

@@ -17,7 +17,7 @@ pub use super::results::mask::{MaskKey, MaskVersion};
 pub use super::results::pose::PoseKey;
 pub use super::results::prediction::PredictionKey;
 pub use super::results::run::RunKey;
-pub use crate::domain::pose::Engine as PoseEngine;
+pub use crate::domain::pose::Registration;
 
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;

@@ -79,7 +79,7 @@ macro_rules! panes {
                 at [Inspect Left, Align Left, Label Left, Evaluate Left]
             } }
             metrics { Metrics {
-                "Figures", "The figures of this pair", Form, needs [Comparison, Ambiguity, Ledger, Poses],
+                "Metrics", "The metrics of this pair", Form, needs [Comparison, Ambiguity, Ledger, Poses],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
             } }
             generate { Generate {
@@ -160,7 +160,7 @@ macro_rules! panes {
                 at [Evaluate Top(1)]
             } }
             table {
-                Table { "All figures", "The figures of all pairs so far", Form, needs [], at [Evaluate Top(1)] }
+                Table { "All metrics", "The metrics of all pairs so far", Form, needs [], at [Evaluate Top(1)] }
             }
             log { Log {
                 "Log", "What happened", Form, needs [],

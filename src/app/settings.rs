@@ -5,7 +5,7 @@ pub mod state;
 pub use state::*;
 
 use super::effect::Effect;
-use super::keys::{ImprintSource, PoseEngine, ShiftMode};
+use super::keys::{ImprintSource, Registration, ShiftMode};
 use super::state::State;
 use crate::infer::engine::EngineChoice;
 
@@ -45,7 +45,7 @@ pub enum SettingsCommand {
     /// Whether the GelSlim's window is drawn.
     SetFootprintVisible(bool),
     /// The registration.
-    SetPoseEngine(PoseEngine),
+    SetPoseEngine(Registration),
     /// The model runtime.
     SetRuntime(EngineChoice),
     /// What kept predictions may take on the disk, MiB.

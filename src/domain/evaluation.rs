@@ -164,7 +164,7 @@ pub struct Estimate {
 
 /// The figures of one method in one column group. `None`: cannot be there, as the notes say.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Figures {
+pub struct TableMetrics {
     /// The column group.
     pub group: Group,
     /// Tools averaged over.
@@ -201,7 +201,7 @@ pub struct Figures {
     pub seconds: Option<f64>,
 }
 
-impl Figures {
+impl TableMetrics {
     /// A group without figures.
     pub fn empty(group: Group) -> Self {
         Self {
@@ -236,7 +236,7 @@ pub struct Row {
     /// The measured imprints themselves: what no generator can beat.
     pub upper_bound: bool,
     /// One per column group of the table.
-    pub groups: Vec<Figures>,
+    pub groups: Vec<TableMetrics>,
 }
 
 /// The row of a method, for the column groups `groups`; `resamples` drawings for the intervals, 0 for none.
@@ -263,7 +263,7 @@ pub fn groups_of<'a>(grasps: impl IntoIterator<Item = &'a GraspScore>) -> Vec<Gr
     groups
 }
 
-fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples: usize) -> Figures {
+fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples: usize) -> TableMetrics {
     let mut names: Vec<Option<&str>> = grasps.iter().map(|g| g.tool.as_deref()).collect();
     names.sort_unstable();
     names.dedup();
@@ -275,7 +275,7 @@ fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples:
     let mut seconds: Vec<f64> = grasps.iter().filter_map(|g| g.seconds).collect();
     seconds.sort_by(f64::total_cmp);
     let n = seconds.len();
-    Figures {
+    TableMetrics {
         tools: tools.len(),
         grasps: grasps.len(),
         images: grasps.iter().map(|g| g.images.len()).sum(),
@@ -294,7 +294,7 @@ fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples:
             mean(images(tool).filter_map(|i| i.tool_right).map(|right| if right { 100.0 } else { 0.0 }))
         }),
         seconds: (n > 0).then(|| 0.5 * (seconds[(n - 1) / 2] + seconds[n / 2])),
-        ..Figures::empty(group)
+        ..TableMetrics::empty(group)
     }
 }
 

@@ -8,7 +8,7 @@ use super::align::TraceStep;
 use super::align::basin::{Basin, BasinConfig, basin};
 use super::align::correspond::{Matches, ModelPoints, Surface, correspondences};
 use super::mesh::sampling::spread;
-use super::pose::{Engine, ToolModel, register_from};
+use super::pose::{Registration, ToolModel, register_from};
 
 /// Contact points per run of a basin map with the distance field: more move its ends by less than a line is wide.
 const MAP_POINTS: usize = 512;
@@ -21,7 +21,7 @@ const MAP_POINTS_COSTLY: usize = 96;
 pub fn basin_map(
     points: &[DVec3],
     tool: &ToolModel,
-    engine: Engine,
+    engine: Registration,
     config: &BasinConfig,
     cancelled: impl Fn() -> bool + Sync,
 ) -> Option<Basin> {
@@ -32,8 +32,8 @@ pub fn basin_map(
 }
 
 /// Whether the registration compares with the silhouette's field rather than with model points.
-pub fn uses_field(engine: Engine) -> bool {
-    matches!(engine, Engine::DistanceField | Engine::Certified)
+pub fn uses_field(engine: Registration) -> bool {
+    matches!(engine, Registration::DistanceField | Registration::Certified)
 }
 
 /// What contact points are compared with at any step of a run, prepared once per tool.
@@ -44,7 +44,7 @@ pub struct Counterparts {
 
 impl Counterparts {
     /// For a registration with a tool.
-    pub fn new(tool: &ToolModel, engine: Engine) -> Self {
+    pub fn new(tool: &ToolModel, engine: Registration) -> Self {
         Self {
             model: (!uses_field(engine)).then(|| {
                 let surface = tool.surface().iter().map(|(p, _)| *p);
@@ -89,7 +89,7 @@ mod tests {
         let tool = ToolModel::new(cross()).unwrap();
         let points = contacts(600);
         let start = PlanarPose { theta_rad: 0.12, y_m: 0.0, z_m: 0.001 };
-        for engine in Engine::iter() {
+        for engine in Registration::iter() {
             let own = register(&points, &tool, engine, true).unwrap();
             let plain = register(&points, &tool, engine, false).unwrap();
             assert_eq!(own.grasp_from_object, plain.grasp_from_object, "{engine}: looking changes nothing");
@@ -112,14 +112,14 @@ mod tests {
         let tool = ToolModel::new(cross()).unwrap();
         let mut points = contacts(900);
         points.push(DVec3::NAN);
-        for engine in Engine::iter() {
+        for engine in Registration::iter() {
             let config = BasinConfig { size: [5, 3], ..BasinConfig::new(Plane::AngleY) };
             let map = basin_map(&points, &tool, engine, &config, || false).unwrap();
             let most = if uses_field(engine) { MAP_POINTS } else { MAP_POINTS_COSTLY };
             assert_eq!((map.points, map.offered, map.cells.len()), (most, 901, 15), "{engine}");
             assert!(basin_map(&points, &tool, engine, &config, || true).is_none());
         }
-        let none = basin_map(&[], &tool, Engine::default(), &BasinConfig::new(Plane::YZ), || false).unwrap();
+        let none = basin_map(&[], &tool, Registration::default(), &BasinConfig::new(Plane::YZ), || false).unwrap();
         assert!(none.cells.iter().all(|c| c.failure.is_some()) && none.basins.is_empty());
     }
 }

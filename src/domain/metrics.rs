@@ -15,5 +15,5 @@ pub use color::{LEVELS, color, planes};
 pub use frechet::frechet_distance;
 pub use image::{MetricError, Psnr, PsnrMean, mse, psnr, psnr_of_mse, unit_range};
 pub use joint::{Joint, Line, line};
-pub use split::{Figures, Split, split};
+pub use split::{PixelMetrics, Split, split};
 pub use ssim::{Ssim, SsimRange, ssim, ssim_ranges};

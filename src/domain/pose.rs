@@ -30,7 +30,7 @@ pub use super::tool::{ToolError, ToolModel};
 )]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
-pub enum Engine {
+pub enum Registration {
     /// Robust registration on the distance field of the tool's silhouette.
     #[default]
     DistanceField,
@@ -54,7 +54,7 @@ pub enum Engine {
     Refined,
 }
 
-impl Engine {
+impl Registration {
     /// Name in settings, files and on the command line, such as `distance_field`.
     pub fn key(self) -> &'static str {
         self.into()
@@ -103,7 +103,7 @@ impl Engine {
     }
 
     /// The registration with the settings that the product uses.
-    pub fn registration(self) -> Box<dyn Register> {
+    pub fn method(self) -> Box<dyn Register> {
         match self {
             Self::DistanceField => Box::new(AlignConfig::default()),
             Self::Certified => Box::new(AlignConfig::certified()),
@@ -124,8 +124,13 @@ impl Engine {
 ///
 /// # Errors
 /// [`AlignError`] for too few points or none near the tool.
-pub fn register(points: &[DVec3], tool: &ToolModel, engine: Engine, record: bool) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.registration(), points, tool, Ask { starts: None, record })
+pub fn register(
+    points: &[DVec3],
+    tool: &ToolModel,
+    engine: Registration,
+    record: bool,
+) -> Result<AlignReport, AlignError> {
+    register_with(&*engine.method(), points, tool, Ask { starts: None, record })
 }
 
 /// The same from one start, `grasp_from_object`, instead of the engine's own.
@@ -135,11 +140,11 @@ pub fn register(points: &[DVec3], tool: &ToolModel, engine: Engine, record: bool
 pub fn register_from(
     points: &[DVec3],
     tool: &ToolModel,
-    engine: Engine,
+    engine: Registration,
     start: PlanarPose,
     record: bool,
 ) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.registration(), points, tool, Ask { starts: Some(&[start]), record })
+    register_with(&*engine.method(), points, tool, Ask { starts: Some(&[start]), record })
 }
 
 /// The same with a registration of other settings.
@@ -167,7 +172,7 @@ mod tests {
 
     #[test]
     fn keys_name_the_registrations() {
-        for engine in Engine::iter() {
+        for engine in Registration::iter() {
             assert_eq!(engine.key().parse(), Ok(engine));
             assert_eq!(serde_json::to_value(engine).unwrap(), engine.key());
         }

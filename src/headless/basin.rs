@@ -14,7 +14,7 @@ use crate::domain::align::basin::{Basin, Plane};
 use crate::domain::align::{Ask, Run};
 use crate::domain::findings::Finding;
 use crate::domain::frames::PlanarPose;
-use crate::domain::pose::Engine;
+use crate::domain::pose::Registration;
 use crate::domain::units::{angle_error, fixed, mm, wrap_angle};
 use crate::work;
 use crate::work::job::JobCx;
@@ -38,8 +38,8 @@ pub(super) struct BasinArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration.
-    #[arg(long, default_value = Engine::default().key(), value_parser = keyed::<Engine>())]
-    engine: Engine,
+    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
+    engine: Registration,
     #[command(flatten)]
     json: JsonArgs,
     #[command(flatten)]
@@ -104,7 +104,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let contact = predictor.contact(&args.mask, imprints, inputs)?;
     let points = contact.points(&sample)?;
     // What keeps every start from an answer keeps the registration itself from one, and is said once.
-    let registration = args.engine.registration();
+    let registration = args.engine.method();
     let own = work::pose::pose(&points, &tool, &*registration, Ask::default(), sample.grasp_from_object)?;
     let started = Instant::now();
     let basin = work::pose::basin(&points, &tool, args.engine, args.plane.into(), &output.job())?;

@@ -13,7 +13,7 @@ use super::predict::{RuntimeArg, ShiftArg, sampler};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Row, paper_rows};
-use crate::domain::pose::Engine;
+use crate::domain::pose::Registration;
 use crate::infer::bundle::{Bundle, Found, Origin, find_all};
 use crate::io::atomic;
 use crate::work::evaluate::{Evaluation, Report, Setup, evaluate, rows};
@@ -36,8 +36,8 @@ pub(super) struct EvaluateArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long, default_value = Engine::default().key(), value_parser = keyed::<Engine>())]
-    engine: Engine,
+    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
+    engine: Registration,
     /// Whose images are compared. Angles always come from the contact of both fingers.
     #[arg(long, value_enum, default_value_t = Fingers::Both)]
     fingers: Fingers,

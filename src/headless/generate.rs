@@ -89,7 +89,7 @@ enum Unit {
 const COLOR_CONVENTION: &str = "difference image of the color sensor on the 0..255 scale, peak and range 255; the split \
     by footprint, contact and pose need depth and are left out";
 
-/// Figures of one prediction. PSNR and SSIM are those of `convention`.
+/// AngleMetrics of one prediction. PSNR and SSIM are those of `convention`.
 #[derive(Debug, Default, Clone, Serialize)]
 struct Pair {
     name: String,
@@ -102,9 +102,9 @@ struct Pair {
     vqvae_ssim: Option<f64>,
     /// The figures apart for what the GelSlim saw and for what lies outside its footprint; errors in meters.
     #[serde(skip_serializing_if = "Option::is_none")]
-    seen: Option<metrics::Figures>,
+    seen: Option<metrics::PixelMetrics>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    invented: Option<metrics::Figures>,
+    invented: Option<metrics::PixelMetrics>,
     /// Whether the GelSlim image tells where on the tool it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     ambiguity: Option<Ambiguity>,
@@ -145,9 +145,9 @@ struct PartMean {
 }
 
 impl PartMean {
-    fn of(pairs: &[Pair], part: fn(&Pair) -> Option<metrics::Figures>) -> Option<Self> {
-        let all: Vec<metrics::Figures> = pairs.iter().filter_map(part).collect();
-        let of = |get: fn(&metrics::Figures) -> Option<f64>| average(all.iter().filter_map(get));
+    fn of(pairs: &[Pair], part: fn(&Pair) -> Option<metrics::PixelMetrics>) -> Option<Self> {
+        let all: Vec<metrics::PixelMetrics> = pairs.iter().filter_map(part).collect();
+        let of = |get: fn(&metrics::PixelMetrics) -> Option<f64>| average(all.iter().filter_map(get));
         (!all.is_empty()).then(|| Self {
             psnr_db: of(|f| f.psnr_db),
             ssim: of(|f| f.ssim),

@@ -20,7 +20,7 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{fill_holes, largest_island};
-use crate::domain::pose::{Engine, ToolModel};
+use crate::domain::pose::{Registration, ToolModel};
 use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
@@ -68,8 +68,8 @@ pub(super) struct LabelArgs {
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     imprint: ImprintSource,
     /// The registration.
-    #[arg(long, default_value = Engine::default().key(), value_parser = keyed::<Engine>())]
-    engine: Engine,
+    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
+    engine: Registration,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -215,7 +215,7 @@ fn change(
                     Some(Err(err)) => anyhow::bail!("{}", says(err)),
                     None => anyhow::bail!("{}: no tool is named, so there is no CAD model", entry.name),
                 };
-                let (points, registration) = (contact.points(sample)?, args.engine.registration());
+                let (points, registration) = (contact.points(sample)?, args.engine.method());
                 let found = pose(&points, tool, &*registration, Ask::default(), sample.grasp_from_object)?;
                 found.grasp_from_object.into()
             }

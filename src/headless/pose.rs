@@ -24,7 +24,7 @@ use crate::domain::findings::Finding;
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::{AcceptedPose, HandPose};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::{Engine, ToolModel};
+use crate::domain::pose::{Registration, ToolModel};
 use crate::domain::rig::PerPad;
 use crate::domain::units::angle_error;
 use crate::io::dataset::Dataset;
@@ -85,7 +85,7 @@ enum Imprints {
 
 /// The registrations to run, in this order.
 #[derive(Debug, Clone)]
-pub(super) struct Engines(pub(super) Vec<Engine>);
+pub(super) struct Engines(pub(super) Vec<Registration>);
 
 /// Reads the key of a registration, or one of the short names; lists them all in the help.
 pub(super) fn parse_engines() -> impl TypedValueParser<Value = Engines> {
@@ -94,12 +94,12 @@ pub(super) fn parse_engines() -> impl TypedValueParser<Value = Engines> {
         PossibleValue::new("lab").help("The same as lab_icp"),
         PossibleValue::new("all").help("All of the following, one after the other"),
     ];
-    names.extend(Engine::iter().map(|e| PossibleValue::new(e.key()).help(e.description())));
+    names.extend(Registration::iter().map(|e| PossibleValue::new(e.key()).help(e.description())));
     PossibleValuesParser::new(names).map(|name| {
         Engines(match name.as_str() {
-            "default" => vec![Engine::default()],
-            "lab" => vec![Engine::LabIcp],
-            "all" => Engine::iter().collect(),
+            "default" => vec![Registration::default()],
+            "lab" => vec![Registration::LabIcp],
+            "all" => Registration::iter().collect(),
             key => key.parse().into_iter().collect(),
         })
     })
@@ -122,9 +122,9 @@ fn parse_trap(text: &str) -> Result<PaperTrap, String> {
 }
 
 /// The registration as the arguments want it.
-fn registration(args: &PoseArgs, engine: Engine) -> Box<dyn Register> {
-    if engine != Engine::LabIcp {
-        return engine.registration();
+fn registration(args: &PoseArgs, engine: Registration) -> Box<dyn Register> {
+    if engine != Registration::LabIcp {
+        return engine.method();
     }
     let mut config = LabIcpConfig { traps: args.paper_traps.clone(), ..LabIcpConfig::default() };
     if let Some(seed) = args.paper_starts {
@@ -192,7 +192,7 @@ impl Accepted {
 }
 
 #[derive(Debug, Clone, Serialize)]
-struct Figures {
+struct AngleMetrics {
     #[serde(flatten)]
     angles: AngleSummary,
     median_ms: Option<f64>,
@@ -202,9 +202,9 @@ struct Figures {
 struct Summary {
     /// The figures of the first engine on the first kind of imprint.
     #[serde(flatten)]
-    first: Figures,
+    first: AngleMetrics,
     /// `engine` (first kind of imprint) and `engine/imprint` (all): the figures of each.
-    engines: BTreeMap<String, Figures>,
+    engines: BTreeMap<String, AngleMetrics>,
 }
 
 #[derive(Debug, Serialize)]
@@ -343,7 +343,7 @@ fn pose_cases(
         sample.rig.pads().map(left_open).collect()
     });
     let several = predicted && args.ensemble.seeds > 1;
-    let one = |&engine: &Engine| {
+    let one = |&engine: &Registration| {
         let fan = several
             .then(|| seeds::fan(predictor, inputs, tool, engine, &args.mask, args.ensemble.seeds))
             .transpose()?;
@@ -377,7 +377,7 @@ fn pose_cases(
     args.engine.0.iter().map(one).collect()
 }
 
-fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> Figures {
+fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> AngleMetrics {
     let cases: Vec<&Case> = cases.collect();
     // A case without truth has no error; one without a pose is a failure.
     let errors: Vec<f64> =
@@ -385,10 +385,10 @@ fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> Figures {
     let mut ms: Vec<f64> = cases.iter().map(|c| c.ms).collect();
     ms.sort_by(f64::total_cmp);
     let median_ms = (!ms.is_empty()).then(|| 0.5 * (ms[(ms.len() - 1) / 2] + ms[ms.len() / 2]));
-    Figures { angles: AngleSummary::from_errors(&errors), median_ms }
+    AngleMetrics { angles: AngleSummary::from_errors(&errors), median_ms }
 }
 
-fn summary(cases: &[Case], first_imprint: &str, first_engine: Engine) -> Summary {
+fn summary(cases: &[Case], first_imprint: &str, first_engine: Registration) -> Summary {
     let of = |engine: &str, imprint: &str| figures(cases.iter().filter(|c| c.engine == engine && c.imprint == imprint));
     let mut engines = BTreeMap::new();
     for case in cases {

@@ -13,7 +13,7 @@ use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
 use crate::domain::ensemble::{AngleFan, Spread, seeds};
 use crate::domain::grid::DepthMap;
-use crate::domain::pose::{Engine, ToolModel};
+use crate::domain::pose::{Registration, ToolModel};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::domain::units::angle_error;
@@ -69,7 +69,7 @@ pub(super) fn predict(
     Ok(FingerSeeds { imprints, spread, channels })
 }
 
-/// Figures of the seeds of one touch.
+/// AngleMetrics of the seeds of one touch.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SeedFigures {
     seeds: Vec<u64>,
@@ -145,7 +145,7 @@ pub(super) struct PoseFan {
 
 impl PoseFan {
     /// Writes `STEM_ENGINE_fan.png`; nothing where the angles have no mean. `name` is the pair's.
-    pub(super) fn write(&self, stem: &Path, name: &str, engine: Engine) -> anyhow::Result<()> {
+    pub(super) fn write(&self, stem: &Path, name: &str, engine: Registration) -> anyhow::Result<()> {
         let file = names::with_ending(stem, &format!("_{}_fan.png", engine.key()));
         let Some(fan) = &self.fan else { return Ok(()) };
         if let Some(picture) = super::bench::fan::picture(name, fan, self.truth_rad)? {
@@ -160,7 +160,7 @@ pub(super) fn fan(
     predictor: &mut Predictor,
     inputs: MaskInputs<'_>,
     tool: &ToolModel,
-    engine: Engine,
+    engine: Registration,
     args: &MaskArgs,
     count: u16,
 ) -> anyhow::Result<PoseFan> {
@@ -179,9 +179,9 @@ pub(super) fn fan(
             let made_of = format!("{} finger: {}", sample.rig.pad_key(pad), found.basis.key(contact.source().key()));
             *made_otherwise.entry(made_of).or_insert(0) += 1;
         }
-        let found = contact.points(sample).and_then(|points| {
-            pose::pose(&points, tool, &*engine.registration(), Ask::default(), sample.grasp_from_object)
-        });
+        let found = contact
+            .points(sample)
+            .and_then(|points| pose::pose(&points, tool, &*engine.method(), Ask::default(), sample.grasp_from_object));
         Ok(found.ok().map(|found| found.angle_rad))
     };
     let mut angles = Vec::new();

@@ -10,7 +10,7 @@ use super::widget::line::Line;
 use super::widget::texture::Memo;
 use crate::app::action::Action;
 use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand};
-use crate::app::keys::{ImprintSource, PoseEngine};
+use crate::app::keys::{ImprintSource, Registration};
 use crate::app::state::{Absent, Lookup};
 use crate::domain::hand::{HandPose, PoseDifference};
 use crate::domain::postprocess::{Severity, Stage, Stats};
@@ -62,7 +62,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
             let combo =
                 eframe::egui::ComboBox::from_id_salt("engine").width(150.0).truncate().selected_text(engine.label());
             let response = combo.show_ui(ui, |ui| {
-                for e in PoseEngine::iter() {
+                for e in Registration::iter() {
                     if ui.selectable_label(e == engine, e.label()).on_hover_text(e.description()).clicked() {
                         cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e)));
                     }

@@ -10,7 +10,7 @@ use super::widget::{empty, progress};
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane, TasksCommand};
 use crate::app::evaluate::{EvaluateCommand, GRASPS};
-use crate::domain::evaluation::{Column, Figures, Group, Row, columns};
+use crate::domain::evaluation::{Column, Group, Row, TableMetrics, columns};
 
 /// Height of a row, points.
 const ROW: f32 = 20.0;
@@ -120,7 +120,7 @@ fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
         let mut groups: Vec<Group> = result.groups.clone();
         groups.sort_unstable();
         for group in groups {
-            let figures: Vec<(&Row, &Figures)> =
+            let figures: Vec<(&Row, &TableMetrics)> =
                 rows.iter().filter_map(|r| Some((r, r.groups.iter().find(|f| f.group == group)?))).collect();
             heading(cx, ui, group, &shown);
             let best = Best::of(&shown, &figures);
@@ -178,7 +178,7 @@ fn heading(cx: &Cx<'_>, ui: &mut Ui, group: Group, shown: &[&Column]) {
 struct Best(Vec<Option<f64>>);
 
 impl Best {
-    fn of(shown: &[&Column], figures: &[(&Row, &Figures)]) -> Self {
+    fn of(shown: &[&Column], figures: &[(&Row, &TableMetrics)]) -> Self {
         let of = |column: &&Column| {
             let values: Vec<f64> = figures
                 .iter()
@@ -196,7 +196,14 @@ fn competes(row: &Row) -> bool {
     !row.published && !row.upper_bound
 }
 
-fn line(cx: &Cx<'_>, ui: &mut Ui, row: &Row, figures: &Figures, (shown, all): (&[&Column], &[&Column]), best: &Best) {
+fn line(
+    cx: &Cx<'_>,
+    ui: &mut Ui,
+    row: &Row,
+    figures: &TableMetrics,
+    (shown, all): (&[&Column], &[&Column]),
+    best: &Best,
+) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
     if response.hovered() {
         ui.painter().rect_filled(rect, 3.0, cx.p.control[0]);

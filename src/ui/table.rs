@@ -9,8 +9,8 @@ use super::theme::{Palette, SMALL, caption};
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, ViewCommand};
-use crate::app::figures::PairFigures;
 use crate::app::labels::Review;
+use crate::app::metrics::PairMetrics;
 use crate::app::state::State;
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
@@ -63,7 +63,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             let action = Action::Generate.command(cx.state).map(|_| ("Generate (Ctrl+G)", Action::Generate.tooltip()));
             if empty::show(
                 ui,
-                "No figures yet",
+                "No metrics yet",
                 "Pairs appear here once they were generated or aligned, the worst first",
                 action,
             ) {
@@ -87,7 +87,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
 
 /// The rows, in the order of the results.
 fn rows(state: &State) -> Vec<Row> {
-    let row = |f: &PairFigures<'_>| {
+    let row = |f: &PairMetrics<'_>| {
         let entry = state.library.entry(f.pair)?;
         let [measured, predicted] = f.poses.map(|pose| pose.error_rad.map(f64::to_degrees));
         let c = f.comparison;
@@ -107,7 +107,7 @@ fn rows(state: &State) -> Vec<Row> {
             by_hand: f.poses.map(|pose| pose.by_hand),
         })
     };
-    state.figures_so_far().iter().filter_map(row).collect()
+    state.metrics_so_far().iter().filter_map(row).collect()
 }
 
 /// Sorts by a column; rows without a number come last either way.

@@ -15,7 +15,7 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane, SettingsCommand};
 use crate::app::inspect::{InspectCommand, Inspected};
-use crate::app::keys::{ImprintSource, PoseBits, PoseEngine};
+use crate::app::keys::{ImprintSource, PoseBits, Registration};
 use crate::app::state::Lookup;
 use crate::domain::frames::PlanarPose;
 use crate::domain::units;
@@ -132,7 +132,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     let engine = cx.state.settings.pose_engine;
     let combo = ComboBox::from_id_salt("time machine engine").width(168.0).selected_text(engine.label());
     let combo = combo.show_ui(ui, |ui| {
-        for e in PoseEngine::iter() {
+        for e in Registration::iter() {
             if ui.selectable_label(e == engine, e.label()).on_hover_text(e.description()).clicked() {
                 cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e)));
             }

@@ -10,7 +10,7 @@ use crate::domain::align::basin::{Basin, BasinConfig, Plane};
 use crate::domain::align::{AlignReport, Ask, PointFit, Register, TraceStep};
 use crate::domain::frames::PlanarPose;
 use crate::domain::inspect::basin_map;
-use crate::domain::pose::{Engine, ToolModel, register_with};
+use crate::domain::pose::{Registration, ToolModel, register_with};
 use crate::domain::units;
 
 /// A registered pose.
@@ -86,7 +86,13 @@ pub fn pose(
 ///
 /// # Errors
 /// If the job was told to stop, or no start led anywhere.
-pub fn basin(points: &[DVec3], tool: &ToolModel, engine: Engine, plane: Plane, cx: &JobCx) -> Result<Basin, TaskError> {
+pub fn basin(
+    points: &[DVec3],
+    tool: &ToolModel,
+    engine: Registration,
+    plane: Plane,
+    cx: &JobCx,
+) -> Result<Basin, TaskError> {
     const WHAT: &str = "Basin map";
     let config = BasinConfig::new(plane);
     let map = basin_map(points, tool, engine, &config, || cx.cancel.is_cancelled())

@@ -4,7 +4,7 @@ use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, TasksCommand};
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::jobs::Lane;
-use touch2touch::app::keys::{ImprintSource, PoseEngine, Request};
+use touch2touch::app::keys::{ImprintSource, Registration, Request};
 use touch2touch::app::settings::MaskSource;
 use touch2touch::app::state::Lookup;
 use touch2touch::domain::align::basin::Plane;
@@ -149,13 +149,13 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     let mut bench = bench(&[Pane::TimeMachine]);
     send(&mut bench, InspectCommand::Begin);
     send(&mut bench, InspectCommand::Pin);
-    bench.send(SettingsCommand::SetPoseEngine(PoseEngine::LabIcp));
+    bench.send(SettingsCommand::SetPoseEngine(Registration::LabIcp));
     bench.settle();
     assert_eq!(bench.state.inspection().ready().unwrap().num_runs(), 1);
     send(&mut bench, InspectCommand::End);
     send(&mut bench, InspectCommand::Pin);
     let [Some(a), Some(b)] = bench.state.pins() else { panic!("{:?}", bench.state.pins()) };
-    assert_eq!((a.engine, b.engine), (PoseEngine::DistanceField, PoseEngine::LabIcp));
+    assert_eq!((a.engine, b.engine), (Registration::DistanceField, Registration::LabIcp));
     assert_ne!(a.grasp_from_object, b.grasp_from_object);
     // A third takes the place of the older one.
     send(&mut bench, InspectCommand::Begin);

@@ -16,7 +16,7 @@ use touch2touch::app::command::{
 };
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{
-    DatasetSeq, ImprintSource, PairKey, PoseEngine, PredictionKey, Request, Revision, ShiftMode, TouchKey,
+    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Request, Revision, ShiftMode, TouchKey,
 };
 use touch2touch::app::labels::{Document, Review};
 use touch2touch::app::library::{Place, Sort};
@@ -320,7 +320,7 @@ draws! {
         1 SetMaskOutline(any::<bool>()),
         1 SetMaskOpacity(number()),
         1 SetFootprintVisible(any::<bool>()),
-        1 SetPoseEngine(any_of::<PoseEngine>()),
+        1 SetPoseEngine(any_of::<Registration>()),
         1 SetRuntime(any_of::<EngineChoice>()),
         1 SetCacheBudget(any::<u32>()),
         1 SetCamerasLinked(any::<bool>()),

@@ -5,7 +5,7 @@ use std::sync::{Arc, Condvar, Mutex};
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand};
-use touch2touch::app::keys::{ImprintSource, PoseEngine};
+use touch2touch::app::keys::{ImprintSource, Registration};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::settings::{MaskSource, MaskTool};
@@ -48,11 +48,11 @@ fn the_pose_follows_the_mask() {
     let after = bench.state.pose(MEASURED).ready().unwrap();
     assert!(after.num_points < pose.num_points);
     // The other registration is another result; the first one is still there.
-    bench.send(SettingsCommand::SetPoseEngine(PoseEngine::LabIcp));
+    bench.send(SettingsCommand::SetPoseEngine(Registration::LabIcp));
     bench.settle();
     let lab = bench.state.pose(MEASURED).ready().unwrap();
     assert!(lab.error_rad.is_some() && lab.report.iterations > 1);
-    bench.send(SettingsCommand::SetPoseEngine(PoseEngine::DistanceField));
+    bench.send(SettingsCommand::SetPoseEngine(Registration::DistanceField));
     assert!(bench.state.pose(MEASURED).ready().is_some());
     // Accepting it is a change of the document like any other.
     let accept = Action::AcceptMeasuredPose.command(&bench.state).unwrap();

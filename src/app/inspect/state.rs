@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::keys::{ImprintSource, PairKey, PoseBits, PoseEngine};
+use super::super::keys::{ImprintSource, PairKey, PoseBits, Registration};
 use super::super::pane::Need;
 pub use super::super::results::inspection::Inspection;
 use super::super::state::State;
@@ -81,7 +81,7 @@ pub struct Pin {
     /// The imprint.
     pub source: ImprintSource,
     /// The registration.
-    pub engine: PoseEngine,
+    pub engine: Registration,
     /// The start it belongs to.
     pub run: usize,
     /// Its position in the run.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::keys::PoseEngine;
+use super::super::keys::Registration;
 use super::super::workbench::state::PoseOf;
 use super::cloud::CloudKey;
 use super::tool::ToolKey;
@@ -22,7 +22,7 @@ pub struct PoseKey {
     /// The tool.
     pub tool: Arc<str>,
     /// The registration.
-    pub engine: PoseEngine,
+    pub engine: Registration,
 }
 
 /// What is registered: the inputs of every job about a pose.
@@ -52,7 +52,7 @@ impl Computes for PoseKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
         let (Registered { clouds, tool, truth }, engine) = (self.find(state)?, self.engine);
         Some(Job::new(Lane::Compute, "Pose", move |_| {
-            pose(&clouds.contact_points(), &tool.model, &*engine.registration(), Ask::default(), truth)
+            pose(&clouds.contact_points(), &tool.model, &*engine.method(), Ask::default(), truth)
         }))
     }
 

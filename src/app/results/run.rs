@@ -23,7 +23,7 @@ impl Computes for RunKey {
         let (engine, start) = (self.pose.engine, self.start.map(PoseBits::get));
         Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
             let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true };
-            pose(&clouds.contact_points(), &tool.model, &*engine.registration(), ask, truth)
+            pose(&clouds.contact_points(), &tool.model, &*engine.method(), ask, truth)
         }))
     }
 

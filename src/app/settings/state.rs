@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::super::keys::{PoseEngine, Preset, Sampler, ShiftMode, Spacing};
+use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
 use crate::domain::postprocess::RefitShift;
@@ -49,7 +49,7 @@ pub struct Settings {
     /// The mask tools.
     pub mask: MaskSettings,
     /// The registration.
-    pub pose_engine: PoseEngine,
+    pub pose_engine: Registration,
     /// The runtime that runs models.
     pub runtime: EngineChoice,
     /// What the predictions kept on the disk may take, MiB; 0 keeps none.
@@ -88,7 +88,7 @@ impl Default for Settings {
             refit: None,
             generate: GenerateSettings::default(),
             mask: MaskSettings::default(),
-            pose_engine: PoseEngine::default(),
+            pose_engine: Registration::default(),
             runtime: EngineChoice::default(),
             cache_mib: 512,
             cameras_linked: true,

@@ -1,6 +1,6 @@
 //! What was published, on real data.
 
-use super::{Estimate, Figures, Group, Row};
+use super::{Estimate, Group, Row, TableMetrics};
 
 /// Rows of the paper and of the lab's evaluation notebook, for both fingers of 46 real grasps per tool. FID there is that
 /// of Inception features.
@@ -30,7 +30,7 @@ fn row(method: &str, seen: [Option<f64>; 6], unseen: [Option<f64>; 6]) -> Row {
     let figures = |group, tools: usize, values: [Option<f64>; 6]| {
         let [psnr_db, ssim, fid, angle_deg, success_5, success_10] = values;
         let value = |v: Option<f64>| v.map(|value| Estimate { value, interval: None });
-        Figures {
+        TableMetrics {
             tools,
             grasps: 46 * tools,
             images: 92 * tools,
@@ -40,7 +40,7 @@ fn row(method: &str, seen: [Option<f64>; 6], unseen: [Option<f64>; 6]) -> Row {
             angle_deg: value(angle_deg),
             success_5: value(success_5),
             success_10: value(success_10),
-            ..Figures::empty(group)
+            ..TableMetrics::empty(group)
         }
     };
     Row {

@@ -1,6 +1,6 @@
 //! The table as text, Markdown and CSV.
 
-use super::{Estimate, Figures, Group, Row};
+use super::{Estimate, Group, Row, TableMetrics};
 use crate::domain::sample::Scale;
 
 /// A column of the table.
@@ -15,7 +15,7 @@ pub struct Column {
     /// Whether more of it is better.
     pub larger_is_better: bool,
     /// Its figure.
-    pub get: fn(&Figures) -> Option<Estimate>,
+    pub get: fn(&TableMetrics) -> Option<Estimate>,
     /// Its name in files.
     key: &'static str,
 }
@@ -29,7 +29,7 @@ const fn column(
     key: &'static str,
     decimals: usize,
     larger_is_better: bool,
-    get: fn(&Figures) -> Option<Estimate>,
+    get: fn(&TableMetrics) -> Option<Estimate>,
     tip: &'static str,
 ) -> Column {
     Column { heading, tip, decimals, larger_is_better, get, key }
@@ -119,7 +119,7 @@ fn groups(rows: &[Row]) -> Vec<Group> {
     groups
 }
 
-fn of(row: &Row, group: Group) -> Option<&Figures> {
+fn of(row: &Row, group: Group) -> Option<&TableMetrics> {
     row.groups.iter().find(|f| f.group == group)
 }
 
@@ -142,7 +142,7 @@ pub fn text(rows: &[Row]) -> String {
     let columns = columns(rows);
     let mut out = String::new();
     for group in groups(rows) {
-        let present: Vec<(&Row, &Figures)> = rows.iter().filter_map(|r| Some((r, of(r, group)?))).collect();
+        let present: Vec<(&Row, &TableMetrics)> = rows.iter().filter_map(|r| Some((r, of(r, group)?))).collect();
         let name = present.iter().map(|(r, _)| r.method.chars().count()).max().unwrap_or(0).max(8);
         let cells: Vec<Vec<String>> = present
             .iter()

@@ -1,4 +1,4 @@
-//! Figures of a prediction apart for what the GelSlim saw and for what the model made up.
+//! PixelMetrics of a prediction apart for what the GelSlim saw and for what the model made up.
 
 use serde::Serialize;
 
@@ -7,9 +7,9 @@ use crate::domain::grid::{Grid, Mask};
 use super::image::{check_size, psnr_of_mse};
 use super::{MetricError, SsimRange, ssim};
 
-/// Figures over some of an image's pixels; those that are not finite in both images are left out.
+/// PixelMetrics over some of an image's pixels; those that are not finite in both images are left out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Figures {
+pub struct PixelMetrics {
     /// Pixels compared.
     pub pixels: usize,
     /// Peak signal-to-noise ratio, decibels; `None` without a pixel, or if they are all equal.
@@ -28,11 +28,11 @@ pub struct Figures {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Split {
     /// All pixels.
-    pub whole: Figures,
+    pub whole: PixelMetrics,
     /// Inside the GelSlim's footprint: the model saw this.
-    pub seen: Figures,
+    pub seen: PixelMetrics,
     /// Outside: the model made this up.
-    pub invented: Figures,
+    pub invented: PixelMetrics,
 }
 
 /// The figures of a prediction (raw orientation) whole and by parts. `peak` is PSNR's peak and SSIM's range.
@@ -46,7 +46,7 @@ pub fn split(prediction: &Grid<f32>, truth: &Grid<f32>, seen: &Mask, peak: f64) 
         return Err(MetricError::Size { prediction: seen.size(), truth: truth.size() });
     }
     let map = ssim(prediction, truth, SsimRange::Explicit(peak))?.map;
-    let figures = |wanted: &dyn Fn(bool) -> bool| -> Result<Figures, MetricError> {
+    let figures = |wanted: &dyn Fn(bool) -> bool| -> Result<PixelMetrics, MetricError> {
         let (mut pixels, mut squares, mut sizes, mut sum, mut similarity) = (0usize, 0.0, 0.0, 0.0, 0.0);
         let places = prediction.as_slice().iter().zip(truth.as_slice()).zip(map.as_slice()).zip(seen.as_slice());
         for (((&p, &t), &s), _) in places.filter(|(_, seen)| wanted(**seen)) {
@@ -64,7 +64,7 @@ pub fn split(prediction: &Grid<f32>, truth: &Grid<f32>, seen: &Mask, peak: f64) 
             Some(mse) => psnr_of_mse(mse, peak)?.db(),
             None => None,
         };
-        Ok(Figures { pixels, psnr_db, ssim: mean(similarity), mae: mean(sizes), bias: mean(sum) })
+        Ok(PixelMetrics { pixels, psnr_db, ssim: mean(similarity), mae: mean(sizes), bias: mean(sum) })
     };
     Ok(Split { whole: figures(&|_| true)?, seen: figures(&|seen| seen)?, invented: figures(&|seen| !seen)? })
 }
@@ -106,7 +106,7 @@ mod tests {
         assert!((found.invented.psnr_db.unwrap() - 27.04).abs() < 0.01);
         assert!(found.seen.ssim.unwrap() > found.invented.ssim.unwrap());
         assert_eq!(found.seen.pixels + found.invented.pixels, found.whole.pixels);
-        let n = |f: Figures| f.pixels as f64;
+        let n = |f: PixelMetrics| f.pixels as f64;
         let mean = (n(found.seen) * found.seen.mae.unwrap() + n(found.invented) * found.invented.mae.unwrap())
             / n(found.whole);
         assert!((found.whole.mae.unwrap() - mean).abs() < 1e-12);
@@ -117,7 +117,7 @@ mod tests {
         let image = Grid::filled(8, 8, 0.001f32);
         let all = Grid::filled(8, 8, true);
         let found = split(&image, &image.map(|v| v + 0.001), &all, 0.0225).unwrap();
-        assert_eq!(found.invented, Figures { pixels: 0, psnr_db: None, ssim: None, mae: None, bias: None });
+        assert_eq!(found.invented, PixelMetrics { pixels: 0, psnr_db: None, ssim: None, mae: None, bias: None });
         let holes = Grid::filled(8, 8, f32::NAN);
         assert_eq!(split(&holes, &image, &all, 0.0225), Err(MetricError::Nothing));
         assert!(split(&image, &image, &Grid::filled(4, 4, true), 0.0225).is_err());

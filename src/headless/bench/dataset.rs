@@ -14,7 +14,7 @@ use crate::domain::catalog;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::{Engine, register};
+use crate::domain::pose::{Registration, register};
 use crate::domain::rig::lab;
 use crate::domain::sample::DepthCamera;
 use crate::domain::sim::{self, SimConfig, Spoil, spoil_mask};
@@ -42,8 +42,8 @@ pub(in crate::headless) struct DatasetArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// The registration.
-    #[arg(long, default_value_t = Engine::default())]
-    engine: Engine,
+    #[arg(long, default_value_t = Registration::default())]
+    engine: Registration,
     #[command(flatten)]
     json: JsonArgs,
 }

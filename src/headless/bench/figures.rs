@@ -33,9 +33,9 @@ pub(super) struct Outcome {
     pub(super) rung: Option<String>,
 }
 
-/// Figures of a set of cases. Shares are percent of all cases, 0..100.
+/// AngleMetrics of a set of cases. Shares are percent of all cases, 0..100.
 #[derive(Clone, Debug, Serialize)]
-pub(super) struct Figures {
+pub(super) struct AngleMetrics {
     #[serde(flatten)]
     pub(super) angles: AngleSummary,
     /// Largest error, degrees; `null` if no case has a pose.
@@ -65,13 +65,13 @@ pub(super) struct Figures {
     pub(super) rungs: BTreeMap<String, usize>,
 }
 
-/// Figures over everything and per stratum.
+/// AngleMetrics over everything and per stratum.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Summary {
     #[serde(flatten)]
-    pub(super) all: Figures,
+    pub(super) all: AngleMetrics,
     /// `nominal`, `hard`, `degenerate`; those without a case are left out.
-    pub(super) strata: BTreeMap<String, Figures>,
+    pub(super) strata: BTreeMap<String, AngleMetrics>,
 }
 
 impl Summary {
@@ -79,14 +79,14 @@ impl Summary {
         let strata = Stratum::iter()
             .filter_map(|s| {
                 let part: Vec<&Outcome> = outcomes.iter().filter(|o| o.stratum == s).collect();
-                (!part.is_empty()).then(|| (s.to_string(), Figures::new(&part)))
+                (!part.is_empty()).then(|| (s.to_string(), AngleMetrics::new(&part)))
             })
             .collect();
-        Self { all: Figures::new(&outcomes.iter().collect::<Vec<_>>()), strata }
+        Self { all: AngleMetrics::new(&outcomes.iter().collect::<Vec<_>>()), strata }
     }
 }
 
-impl Figures {
+impl AngleMetrics {
     fn new(outcomes: &[&Outcome]) -> Self {
         let errors: Vec<f64> = outcomes.iter().map(|o| o.error_deg.to_radians()).collect();
         let percent =

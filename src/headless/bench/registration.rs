@@ -11,15 +11,15 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::canvas;
-use super::figures::{Outcome, Summary, quantile};
 use super::front::{self, Axis, FrontPoint, Picture};
+use super::metrics::{Outcome, Summary, quantile};
 use super::{Machine, contact_points, peers};
 use crate::domain::align::{AlignError, AlignReport, icp};
 use crate::domain::cloud::CloudError;
 use crate::domain::field::DistanceField;
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
-use crate::domain::pose::{Engine, ToolModel, register};
+use crate::domain::pose::{Registration, ToolModel, register};
 use crate::domain::units::angle_error;
 use crate::headless::args::{JsonArgs, LimitArgs, at_least_one};
 use crate::headless::output::says;
@@ -41,7 +41,7 @@ pub(in crate::headless) struct RegistrationArgs {
     json: JsonArgs,
     /// Only these engines, separated by commas.
     #[arg(long, value_delimiter = ',')]
-    engines: Vec<Engine>,
+    engines: Vec<Registration>,
     /// Which contact masks.
     #[arg(long, value_enum, default_value_t = Masks::Spoilt)]
     masks: Masks,
@@ -182,7 +182,8 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
     let mut set = CaseSet::open(&args.cases)?;
     let chosen = args.limit.spread(set.cases.len());
     set.cases = chosen.into_iter().map(|i| set.cases[i].clone()).collect();
-    let engines: Vec<Engine> = if args.engines.is_empty() { Engine::iter().collect() } else { args.engines.clone() };
+    let engines: Vec<Registration> =
+        if args.engines.is_empty() { Registration::iter().collect() } else { args.engines.clone() };
     let output = Output::new(args.json.common(), "measuring", set.cases.len() * engines.len());
     let machine = Machine::now();
     // One thread, whatever an engine would like to use: the figures are the work, not the machine.
@@ -251,7 +252,7 @@ fn prepare(set: &CaseSet, masks: Masks) -> anyhow::Result<Vec<Prepared>> {
 fn measure(
     args: &RegistrationArgs,
     set: &CaseSet,
-    engines: &[Engine],
+    engines: &[Registration],
     machine: Machine,
     output: &Output,
 ) -> anyhow::Result<Report> {
@@ -281,7 +282,8 @@ fn measure(
     for (_, case) in &set.cases {
         let model = &models[&case.tool];
         lift_ms.push(timed(|| points(case, args.masks)).median);
-        let whole = || Ok::<_, anyhow::Error>(register(&points(case, args.masks)?, model, Engine::default(), false)?);
+        let whole =
+            || Ok::<_, anyhow::Error>(register(&points(case, args.masks)?, model, Registration::default(), false)?);
         whole_ms.push(timed(whole).median);
     }
     let quantiles = |ms: &[f64]| Quantiles {
@@ -313,7 +315,7 @@ fn measure(
         });
     }
     Ok(Report {
-        default: Engine::default().to_string(),
+        default: Registration::default().to_string(),
         machine,
         folder: args.cases.clone(),
         masks: args.masks,

@@ -18,7 +18,7 @@ use crate::domain::contact::ContactMask;
 use crate::domain::dataset::Problem;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::pose::{Engine, ToolModel};
+use crate::domain::pose::{Registration, ToolModel};
 use crate::domain::rig::{PadId, PerPad, Text};
 use crate::domain::sample::Sample;
 use crate::infer::engine::resolve;
@@ -34,14 +34,14 @@ use crate::work::pose;
 pub(super) struct Worker<'a> {
     args: &'a WatchArgs,
     predictor: Predictor,
-    engine: Engine,
+    engine: Registration,
     tools: BTreeMap<String, ToolModel>,
     stop: Cancel,
     /// Seconds that loading and the first run took.
     pub warm_s: f64,
 }
 
-/// Figures of one finger.
+/// AngleMetrics of one finger.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct FingerFigures {
     finger: Text,
@@ -60,7 +60,7 @@ pub(super) struct FingerFigures {
 
 /// A pose, in the lab's sense of the angle.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct PoseFigures {
+pub(super) struct PoseMetrics {
     tool: String,
     angle_deg: f64,
     y_m: f64,
@@ -89,7 +89,7 @@ pub(super) struct Done {
     /// Why masks are not made of the source that was asked.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub mask_notes: Vec<String>,
-    pose: Option<PoseFigures>,
+    pose: Option<PoseMetrics>,
     /// Why there is no pose.
     no_pose: Option<String>,
     /// Up to the writing of this very file; the event and the summary include it.
@@ -247,18 +247,18 @@ impl<'a> Worker<'a> {
         sample: &Sample,
         tool: Option<&str>,
         contact: &Contact,
-    ) -> Result<PoseFigures, String> {
+    ) -> Result<PoseMetrics, String> {
         let name = tool.ok_or("the file's name says no tool; name it with --tool")?;
         if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             return Err("no bubble camera is known; name a bubble file of the rig with --camera".into());
         }
         let points = contact.points(sample).map_err(|err| err.why)?;
-        let registration = self.engine.registration();
+        let registration = self.engine.method();
         let model = self.tool(dataset, name)?;
         let found = pose::pose(&points, model, &*registration, Ask::default(), sample.grasp_from_object);
         let found = found.map_err(|err| err.why)?;
         let place = found.object_from_grasp();
-        Ok(PoseFigures {
+        Ok(PoseMetrics {
             tool: name.to_owned(),
             angle_deg: found.angle_rad.to_degrees(),
             y_m: place.y_m,

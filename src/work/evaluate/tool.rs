@@ -163,7 +163,7 @@ impl Tool {
             return None;
         }
         let found = contact_points(sample, &made.imprints.as_ref(), &masks.as_ref())
-            .and_then(|points| pose::pose(&points, model, &*setup.engine.registration(), Ask::default(), Some(truth)));
+            .and_then(|points| pose::pose(&points, model, &*setup.engine.method(), Ask::default(), Some(truth)));
         Some(found.ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN))
     }
 

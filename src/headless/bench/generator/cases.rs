@@ -6,7 +6,7 @@ use crate::domain::catalog;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::metrics::{self, AngleSummary};
-use crate::domain::pose::{Engine, ToolModel, register};
+use crate::domain::pose::{Registration, ToolModel, register};
 use crate::domain::rig::{PadId, PerPad, lab};
 use crate::domain::sample::{DepthTouch, Sample};
 use crate::domain::sim::{self, SimConfig};
@@ -101,7 +101,7 @@ impl Judge {
         let imprints = [Some(&imprints[0]), Some(&imprints[1])].into();
         let points = contact_points(&case.sample, &imprints, &masks.as_ref())?;
         // Too few contact points are no pose; that is counted.
-        let report = register(&points, &case.tool, Engine::default(), false).ok();
+        let report = register(&points, &case.tool, Registration::default(), false).ok();
         Ok(report.map(|r| angle_error(r.grasp_from_object.theta_rad, case.truth.theta_rad)))
     }
 }

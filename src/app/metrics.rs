@@ -12,7 +12,7 @@ use crate::work::pose::PoseResult;
 
 /// Figures of one prediction, or of a pair that was only aligned.
 #[derive(Clone, Debug)]
-pub struct PairFigures<'a> {
+pub struct PairMetrics<'a> {
     /// The pair.
     pub pair: PairId,
     /// The finger predicted; `None` where no prediction of the pair was compared.
@@ -34,22 +34,22 @@ pub struct PoseFigure {
 
 impl State {
     /// The figures of every pair of the open data set that was compared or aligned as the settings say.
-    pub fn figures_so_far(&self) -> Vec<PairFigures<'_>> {
+    pub fn metrics_so_far(&self) -> Vec<PairMetrics<'_>> {
         let Some(open) = &self.library.open else { return Vec::new() };
         let poses = self.poses_so_far();
         let chosen = self.results.chosen.iter().filter(|(touch, _)| touch.pair.dataset == open.seq);
-        let mut found: Vec<PairFigures<'_>> = chosen
+        let mut found: Vec<PairMetrics<'_>> = chosen
             .filter_map(|(touch, recipe)| {
                 // A finger that was not on screen was not compared.
                 let comparison = self.results.comparisons.get(&ComparisonKey(recipe.clone(), self.settings.shift))?;
                 let pair = touch.pair.pair;
                 let poses = poses.get(&pair).copied().unwrap_or_default();
-                Some(PairFigures { pair, finger: Some(touch.finger), comparison: Some(comparison), poses })
+                Some(PairMetrics { pair, finger: Some(touch.finger), comparison: Some(comparison), poses })
             })
             .collect();
         let compared: BTreeSet<PairId> = found.iter().map(|figures| figures.pair).collect();
         let others = poses.into_iter().filter(|(pair, _)| !compared.contains(pair));
-        found.extend(others.map(|(pair, poses)| PairFigures { pair, finger: None, comparison: None, poses }));
+        found.extend(others.map(|(pair, poses)| PairMetrics { pair, finger: None, comparison: None, poses }));
         found
     }
 

@@ -1,8 +1,8 @@
 //! The figures of all pairs so far are those of the results that count now.
 
 use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, SettingsCommand};
-use touch2touch::app::figures::PoseFigure;
-use touch2touch::app::keys::{ImprintSource, PoseEngine};
+use touch2touch::app::keys::{ImprintSource, Registration};
+use touch2touch::app::metrics::PoseFigure;
 use touch2touch::app::settings::MaskSource;
 use touch2touch::app::state::State;
 use touch2touch::app::workbench::{SceneTool, WorkbenchCommand};
@@ -15,7 +15,7 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 
 /// The figure of the simulated grasp's measured pose, if there is one; nothing else may have any.
 fn figure(state: &State) -> Option<PoseFigure> {
-    let found = state.figures_so_far();
+    let found = state.metrics_so_far();
     assert!(found.iter().all(|f| f.pair == SIMULATED && f.finger.is_none() && f.comparison.is_none()), "{found:?}");
     found.first().map(|f| f.poses[MEASURED as usize])
 }
@@ -37,7 +37,10 @@ fn a_pose_counts_as_long_as_it_is_made_as_the_settings_say() {
     bench.settle();
     assert_eq!(figure(&bench.state), here);
     for (other, back) in [
-        (SettingsCommand::SetPoseEngine(PoseEngine::LabIcp), SettingsCommand::SetPoseEngine(PoseEngine::DistanceField)),
+        (
+            SettingsCommand::SetPoseEngine(Registration::LabIcp),
+            SettingsCommand::SetPoseEngine(Registration::DistanceField),
+        ),
         (SettingsCommand::SetMaskSource(MaskSource::Threshold), SettingsCommand::SetMaskSource(MaskSource::Cad)),
     ] {
         bench.send(other.clone());
