@@ -20,12 +20,12 @@ pub struct PairMetrics<'a> {
     /// The prediction shown for it against the measurement.
     pub comparison: Option<&'a Comparison>,
     /// The pair's poses, by [`ImprintSource`].
-    pub poses: [PoseFigure; 2],
+    pub poses: [PoseMetric; 2],
 }
 
 /// How far a pose is off.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PoseFigure {
+pub struct PoseMetric {
     /// Size of the angle's error, radians, where the truth is known.
     pub error_rad: Option<f64>,
     /// Whether a person set the pose.
@@ -55,7 +55,7 @@ impl State {
 
     /// Of the poses among the results those that count now: of each pair and imprint the one from the most masks, and
     /// of these the most drawn by hand.
-    fn poses_so_far(&self) -> BTreeMap<PairId, [PoseFigure; 2]> {
+    fn poses_so_far(&self) -> BTreeMap<PairId, [PoseMetric; 2]> {
         let mut best: BTreeMap<(PairId, ImprintSource), ([usize; 2], &PoseResult)> = BTreeMap::new();
         for (key, pose) in self.results.poses.iter() {
             let Some(place) = self.place_now(key) else { continue };
@@ -65,7 +65,7 @@ impl State {
                 best.insert(place, (rank, pose));
             }
         }
-        let mut found: BTreeMap<PairId, [PoseFigure; 2]> = BTreeMap::new();
+        let mut found: BTreeMap<PairId, [PoseMetric; 2]> = BTreeMap::new();
         for ((pair, source), (_, pose)) in best {
             let labels = self.library.entry(pair).and_then(|entry| self.document.pair(&entry.name));
             // What a person set counts before what was registered.
@@ -75,7 +75,7 @@ impl State {
                 (Some(_), None) => None,
                 (Some(hand), Some(truth)) => Some(units::angle_error(hand.pose.planar.inverse().theta_rad, truth)),
             };
-            found.entry(pair).or_default()[source as usize] = PoseFigure { error_rad, by_hand: hand.is_some() };
+            found.entry(pair).or_default()[source as usize] = PoseMetric { error_rad, by_hand: hand.is_some() };
         }
         found
     }

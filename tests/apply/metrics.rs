@@ -2,7 +2,7 @@
 
 use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, SettingsCommand};
 use touch2touch::app::keys::{ImprintSource, Registration};
-use touch2touch::app::metrics::PoseFigure;
+use touch2touch::app::metrics::PoseMetric;
 use touch2touch::app::settings::MaskSource;
 use touch2touch::app::state::State;
 use touch2touch::app::workbench::{SceneTool, WorkbenchCommand};
@@ -14,7 +14,7 @@ use super::panes;
 const MEASURED: ImprintSource = ImprintSource::Measured;
 
 /// The figure of the simulated grasp's measured pose, if there is one; nothing else may have any.
-fn figure(state: &State) -> Option<PoseFigure> {
+fn figure(state: &State) -> Option<PoseMetric> {
     let found = state.metrics_so_far();
     assert!(found.iter().all(|f| f.pair == SIMULATED && f.finger.is_none() && f.comparison.is_none()), "{found:?}");
     found.first().map(|f| f.poses[MEASURED as usize])
@@ -29,7 +29,7 @@ fn a_pose_counts_as_long_as_it_is_made_as_the_settings_say() {
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.settle();
     let error_rad = bench.state.pose(MEASURED).ready().unwrap().error_rad;
-    let here = Some(PoseFigure { error_rad, by_hand: false });
+    let here = Some(PoseMetric { error_rad, by_hand: false });
     assert!(error_rad.is_some());
     assert_eq!(figure(&bench.state), here);
     // Another pair is looked at; then other settings, and back.

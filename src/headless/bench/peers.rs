@@ -8,7 +8,7 @@ use anyhow::{Context as _, ensure};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::metrics::{Outcome, Summary};
+use super::figures::{Outcome, Summary};
 use super::registration::{EngineRow, Prepared, offset, position_error_mm};
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;

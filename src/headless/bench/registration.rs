@@ -11,8 +11,8 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::canvas;
+use super::figures::{Outcome, Summary, quantile};
 use super::front::{self, Axis, FrontPoint, Picture};
-use super::metrics::{Outcome, Summary, quantile};
 use super::{Machine, contact_points, peers};
 use crate::domain::align::{AlignError, AlignReport, icp};
 use crate::domain::cloud::CloudError;
