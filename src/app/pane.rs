@@ -74,24 +74,18 @@ pub enum Need {
 macro_rules! panes {
     ($with:ident) => {
         $with! {
-            browser {
-                Browser {
-                    "Samples", "The pairs of what is open", Form, needs [Thumbnails],
-                    at [Inspect Left, Align Left, Label Left, Evaluate Left]
-                }
-            }
-            metrics {
-                Metrics {
-                    "Figures", "The figures of this pair", Form, needs [Comparison, Ambiguity, Ledger, Poses],
-                    at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
-                }
-            }
-            generate {
-                Generate {
-                    "Generate", "Predicts the Soft Bubble imprint", Form, needs [Pair],
-                    at [Inspect Right(1), Align Right(2), Evaluate Right(1)]
-                }
-            }
+            browser { Browser {
+                "Samples", "The pairs of what is open", Form, needs [Thumbnails],
+                at [Inspect Left, Align Left, Label Left, Evaluate Left]
+            } }
+            metrics { Metrics {
+                "Figures", "The figures of this pair", Form, needs [Comparison, Ambiguity, Ledger, Poses],
+                at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
+            } }
+            generate { Generate {
+                "Generate", "Predicts the Soft Bubble imprint", Form, needs [Pair],
+                at [Inspect Right(1), Align Right(2), Evaluate Right(1)]
+            } }
             scene {
                 SceneMeasured {
                     "3D measured", "The measured surface on the CAD model, grasp frame",
@@ -134,60 +128,44 @@ macro_rules! panes {
                     at [Inspect Bottom(1), Evaluate Bottom(3)]
                 }
             }
-            ledger {
-                Ledger {
-                    "Depth chain", "Everything between the decoder and the meters, stage by stage",
-                    Form, needs [Ledger], at [Inspect Bottom(1), Evaluate Bottom(3)]
-                }
-            }
-            seeds {
-                Seeds {
-                    "Seeds", "Several predictions of the touch: where they disagree, and how their poses fan out",
-                    Form, needs [Seeds], at [Inspect Bottom(1)]
-                }
-            }
-            timemachine {
-                TimeMachine {
-                    "Time machine", "The steps of a registration, forwards and backwards",
-                    Steps, needs [Steps], at [Align Bottom(1)]
-                }
-            }
-            basin {
-                BasinMap {
-                    "Basin map", "Where starts lead; a click on one loads its run into the time machine",
-                    Map, needs [Basin], at [Align Right(1)]
-                }
-            }
-            layers {
-                Layers {
-                    "Layers", "Residuals, drop reasons, distances both ways and the weak direction of a registration",
-                    Form, needs [Layers], at [Align Right(1)]
-                }
-            }
-            poses {
-                Poses {
-                    "Poses", "Truth, measurement and prediction against each other, per finger and joint",
-                    Form, needs [Poses, FingerPoses], at [Align Right(1)]
-                }
-            }
+            ledger { Ledger {
+                "Depth chain", "Everything between the decoder and the meters, stage by stage",
+                Form, needs [Ledger], at [Inspect Bottom(1), Evaluate Bottom(3)]
+            } }
+            seeds { Seeds {
+                "Seeds", "Several predictions of the touch: where they disagree, and how their poses fan out",
+                Form, needs [Seeds], at [Inspect Bottom(1)]
+            } }
+            timemachine { TimeMachine {
+                "Time machine", "The steps of a registration, forwards and backwards",
+                Steps, needs [Steps], at [Align Bottom(1)]
+            } }
+            basin { BasinMap {
+                "Basin map", "Where starts lead; a click on one loads its run into the time machine",
+                Map, needs [Basin], at [Align Right(1)]
+            } }
+            layers { Layers {
+                "Layers", "Residuals, drop reasons, distances both ways and the weak direction of a registration",
+                Form, needs [Layers], at [Align Right(1)]
+            } }
+            poses { Poses {
+                "Poses", "Truth, measurement and prediction against each other, per finger and joint",
+                Form, needs [Poses, FingerPoses], at [Align Right(1)]
+            } }
             masks {
                 Masks { "Mask", "Corrects the contact mask", Form, needs [Masks], at [Label Right(1)] }
             }
-            results {
-                Results {
-                    "Results", "The paper's results table of the open data set", Form, needs [],
-                    at [Evaluate Top(1)]
-                }
-            }
+            results { Results {
+                "Results", "The paper's results table of the open data set", Form, needs [],
+                at [Evaluate Top(1)]
+            } }
             table {
                 Table { "All figures", "The figures of all pairs so far", Form, needs [], at [Evaluate Top(1)] }
             }
-            log {
-                Log {
-                    "Log", "What happened", Form, needs [],
-                    at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
-                }
-            }
+            log { Log {
+                "Log", "What happened", Form, needs [],
+                at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
+            } }
             settings_pane {
                 Settings { "Settings", "Preferences", Form, needs [], at [Inspect Right(1)] }
             }
