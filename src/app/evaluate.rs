@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::*;
+pub use state::{GRASPS, TableState};
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::*;
+pub use state::{BasinColor, Inspect, Inspected, Inspection, Pin};
 
 use super::keys::{ImprintSource, Request};
 use super::state::State;

@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::*;
+pub use state::{Document, HandMask, PairLabels, Review, Stored, Stroke};
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::*;
+pub use state::{Follow, Library, OpenDataset, Place, Sort};
 
 use std::ops::Range;
 

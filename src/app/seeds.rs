@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::*;
+pub use state::{COUNT, Seeds};
 
 use super::state::State;
 

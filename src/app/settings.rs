@@ -2,7 +2,10 @@
 
 pub mod state;
 
-pub use state::*;
+pub use state::{
+    BRUSH_RADIUS_PX, ColorMap, ColorRange, GenerateSettings, MAX_CACHE_MIB, MAX_RECENT, MaskChoice, MaskSettings,
+    MaskSource, MaskTool, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
+};
 
 use super::effect::Effect;
 use super::keys::{ImprintSource, Registration, ShiftMode};

@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::*;
+pub use state::{Entry, Level, Log, Task, Tasks, Ticket};
 
 use super::effect::Effect;
 use super::state::State;

@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::*;
+pub use state::{CameraPreset, Hover, Selection, UiRequest};
 
 use std::collections::BTreeSet;
 

@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::*;
+pub use state::{HandTry, Layer, Picked, PoseOf, SceneTool, Workbench};
 
 use glam::DVec3;
 
