@@ -163,7 +163,7 @@ fn json(arguments: &[&str], home: &Path) -> Value {
 fn assert_same(place: Place, path: &str, home: &Path, pairs: u32) -> BTreeMap<String, usize> {
     let poses = json(&["pose", path, "--imprint", "both"], home);
     let out = home.join("generated");
-    let generated = json(&["generate", path, "--out", out.to_str().unwrap()], home);
+    let generated = json(&["generate", path, "--finger", "both", "--out", out.to_str().unwrap()], home);
     let mut studio = Studio::open(place, home);
     let mut compared: BTreeMap<String, usize> = BTreeMap::new();
     for pair in 0..pairs {
@@ -231,13 +231,11 @@ fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
         (0..3).map(|pair| name_of(&report, pair)).collect()
     };
     // One is corrected and accepted by the verb, another by the studio; the third is left out.
-    let adopt =
-        ["label", path, "--pair", &names[0], "--adopt", "--mask", "cad", "--finger", "right", "--accept", "measured"];
-    let labeled = json(&adopt, home.path());
-    assert_eq!(
-        (&labeled["pairs"][0]["review"], &labeled["pairs"][0]["masks"][0][0]),
-        (&"in_progress".into(), &"right".into())
-    );
+    let adopt = ["label", path, "--pair", &names[0], "--adopt", "--mask", "cad", "--finger", "right"];
+    json(&adopt, home.path());
+    let labeled = json(&["label", path, "--pair", &names[0], "--accept", "measured"], home.path());
+    let labeled = &labeled["pairs"][0];
+    assert_eq!((&labeled["review"], &labeled["masks"][0][0]), (&"in_progress".into(), &"right".into()));
     let skipped = json(&["label", path, "--pair", &names[2], "--review", "skip"], home.path());
     assert_eq!(skipped["pairs"][0]["review"], "skip");
 

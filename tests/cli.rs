@@ -262,7 +262,7 @@ fn predictions_are_written_scored_and_equal_for_equal_seeds() {
 fn the_lab_sample_is_within_two_degrees() {
     let Some(lab) = support::shared("lab-sample") else { return };
     let dir = tempfile::tempdir().unwrap();
-    let pose = run(&["pose", lab.to_str().unwrap(), "--json"], dir.path());
+    let pose = run(&["pose", lab.to_str().unwrap(), "--mask", "cad", "--json"], dir.path());
     assert!(pose.status.success(), "{}", error_text(&pose));
     let report = json(&pose);
     assert_eq!(report["cases"].as_array().unwrap().len(), 4);

@@ -69,6 +69,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch pose", How::Run(&[], "--limit 1", &[0])),
     // The first of the faults may well have no pose.
     ("touch2touch pose faults", How::Run(&[], "--limit 1", &[0, 1])),
+    ("touch2touch label", How::Run(&[], "", &[0])),
     ("touch2touch masks export", How::Run(&[], "", &[0])),
     ("touch2touch basin", How::Run(&[], "", &[0])),
     ("touch2touch bench registration", How::Run(&[], "--limit 2 --no-peers", &[0])),

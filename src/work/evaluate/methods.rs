@@ -90,7 +90,9 @@ impl Models {
         for origin in &setup.bundles {
             let bundle = BundleInfo::of(&open(origin)?);
             let info = bundle.generator.as_ref();
-            let info = info.ok_or_else(|| TaskError::new(WHAT, format!("{origin} is a {}", bundle.kind.name())))?;
+            let info = info.ok_or_else(|| {
+                TaskError::new(WHAT, format!("{origin} is a {}, not a generator", bundle.kind.name()))
+            })?;
             let input = info.sensors.ends(&bundle.name, &dataset.rig).map_err(|err| fail(&err))?.input;
             let (defaults, name) = (info.defaults, bundle.name.clone());
             let config = GenerateConfig {
