@@ -160,14 +160,18 @@ fn json(arguments: &[&str], home: &Path) -> Value {
 }
 
 /// Compares every pose, comparison and mask that the studio shows of a pair with what the verbs say of it.
-fn assert_same(place: Place, path: &str, home: &Path, pairs: u32) -> BTreeMap<String, usize> {
-    let poses = json(&["pose", path, "--imprint", "both"], home);
+fn assert_same(place: Place, path: &str, home: &Path, pairs: usize) -> BTreeMap<String, usize> {
+    let limit = pairs.to_string();
+    let poses = json(&["pose", path, "--imprint", "both", "--limit", &limit], home);
     let out = home.join("generated");
-    let generated = json(&["generate", path, "--finger", "both", "--out", out.to_str().unwrap()], home);
+    let generate = ["generate", path, "--finger", "both", "--out", out.to_str().unwrap(), "--limit", &limit];
+    let generated = json(&generate, home);
     let mut studio = Studio::open(place, home);
     let mut compared: BTreeMap<String, usize> = BTreeMap::new();
+    let listed = studio.state.library.open.as_ref().unwrap().source.index().pairs.len();
     for pair in 0..pairs {
-        studio.predict(pair);
+        // As the verbs spread what they take.
+        studio.predict((pair * listed / pairs) as u32);
         let state = &studio.state;
         let name = state.pair_name();
         for source in ImprintSource::iter() {

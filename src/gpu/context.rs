@@ -21,7 +21,7 @@ pub struct Gpu {
     /// are made for this number.
     ///
     /// [`Pipelines`]: super::pipelines::Pipelines
-    /// [`Target`]: Target
+    /// [`Target`]: super::target::Target
     pub samples: u32,
     /// The adapter is a program: four samples cost it 2.5 times the time of one, so it is spared them.
     pub software: bool,
