@@ -52,7 +52,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     assert_eq!(json(&doctor)["pairs"], 4);
     assert_eq!(json(&doctor)["problems"], Value::Array(vec![]), "our own files are sound");
 
-    let pose = run(&["pose", set_text, "--engine", "all", "--json"], data_path);
+    let pose = run(&["pose", set_text, "--mask", "cad", "--engine", "all", "--json"], data_path);
     assert!(pose.status.success(), "{}", error_text(&pose));
     let report = json(&pose);
     let cases = report["cases"].as_array().unwrap();
@@ -71,7 +71,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
         }
     }
 
-    let traced = run(&["pose", set_text, "--limit", "1", "--trace", "--json"], data_path);
+    let traced = run(&["pose", set_text, "--mask", "cad", "--limit", "1", "--trace", "--json"], data_path);
     let report = &json(&traced)["cases"][0]["report"];
     assert!(report["trace"].as_array().unwrap().len() > 3, "the start and some iterations");
     assert!(report["fits"].as_array().unwrap().len() > 100, "each point's residual");
@@ -80,12 +80,18 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     // The paper's starts in the wrong frame: what was asked for stands beside the little that was applied.
     let paper =
         ["--engine", "lab", "--paper-starts", "3", "--paper-trap", "wrong-frame", "--paper-trap", "rmse-choice"];
-    let trapped = run(&[&["pose", set_text, "--limit", "1", "--trace", "--json"][..], &paper].concat(), data_path);
+    let trapped = run(
+        &[&["pose", set_text, "--mask", "cad", "--limit", "1", "--trace", "--json"][..], &paper].concat(),
+        data_path,
+    );
     let runs = json(&trapped)["cases"][0]["report"]["runs"].as_array().unwrap().clone();
     assert_eq!(runs.len(), 10);
     let largest = |key: &str| runs.iter().map(|r| r[key]["theta_rad"].as_f64().unwrap().abs()).fold(0.0, f64::max);
     assert!(largest("requested") > 0.2 && largest("start") < 0.1, "{} {}", largest("requested"), largest("start"));
-    let told = run(&["pose", set_text, "--limit", "1", "--trace", "--start", "-10,1,-2", "--json"], data_path);
+    let told = run(
+        &["pose", set_text, "--mask", "cad", "--limit", "1", "--trace", "--start", "-10,1,-2", "--json"],
+        data_path,
+    );
     let start = &json(&told)["cases"][0]["report"]["start"];
     assert!((start["theta_rad"].as_f64().unwrap() + 10f64.to_radians()).abs() < 1e-12, "{start}");
     assert!((start["z_m"].as_f64().unwrap() + 0.002).abs() < 1e-12, "{start}");
@@ -174,18 +180,18 @@ fn a_cad_model_in_millimeters_is_refused_with_an_offer_that_can_be_accepted() {
     let set_text = set.to_str().unwrap();
     let tool = "pattern_36";
     assert!(run(&["simulate", "--out", set_text, "--tools", tool, "--grasps", "1"], dir.path()).status.success());
-    let meters = json(&run(&["pose", set_text, "--json"], dir.path()));
+    let meters = json(&run(&["pose", set_text, "--mask", "cad", "--json"], dir.path()));
     let file = set.join("tools_stls").join(format!("{tool}.stl"));
     let mut mesh = touch2touch::io::stl::read(&file).unwrap().mesh;
     mesh.vertices.iter_mut().for_each(|v| *v *= 1e3);
     touch2touch::io::stl::write(&file, &mesh).unwrap();
 
-    let refused = run(&["pose", set_text, "--json"], dir.path());
+    let refused = run(&["pose", set_text, "--mask", "cad", "--json"], dir.path());
     assert_eq!(refused.status.code(), Some(1));
     let said = error_text(&refused);
     assert!(said.contains("scale it by 0.001") && said.contains("--tool-scale auto"), "{said}");
     let accept = |args: &[&str]| {
-        let done = run(&[&["pose", set_text, "--json"], args].concat(), dir.path());
+        let done = run(&[&["pose", set_text, "--mask", "cad", "--json"], args].concat(), dir.path());
         assert!(done.status.success(), "{}", error_text(&done));
         let (a, b) = (&json(&done)["cases"][0]["angle_deg"], &meters["cases"][0]["angle_deg"]);
         assert!((a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-3, "{a} {b}");

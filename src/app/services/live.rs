@@ -294,6 +294,7 @@ fn parse_settings(bytes: &[u8]) -> Result<Settings, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::settings::{ColorMap, MaskChoice, MaskSettings, MaskSource};
     use crate::domain::frames::PlanarPose;
     use crate::domain::grid::Mask;
     use crate::domain::hand::{AcceptedPose, HandPose};
@@ -401,6 +402,13 @@ mod tests {
         // Numbers that cannot be worked with are brought into range; unknown and missing keys are no harm.
         std::fs::write(&file, r#"{"version": 1, "ui_zoom": 1e9, "new_key": 3}"#).unwrap();
         assert_eq!(services.load_settings().0.ui_zoom, 4.0);
+        // What earlier versions wrote opens: the color map under its old name, the numbers of masks beside the tools.
+        let old = r#"{"version": 1, "colour_map": "gray", "mask": {"source": "top_percent", "top_percent": 3.0}}"#;
+        std::fs::write(&file, old).unwrap();
+        let (settings, problem) = services.load_settings();
+        assert_eq!((problem, settings.color_map), (None, ColorMap::Gray));
+        let choice = MaskChoice { source: MaskSource::TopPercent, top_percent: 3.0, ..MaskChoice::default() };
+        assert_eq!(settings.mask, MaskSettings { choice, ..MaskSettings::default() });
     }
 
     #[test]
