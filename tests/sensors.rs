@@ -1,7 +1,7 @@
 //! Sensors are data: the reverse direction, from Soft Bubble to GelSlim, and a gripper that this program never saw.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command as Process, Output};
+use std::process::Output;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -24,19 +24,10 @@ use touch2touch::io::dataset::{Dataset, RIG_JSON};
 use touch2touch::io::images;
 use touch2touch::work::bundles::BundleKind;
 
+use crate::support::run;
+
 fn bundle(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name)
-}
-
-fn run(args: &[&str], home: &Path) -> Output {
-    Process::new(env!("CARGO_BIN_EXE_touch2touch"))
-        .args(args)
-        .env("TOUCH2TOUCH_DATA", home)
-        .env("XDG_DATA_HOME", home)
-        .env("XDG_CONFIG_HOME", home)
-        .env("TOUCH2TOUCH_CACHE", home)
-        .output()
-        .unwrap()
 }
 
 fn text(output: &Output) -> String {

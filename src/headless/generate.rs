@@ -89,7 +89,7 @@ enum Unit {
 const COLOR_CONVENTION: &str = "difference image of the color sensor on the 0..255 scale, peak and range 255; the split \
     by footprint, contact and pose need depth and are left out";
 
-/// AngleMetrics of one prediction. PSNR and SSIM are those of `convention`.
+/// Metrics of one prediction. PSNR and SSIM are those of `convention`.
 #[derive(Debug, Default, Clone, Serialize)]
 struct Pair {
     name: String,

@@ -4,10 +4,9 @@ use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use strum::IntoEnumIterator as _;
 
+use super::args::keyed;
 use super::contact_mask::MaskArgs;
 use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
@@ -38,7 +37,7 @@ pub(super) struct ModelArgs {
     mask_bundle: Option<PathBuf>,
     /// How good: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below
     /// change single numbers of it.
-    #[arg(long, value_parser = PossibleValuesParser::new(Preset::iter().map(Preset::key)).map(preset), default_value = "default")]
+    #[arg(long, value_parser = keyed::<Preset>(), default_value = Preset::default().key())]
     preset: Preset,
     /// Sampling steps (default: the preset's).
     #[arg(long)]
@@ -57,7 +56,7 @@ pub(super) struct ModelArgs {
     #[arg(long, value_enum)]
     spacing: Option<SpacingArg>,
     /// The way from noise to an image (default: the preset's).
-    #[arg(long, value_parser = PossibleValuesParser::new(Sampler::iter().map(Sampler::key)).map(sampler))]
+    #[arg(long, value_parser = keyed::<Sampler>())]
     sampler: Option<Sampler>,
     /// How the decoder's output becomes meters.
     #[arg(long, value_enum, default_value_t = AnyShiftArg::Exact)]
@@ -73,11 +72,6 @@ pub(super) struct ModelArgs {
     no_cache: bool,
 }
 
-/// Of a key that the parser has already compared with the list.
-fn preset(key: String) -> Preset {
-    key.parse().unwrap_or_default()
-}
-
 fn guidance(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|scale| GUIDANCE.contains(scale));
     value.ok_or_else(|| format!("choose {} to {}; 1 is none", GUIDANCE.start(), GUIDANCE.end()))
@@ -89,11 +83,6 @@ enum SpacingArg {
     Trailing,
     /// The public latent-diffusion release's.
     Lab,
-}
-
-/// Of a key that the parser has already compared with the list.
-pub(super) fn sampler(key: String) -> Sampler {
-    key.parse().unwrap_or_default()
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

@@ -41,7 +41,7 @@ pub(super) struct Worker<'a> {
     pub warm_s: f64,
 }
 
-/// AngleMetrics of one finger.
+/// Metrics of one finger.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct FingerFigures {
     finger: Text,
