@@ -1,7 +1,7 @@
 //! Sensors are data: the reverse direction, from Soft Bubble to GelSlim, and a gripper that this program never saw.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command as Process, Output};
+use std::process::Output;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -24,19 +24,10 @@ use touch2touch::io::dataset::{Dataset, RIG_JSON};
 use touch2touch::io::images;
 use touch2touch::work::bundles::BundleKind;
 
+use crate::support::run;
+
 fn bundle(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name)
-}
-
-fn run(args: &[&str], home: &Path) -> Output {
-    Process::new(env!("CARGO_BIN_EXE_touch2touch"))
-        .args(args)
-        .env("TOUCH2TOUCH_DATA", home)
-        .env("XDG_DATA_HOME", home)
-        .env("XDG_CONFIG_HOME", home)
-        .env("TOUCH2TOUCH_CACHE", home)
-        .output()
-        .unwrap()
 }
 
 fn text(output: &Output) -> String {
@@ -177,6 +168,13 @@ fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
     assert_eq!(found["pairs"][0]["finger"], "thumb");
     let depth: Grid<f32> = images::read_gray(&Path::new(&out).join("a_thumb.png")).unwrap();
     assert_eq!(depth.size(), [175, 140]);
+    // What follows a folder knows its sensors too.
+    let watch = ["watch", &set, "--once", "--runtime", "rten", "--mask", "threshold", "--json", "--out", &out];
+    let watched = run(&[&watch[..], &["--bundle", &tiny]].concat(), &home);
+    let said = String::from_utf8_lossy(&watched.stdout);
+    let done = said.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let done = done.filter(|event| event["event"] == "done").collect::<Vec<_>>();
+    assert_eq!((done.len(), &done[0]["fingers"][0]["finger"]), (1, &json!("thumb")), "{said}{}", text(&watched));
     // A bundle for other sensors says so, and what would fit; without a name the fitting one is looked for.
     let lab = bundle("generator");
     let refused = run(&[&generate[..], &[lab.to_str().unwrap()]].concat(), &home);
@@ -204,5 +202,7 @@ fn a_rig_that_makes_no_sense_is_a_problem_of_the_folder() {
         let dataset = Dataset::open(dir.path()).unwrap();
         assert!(dataset.problems.iter().any(|p| p.file.ends_with(RIG_JSON)), "{bad}: {:?}", dataset.problems);
         assert_eq!(*dataset.rig, *Rig::lab());
+        let watched = run(&["watch", dir.path().to_str().unwrap(), "--once"], dir.path());
+        assert!(text(&watched).contains(RIG_JSON) && watched.stdout.is_empty(), "{bad}: {}", text(&watched));
     }
 }

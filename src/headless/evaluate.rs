@@ -3,13 +3,11 @@
 use crate::io::dataset::Dataset;
 use std::path::{Path, PathBuf};
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use strum::IntoEnumIterator as _;
 
 use super::args::{DatasetArgs, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
-use super::predict::{RuntimeArg, ShiftArg, sampler};
+use super::predict::{RuntimeArg, ShiftArg};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Row, paper_rows};
@@ -54,7 +52,7 @@ pub(super) struct EvaluateArgs {
     #[arg(long)]
     seed: Option<u64>,
     /// The way from noise to an image (default: each bundle's).
-    #[arg(long, value_parser = PossibleValuesParser::new(Sampler::iter().map(Sampler::key)).map(sampler))]
+    #[arg(long, value_parser = keyed::<Sampler>())]
     sampler: Option<Sampler>,
     /// How the decoder's output becomes meters.
     #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]

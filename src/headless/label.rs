@@ -6,16 +6,15 @@ use std::sync::Arc;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, keyed};
+use super::args::{DatasetArgs, FingerArg, keyed};
 use super::contact_mask::MaskArgs;
-use super::generate::FingerArg;
 use super::output::says;
-use super::pose::{parse_start, tool_model};
+use super::pose::parse_start;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult, find_pair};
 use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
-use crate::domain::dataset::PairEntry;
+use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
@@ -28,6 +27,7 @@ use crate::work::job::JobCx;
 use crate::work::labels::{HandMask, ImprintSource, Labels, PairLabels, Review, Revision};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
+use crate::work::tool::load_tool;
 
 /// Arguments of `label`.
 #[derive(Debug, Args)]
@@ -137,8 +137,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
         let entry = &dataset.index.pairs[id.0 as usize];
         let mut stored = labels.load(&entry.name)?;
         let before = stored.clone();
-        let sample = dataset.load(id)?;
-        change(args, &dataset, entry, &sample, &mut stored)?;
+        change(args, &dataset, id, &mut stored)?;
         if stored != before {
             labels.save(&entry.name, &stored)?;
         }
@@ -163,27 +162,47 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
     Ok(complete)
 }
 
-/// Makes the changes that the arguments name, masks first: an accepted pose is then of the new ones.
-fn change(
-    args: &LabelArgs,
-    dataset: &Dataset,
-    entry: &PairEntry,
-    sample: &Sample,
-    labels: &mut PairLabels,
-) -> anyhow::Result<()> {
-    let tool = entry.tool.as_deref().map(|name| tool_model(dataset, name));
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let mut contact = |imprint, labels: Option<&PairLabels>| -> anyhow::Result<Contact> {
-        let imprints = predictor.imprints(sample, imprint, &JobCx::unwatched())?;
-        let tool = tool.as_ref().and_then(|tool| tool.as_ref().ok());
-        predictor.contact(&args.mask, imprints, MaskInputs { sample, tool, labels })
-    };
+/// What masks and poses of a pair are made from.
+struct Touch<'a> {
+    args: &'a LabelArgs,
+    sample: Sample,
+    tool: anyhow::Result<ToolModel>,
+    predictor: Predictor,
+}
+
+impl<'a> Touch<'a> {
+    fn load(args: &'a LabelArgs, dataset: &Dataset, id: PairId) -> anyhow::Result<Self> {
+        let entry = &dataset.index.pairs[id.0 as usize];
+        let tool = match &entry.tool {
+            Some(name) => load_tool(dataset, name).map(|(tool, _)| tool).map_err(Into::into),
+            None => Err(anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name)),
+        };
+        Ok(Self { args, sample: dataset.load(id)?, tool, predictor: Predictor::new(&args.model, &dataset.rig) })
+    }
+
+    fn contact(&mut self, imprint: ImprintSource, labels: Option<&PairLabels>) -> anyhow::Result<Contact> {
+        let imprints = self.predictor.imprints(&self.sample, imprint, &JobCx::unwatched())?;
+        let inputs = MaskInputs { sample: &self.sample, tool: self.tool.as_ref().ok(), labels };
+        self.predictor.contact(&self.args.mask, imprints, inputs)
+    }
+
+    fn pose(&mut self, imprint: ImprintSource, labels: &PairLabels) -> anyhow::Result<PlanarPose> {
+        let contact = self.contact(imprint, self.args.mask.drawn(labels))?;
+        let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
+        let (points, registration) = (contact.points(&self.sample)?, self.args.engine.method());
+        Ok(pose(&points, tool, &*registration, Ask::default(), self.sample.grasp_from_object)?.grasp_from_object)
+    }
+}
+
+/// Makes the changes that the arguments name, masks first: an accepted pose is then of the new ones. The pair itself is
+/// only read where something is made from it.
+fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabels) -> anyhow::Result<()> {
     let pads = args.finger.fingers(&dataset.rig)?;
     for &pad in pads.iter().filter(|_| args.remove_mask) {
         labels.draw(pad, None);
     }
     if args.adopt || args.fill_holes || args.largest_island {
-        let found = contact(args.imprint, (!args.adopt).then_some(&*labels))?;
+        let found = Touch::load(args, dataset, id)?.contact(args.imprint, (!args.adopt).then_some(&*labels))?;
         for pad in pads {
             let Some(one) = &found.masks[pad] else { continue };
             let base = match (&labels.masks[pad], one.basis) {
@@ -208,17 +227,7 @@ fn change(
     if let Some(imprint) = args.accept {
         labels.accepted[imprint as usize] = Some(match args.pose {
             Some(planar) => AcceptedPose { pose: planar.into(), by_hand: true },
-            None => {
-                let contact = contact(imprint, args.mask.drawn(labels))?;
-                let tool: &ToolModel = match &tool {
-                    Some(Ok(tool)) => tool,
-                    Some(Err(err)) => anyhow::bail!("{}", says(err)),
-                    None => anyhow::bail!("{}: no tool is named, so there is no CAD model", entry.name),
-                };
-                let (points, registration) = (contact.points(sample)?, args.engine.method());
-                let found = pose(&points, tool, &*registration, Ask::default(), sample.grasp_from_object)?;
-                found.grasp_from_object.into()
-            }
+            None => Touch::load(args, dataset, id)?.pose(imprint, labels)?.into(),
         });
     }
     if let Some(review) = args.review {

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::args::DatasetArgs;
-use super::generate::FingerArg;
+use super::args::{DatasetArgs, FingerArg};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};

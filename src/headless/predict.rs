@@ -1,16 +1,14 @@
 //! The options and models that `generate` and `pose` share. Models are loaded when first needed.
 
+mod args;
+
 use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
-use strum::IntoEnumIterator as _;
-
 use super::contact_mask::MaskArgs;
 use crate::domain::contact::ContactMask;
-use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
+use crate::domain::diffusion::{GenerateConfig, Spacing};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{DepthChain, RefitShift, ShiftMode};
 use crate::domain::rig::{PadId, PerPad, Rig, SensorId};
@@ -27,129 +25,8 @@ use crate::work::mask::{Contact, MaskChoice, MaskInputs, MaskSource};
 use crate::work::models::{Masking, Models, Wanted};
 use crate::work::prediction::Prediction;
 
-/// Which models, and how they are run.
-#[derive(Debug, Clone, Args)]
-pub(super) struct ModelArgs {
-    /// The generator's bundle (default: the shipped one).
-    #[arg(long)]
-    bundle: Option<PathBuf>,
-    /// The mask model's bundle (default: the shipped one).
-    #[arg(long)]
-    mask_bundle: Option<PathBuf>,
-    /// How good: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below
-    /// change single numbers of it.
-    #[arg(long, value_parser = PossibleValuesParser::new(Preset::iter().map(Preset::key)).map(preset), default_value = "default")]
-    preset: Preset,
-    /// Sampling steps (default: the preset's).
-    #[arg(long)]
-    steps: Option<u32>,
-    /// Seed of the noise (default: the bundle's).
-    #[arg(long)]
-    seed: Option<u64>,
-    /// Share of fresh noise per step, 0 to 1, for DDIM (default: the preset's).
-    #[arg(long)]
-    eta: Option<f64>,
-    /// Scale of classifier-free guidance, 1 for none; only for a bundle that was trained for it (default: the bundle's).
-    #[arg(long, value_parser = guidance)]
-    guidance: Option<f64>,
-    /// The training steps visited: `trailing` starts at the noisiest, `lab` is the public release's (default: the
-    /// preset's).
-    #[arg(long, value_enum)]
-    spacing: Option<SpacingArg>,
-    /// The way from noise to an image (default: the preset's).
-    #[arg(long, value_parser = PossibleValuesParser::new(Sampler::iter().map(Sampler::key)).map(sampler))]
-    sampler: Option<Sampler>,
-    /// How the decoder's output becomes meters.
-    #[arg(long, value_enum, default_value_t = AnyShiftArg::Exact)]
-    shift: AnyShiftArg,
-    /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
-    #[arg(long, value_name = "FILE")]
-    stats: Option<PathBuf>,
-    /// The engine that runs the models.
-    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
-    runtime: RuntimeArg,
-    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
-    #[arg(long)]
-    no_cache: bool,
-}
-
-/// Of a key that the parser has already compared with the list.
-fn preset(key: String) -> Preset {
-    key.parse().unwrap_or_default()
-}
-
-fn guidance(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|scale| GUIDANCE.contains(scale));
-    value.ok_or_else(|| format!("choose {} to {}; 1 is none", GUIDANCE.start(), GUIDANCE.end()))
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SpacingArg {
-    /// From the noisiest training step on.
-    Trailing,
-    /// The public latent-diffusion release's.
-    Lab,
-}
-
-/// Of a key that the parser has already compared with the list.
-pub(super) fn sampler(key: String) -> Sampler {
-    key.parse().unwrap_or_default()
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum ShiftArg {
-    /// What the lab's released script saves: its range is mapped twice.
-    Raw,
-    /// The paper's mean-and-deviation shift of that.
-    Paper,
-    /// The doubled mapping undone exactly.
-    Exact,
-}
-
-/// [`ShiftArg`] where statistics of a dataset can be named.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum AnyShiftArg {
-    /// What the lab's released script saves: its range is mapped twice.
-    Raw,
-    /// The paper's mean-and-deviation shift of that.
-    Paper,
-    /// The doubled mapping undone exactly.
-    Exact,
-    /// The paper's shift by the statistics of a dataset (see --stats).
-    Refit,
-}
-
-impl ShiftArg {
-    /// The reading of the decoder's output.
-    pub(super) fn mode(self) -> ShiftMode {
-        match self {
-            ShiftArg::Raw => ShiftMode::Raw,
-            ShiftArg::Paper => ShiftMode::PaperShift,
-            ShiftArg::Exact => ShiftMode::ExactInverse,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum RuntimeArg {
-    /// ONNX Runtime where its library is found, else the built-in engine.
-    Auto,
-    /// The built-in engine.
-    Rten,
-    /// ONNX Runtime.
-    Ort,
-}
-
-impl RuntimeArg {
-    /// The choice for the engines.
-    pub(super) fn choice(self) -> EngineChoice {
-        match self {
-            RuntimeArg::Auto => EngineChoice::Auto,
-            RuntimeArg::Rten => EngineChoice::Rten,
-            RuntimeArg::Ort => EngineChoice::Ort,
-        }
-    }
-}
+use args::SpacingArg;
+pub(super) use args::{AnyShiftArg, ModelArgs, RuntimeArg, ShiftArg};
 
 /// The models of one run of the program, as the arguments want them.
 pub(super) struct Predictor {

@@ -69,7 +69,7 @@ pub(super) fn predict(
     Ok(FingerSeeds { imprints, spread, channels })
 }
 
-/// AngleMetrics of the seeds of one touch.
+/// Metrics of the seeds of one touch.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SeedFigures {
     seeds: Vec<u64>,

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use strum::IntoEnumIterator as _;
 
-use super::bundles::BundleInfo;
+use super::bundles::{BundleInfo, BundleKind};
 use super::error::TaskError;
 use super::imprint::in_meters;
 use super::job::{JobCx, PreviewPicture};
@@ -198,7 +198,7 @@ impl Models {
             let mut loaded = lock(&self.generator);
             let generator = ready(&mut loaded, (bundle.id.clone(), engine), || {
                 cx.progress(0, config.steps.into(), "loading the model");
-                Generator::open(&bundle.open(&what)?, engine).map_err(fail)
+                open_generator(bundle, engine)
             })?;
             let ways = self.ways_to(bundle, generator.spec());
             let begin = std::time::Instant::now();
@@ -226,6 +226,21 @@ impl Models {
             kept,
         };
         Ok(answers.into_iter().flatten().map(prediction).collect())
+    }
+
+    /// Loads a generator or a mask model, so that one that cannot be used is known before the first touch.
+    ///
+    /// # Errors
+    /// If it cannot be loaded, or is of another kind.
+    pub fn load(&self, bundle: &BundleInfo, engine: EngineChoice) -> Result<(), TaskError> {
+        let key = (bundle.id.clone(), engine);
+        match bundle.kind {
+            BundleKind::Generator => {
+                ready(&mut lock(&self.generator), key, || open_generator(bundle, engine)).map(drop)
+            }
+            BundleKind::Mask => ready(&mut lock(&self.mask_model), key, || open_mask_model(bundle, engine)).map(drop),
+            BundleKind::Classifier => Err(TaskError::new(format!("Open {}", bundle.name), "it is a tool classifier")),
+        }
     }
 
     /// Loads a generator and runs it once on two blank images, so that the first touch does not wait for memory and
@@ -290,9 +305,7 @@ impl Models {
     ) -> Result<ContactMask, TaskError> {
         let what = format!("Mask with {}", bundle.name);
         let mut loaded = lock(&self.mask_model);
-        let model = ready(&mut loaded, (bundle.id.clone(), engine), || {
-            MaskModel::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
-        })?;
+        let model = ready(&mut loaded, (bundle.id.clone(), engine), || open_mask_model(bundle, engine))?;
         model.contact(imprint).map_err(|err| TaskError::from_error(&what, &err))
     }
 
@@ -330,6 +343,16 @@ impl Models {
         }
         Ok(Contact { imprints, masks, recipe: by.recipe()?, model: by.model.map(|model| model.name.clone()) })
     }
+}
+
+fn open_generator(bundle: &BundleInfo, engine: EngineChoice) -> Result<Generator, TaskError> {
+    let what = format!("Generate with {}", bundle.name);
+    Generator::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
+}
+
+fn open_mask_model(bundle: &BundleInfo, engine: EngineChoice) -> Result<MaskModel, TaskError> {
+    let what = format!("Mask with {}", bundle.name);
+    MaskModel::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
 }
 
 /// How contact masks are made.

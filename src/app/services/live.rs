@@ -33,6 +33,7 @@ use crate::work::job::JobCx;
 use crate::work::labels::Labels;
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
+use crate::work::tool::tool_file;
 
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";
@@ -127,13 +128,7 @@ impl DataSource for LiveSource {
     }
 
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
-        let what = format!("CAD model of {tool}");
-        match self.dataset.tool_mesh(tool) {
-            Ok(Some(mesh)) => Ok(mesh),
-            Ok(None) => Err(TaskError::new(what, format!("there is no {tool}.stl in the data set"))
-                .with_hint("Put it into data/tools_stls, in meters and the object frame.")),
-            Err(err) => Err(TaskError::from_error(what, &err).with_hint(err.hint())),
-        }
+        Ok(tool_file(&self.dataset, tool)?.mesh)
     }
 
     fn follow(&self) -> Option<Box<dyn Following>> {

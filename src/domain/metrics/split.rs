@@ -1,4 +1,4 @@
-//! PixelMetrics of a prediction apart for what the GelSlim saw and for what the model made up.
+//! Metrics of a prediction apart for what the GelSlim saw and for what the model made up.
 
 use serde::Serialize;
 
@@ -7,7 +7,7 @@ use crate::domain::grid::{Grid, Mask};
 use super::image::{check_size, psnr_of_mse};
 use super::{MetricError, SsimRange, ssim};
 
-/// PixelMetrics over some of an image's pixels; those that are not finite in both images are left out.
+/// Metrics over some of an image's pixels; those that are not finite in both images are left out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PixelMetrics {
     /// Pixels compared.

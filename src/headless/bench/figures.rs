@@ -33,7 +33,7 @@ pub(super) struct Outcome {
     pub(super) rung: Option<String>,
 }
 
-/// AngleMetrics of a set of cases. Shares are percent of all cases, 0..100.
+/// Metrics of a set of cases. Shares are percent of all cases, 0..100.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct AngleMetrics {
     #[serde(flatten)]
@@ -65,7 +65,7 @@ pub(super) struct AngleMetrics {
     pub(super) rungs: BTreeMap<String, usize>,
 }
 
-/// AngleMetrics over everything and per stratum.
+/// Metrics over everything and per stratum.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Summary {
     #[serde(flatten)]

@@ -82,28 +82,28 @@ fn suffixes(rig: &Rig) -> [String; KINDS] {
     [color, depth, "_vqvae".into(), "_touch".into(), "_reference".into()]
 }
 
-/// The sensors that the folder declares, else the lab's.
-fn rig_of(folder: &Path, problems: &mut Vec<Problem>) -> Arc<Rig> {
+/// The sensors that a folder declares in its [`RIG_JSON`], else the lab's.
+///
+/// # Errors
+/// If the file cannot be read or declares no rig.
+pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, Problem> {
     let file = folder.join(RIG_JSON);
     let rig = match files::read(&file, files::SMALL) {
         Ok(text) => Rig::parse(&text).map_err(|why| format!("does not declare a rig: {why}")),
-        Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Rig::lab(),
+        Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(Rig::lab()),
         Err(err) => Err(format!("cannot be read: {err}")),
     };
-    rig.map_or_else(
-        |why| {
-            let hint = "correct it, or remove it to take the pictures for the lab's sensors";
-            problems.push(problem(file, why, hint));
-            Rig::lab()
-        },
-        Arc::new,
-    )
+    let hint = "correct it, or remove it to take the pictures for the lab's sensors";
+    rig.map(Arc::new).map_err(|why| problem(file, why, hint))
 }
 
 /// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
 pub(super) fn scan(folder: &Path) -> Option<Scan> {
     let mut problems = Vec::new();
-    let rig = rig_of(folder, &mut problems);
+    let rig = rig_of(folder).unwrap_or_else(|wrong| {
+        problems.push(wrong);
+        Rig::lab()
+    });
     let suffixes = suffixes(&rig);
     let mut found: BTreeMap<String, Files> = BTreeMap::new();
     let mut common = None;

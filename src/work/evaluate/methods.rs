@@ -15,12 +15,13 @@ use crate::domain::turn::Turn;
 use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::engine::{EngineChoice, resolve};
+use crate::io::caught::caught;
 use crate::io::dataset::{Dataset, SourceKind};
-use crate::work::bundles::BundleInfo;
+use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
 use crate::work::imprint;
 use crate::work::job::JobCx;
-use crate::work::mask::MaskRecipe;
+use crate::work::mask::{MaskRecipe, MaskSource};
 use crate::work::models::{self, Wanted};
 use crate::work::prediction::Prediction;
 
@@ -76,6 +77,15 @@ fn open(origin: &Origin) -> Result<Bundle, TaskError> {
     Bundle::open(origin).map_err(|err| TaskError::from_error(format!("{WHAT}: {origin}"), &err))
 }
 
+/// A bundle that must be of a kind.
+fn find(origin: &Origin, kind: BundleKind) -> Result<BundleInfo, TaskError> {
+    let bundle = BundleInfo::of(&open(origin)?);
+    if bundle.kind == kind {
+        return Ok(bundle);
+    }
+    Err(TaskError::new(WHAT, format!("{origin} is a {}, not a {}", bundle.kind.name(), kind.name())))
+}
+
 impl Models {
     /// Loads everything that the setup names.
     pub(super) fn open(setup: &Setup, dataset: &Dataset, models: &models::Models) -> Result<Self, TaskError> {
@@ -88,11 +98,9 @@ impl Models {
         let engine = resolve(setup.runtime).map_err(|err| fail(&err))?.label().to_owned();
         let mut names: Vec<String> = Vec::new();
         for origin in &setup.bundles {
-            let bundle = BundleInfo::of(&open(origin)?);
+            let bundle = find(origin, BundleKind::Generator)?;
             let info = bundle.generator.as_ref();
-            let info = info.ok_or_else(|| {
-                TaskError::new(WHAT, format!("{origin} is a {}, not a generator", bundle.kind.name()))
-            })?;
+            let info = info.ok_or_else(|| TaskError::new(WHAT, format!("{origin} declares no generator")))?;
             let input = info.sensors.ends(&bundle.name, &dataset.rig).map_err(|err| fail(&err))?.input;
             let (defaults, name) = (info.defaults, bundle.name.clone());
             let config = GenerateConfig {
@@ -105,6 +113,7 @@ impl Models {
             let name = if names.contains(&name) { format!("{name} ({})", origin.short_name()) } else { name };
             names.push(name.clone());
             let (models, engine) = (models.beside(), setup.runtime);
+            models.load(&bundle, engine)?;
             methods.push(Method::Generator(Box::new(GeneratorMethod { name, bundle, models, engine, config, input })));
         }
         let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id), Turn::default()), Ok(Some(_)));
@@ -112,16 +121,19 @@ impl Models {
             methods.push(Method::Stored);
         }
         let mask_bundle = match &setup.mask_bundle {
-            Some(origin) if !pictures => Some(BundleInfo::of(&open(origin)?)),
+            Some(origin) if !pictures => Some(find(origin, BundleKind::Mask)?),
             _ => None,
         };
+        let masks = models.beside();
+        if let (Some(bundle), MaskSource::Auto | MaskSource::Unet) = (&mask_bundle, setup.mask.source) {
+            masks.load(bundle, setup.runtime)?;
+        }
         let classifier = match &setup.classifier {
             Some(origin) if !pictures => {
                 Some(ToolClassifier::open(&open(origin)?, setup.runtime).map_err(|err| fail(&err))?)
             }
             _ => None,
         };
-        let masks = models.beside();
         Ok(Self { methods, masks, mask_bundle, classifier, engine, made_otherwise: BTreeMap::new() })
     }
 
@@ -203,13 +215,8 @@ impl Method {
 }
 
 fn measured(case: &Case) -> Made {
-    let imprint = |f: PadId| Some(case.sample.pad(f)?.depth()?.imprint.clone());
-    Made {
-        imprints: case.sample.rig.pads().map(imprint).collect(),
-        colors: PerPad::default(),
-        tile: None,
-        seconds: None,
-    }
+    let imprints = imprint::measured(&case.sample);
+    Made { imprints, colors: PerPad::default(), tile: None, seconds: None }
 }
 
 fn stored(case: &Case) -> Result<Made, String> {
@@ -262,7 +269,10 @@ impl GeneratorMethod {
         let wanted: Vec<Wanted<'_>> =
             images.iter().map(|difference| Wanted { difference, seed, size: [0, 0] }).collect();
         let cx = cx.quiet();
-        let run = |wanted: &[Wanted<'_>]| self.models.predict(&self.bundle, self.engine, &self.config, wanted, &cx);
+        let run = |wanted: &[Wanted<'_>]| {
+            let predict = || self.models.predict(&self.bundle, self.engine, &self.config, wanted, &cx);
+            caught(predict).unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message)))
+        };
         let one = |image: &Wanted<'_>| {
             let made = run(std::slice::from_ref(image))?.pop();
             made.ok_or_else(|| TaskError::new(WHAT, "the generator gave no prediction"))

@@ -18,13 +18,16 @@ use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{Sample, Scale};
 use crate::infer::classifier::Verdict;
+use crate::io::caught::caught;
 use crate::io::dataset::Dataset;
 use crate::work::cloud::contact_points;
 use crate::work::compare::as_tile;
+use crate::work::error::TaskError;
 use crate::work::job::JobCx;
 use crate::work::mask::MaskInputs;
 use crate::work::models::Masking;
 use crate::work::pose;
+use crate::work::tool::load_tool;
 
 /// A prediction that waits for its image figures.
 struct Image {
@@ -55,12 +58,11 @@ impl Tool {
     /// Reads the CAD model.
     pub(super) fn new(dataset: &Dataset, tool: Option<String>, skipped: &mut Vec<Skipped>) -> Self {
         let model = tool.as_deref().and_then(|name| {
-            let model = match dataset.tool_mesh(name) {
-                Ok(Some(mesh)) => ToolModel::new(mesh).map_err(|err| err.to_string()),
-                Ok(None) => Err(format!("no CAD model (expected tools_stls/{name}.stl), so its grasps have no pose")),
-                Err(err) => Err(format!("{err} ({})", err.hint())),
+            let skip = |err: TaskError| {
+                let why = err.hint.map_or(err.why.clone(), |hint| format!("{} ({hint})", err.why));
+                skipped.push(Skipped { what: name.into(), method: String::new(), why });
             };
-            model.map_err(|why| skipped.push(Skipped { what: name.into(), method: String::new(), why })).ok()
+            load_tool(dataset, name).map(|(model, _)| model).map_err(skip).ok()
         });
         let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
         Self { pattern, model, class: None, pending: BTreeMap::new() }
@@ -103,7 +105,7 @@ impl Tool {
                     let imprint = made.imprints[f].as_ref().filter(|_| with_masks)?;
                     let tool = self.model.as_ref();
                     let inputs = MaskInputs { sample: &case.sample, tool, labels: case.labels.as_ref() };
-                    let found = by_models.contact_mask(by, imprint, f, inputs).map_err(|err| err.why);
+                    let found = guarded(|| by_models.contact_mask(by, imprint, f, inputs).map_err(|err| err.why));
                     let finger = || case.sample.rig.pad_key(f);
                     let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
                     let ContactMask { mask, basis } = found.ok()?;
@@ -122,23 +124,30 @@ impl Tool {
                 kept.push((case, made, masks));
             }
             // Poses on all cores; the models run one by one.
-            let angles: Vec<Option<f64>> = kept
+            let angles: Vec<Result<Option<f64>, String>> = kept
                 .par_iter()
                 .map(|(case, made, masks)| {
                     // A color picture has no depth, so there is nothing that could fail.
                     let posed = with_masks && made.colors.is_empty();
-                    posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()
+                    guarded(|| Ok(posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()))
                 })
                 .collect();
-            for ((case, made, _), angle_error_rad) in kept.into_iter().zip(angles) {
-                let mut images = images(case, &made, setup, upper);
+            for ((case, made, _), angle) in kept.into_iter().zip(angles) {
+                let scored = angle.and_then(|angle| Ok((angle, guarded(|| Ok(images(case, &made, setup, upper)))?)));
+                let (angle_error_rad, mut images) = match scored {
+                    Ok(scored) => scored,
+                    Err(why) => {
+                        skip(case, why);
+                        continue;
+                    }
+                };
                 if let Some(classifier) =
                     classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured && made.colors.is_empty())
                 {
                     let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
-                    match classifier.classify(&pictures) {
+                    match guarded(|| classifier.classify(&pictures).map_err(|err| err.to_string())) {
                         Ok(verdicts) => images.iter_mut().zip(verdicts).for_each(|(i, v)| i.verdict = Some(v)),
-                        Err(err) => skip(case, format!("tool classifier: {err}")),
+                        Err(why) => skip(case, format!("tool classifier: {why}")),
                     }
                 }
                 let score = GraspScore {
@@ -168,12 +177,12 @@ impl Tool {
     }
 
     /// The image figures, now that all predictions of the tool are there.
-    pub(super) fn finish(self, scores: &mut [Scores]) {
+    pub(super) fn finish(self, scores: &mut [Scores], skipped: &mut Vec<Skipped>) {
         let class = self.class;
         let mut measured_features = Vec::new();
         for (at, pending) in self.pending {
             let range = spread(pending.iter().flat_map(|p| &p.images).map(|i| &i.prediction));
-            let done: Vec<GraspScore> = pending
+            let done: Vec<Result<GraspScore, Skipped>> = pending
                 .into_par_iter()
                 .map(|Pending { mut score, images }| {
                     let assumed = score.scale == Scale::Assumed;
@@ -182,13 +191,26 @@ impl Tool {
                     } else {
                         [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)]
                     };
-                    score.images = images.into_iter().map(|image| finished(image, class, ranges, assumed)).collect();
-                    score
+                    let scored = || Ok(images.into_iter().map(|image| finished(image, class, ranges, assumed)).collect());
+                    match guarded(scored) {
+                        Ok(images) => {
+                            score.images = images;
+                            Ok(score)
+                        }
+                        Err(why) => Err(Skipped { what: score.pair, method: scores[at].method.clone(), why }),
+                    }
                 })
                 .collect();
+            let mut kept = Vec::new();
+            for one in done {
+                match one {
+                    Ok(score) => kept.push(score),
+                    Err(bad) => skipped.push(bad),
+                }
+            }
             // The measured imprints come first: what the others' features are compared with.
             if at == 0 {
-                measured_features = done
+                measured_features = kept
                     .iter()
                     .flat_map(|g| g.images.iter().map(move |i| (g.group, i.features.clone())))
                     .filter(|(_, f)| !f.is_empty())
@@ -196,7 +218,7 @@ impl Tool {
             } else {
                 scores[at].measured_features.extend(measured_features.iter().cloned());
             }
-            scores[at].grasps.extend(done);
+            scores[at].grasps.extend(kept);
         }
     }
 }
@@ -236,6 +258,13 @@ fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
     };
     let present = |f: &PadId| case.sample.pad(*f).is_some();
     fingers(&case.sample.rig, setup.both_fingers).filter(present).filter_map(image).collect()
+}
+
+/// The work on one pair: a panic in it is that pair's failure and not the end of the run.
+fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    caught(work).unwrap_or_else(|message| {
+        Err(format!("an internal error, which is a bug: {message}; please report it with this pair"))
+    })
 }
 
 /// Largest minus smallest value of some images.
