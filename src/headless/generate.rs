@@ -18,6 +18,7 @@ use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::ambiguity;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::DepthMap;
+use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::PadId;
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::{metrics, resample};
@@ -26,6 +27,7 @@ use crate::io::names::with_ending;
 use crate::work::compare;
 use crate::work::imprint::{self, imprint_of};
 use crate::work::job::JobCx;
+use crate::work::prediction::Prediction;
 
 use report::{COLOR_CONVENTION, Pair, Report, Unit, convention, mean, take, text};
 use write::{write, write_color};
@@ -106,11 +108,12 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                 }
                 let imprint = imprint_of(&predicted, predictor.shift(), &sample, finger)?;
                 write(&stem, &imprint)?;
-                score(&dataset, id, (finger, &sample), &imprint, &mut pair)?;
+                let drawn = Some((&predicted, predictor.shift()));
+                score(&dataset, id, (finger, &sample), (&imprint, drawn), &mut pair)?;
                 if args.ensemble.seeds > 1 {
                     let found = seeds::predict(&mut predictor, &sample, finger, args.ensemble.seeds)?;
                     let mut of_mean = Pair::default();
-                    score(&dataset, id, (finger, &sample), &found.spread.mean, &mut of_mean)?;
+                    score(&dataset, id, (finger, &sample), (&found.spread.mean, None), &mut of_mean)?;
                     let scores = (of_mean.psnr_db, of_mean.ssim);
                     pair.ensemble = Some(seeds::write(&stem, &found, config.seed, scores)?);
                 }
@@ -151,18 +154,19 @@ fn score(
     dataset: &Dataset,
     id: PairId,
     (finger, sample): (PadId, &Sample),
-    imprint: &DepthMap,
+    (imprint, drawn): (&DepthMap, Option<(&Prediction, ShiftMode)>),
     pair: &mut Pair,
 ) -> anyhow::Result<()> {
     let tile = compare::tile_of(dataset, id, sample)?;
-    if let Some(found) = compare::of_pad(imprint, sample, finger, tile.as_ref())? {
+    if let Some(found) = compare::of_pad(imprint, drawn, sample, finger, tile.as_ref())? {
         take(pair, &found);
     }
     if let Some(tile) = tile
         && let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_meters)
     {
         let theirs = compare::tiles(&vqvae, &tile, sample, finger)?;
-        (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
+        (pair.vqvae_psnr_db, pair.vqvae_ssim, pair.stored) = (theirs.psnr_db, theirs.ssim, theirs.unstretched);
+        pair.vqvae = theirs.unstretched.map(Into::into);
     }
     Ok(())
 }

@@ -100,7 +100,8 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let mut automatic = |sample: &Sample, finger: PadId, tool: Option<&str>| {
         const WHAT: &str = "Contact mask";
         let tool = tool.and_then(|name| {
-            let model = tools.entry(name.to_owned()).or_insert_with(|| load_tool(&dataset, name).ok().map(|(tool, _)| tool));
+            let model =
+                tools.entry(name.to_owned()).or_insert_with(|| load_tool(&dataset, name).ok().map(|(tool, _)| tool));
             model.as_ref()
         });
         let touch = sample.pad(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;

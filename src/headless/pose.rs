@@ -24,8 +24,8 @@ use crate::work::mask::MaskInputs;
 use crate::work::pose::{PoseResult, pose};
 use crate::work::tool::load_tool;
 
-use args::{Imprints, registration};
 pub(super) use args::{Engines, PoseArgs, parse_engines, parse_start};
+use args::{Imprints, registration};
 use report::{Accepted, Case, Report, summary, text};
 
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
@@ -176,4 +176,3 @@ fn pose_cases(
     };
     args.engine.0.iter().map(one).collect()
 }
-

@@ -10,7 +10,7 @@ use super::contact_mask::MaskArgs;
 use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GenerateConfig, Spacing};
 use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::postprocess::{DepthChain, RefitShift, ShiftMode};
+use crate::domain::postprocess::{CorrectionParts, DepthChain, RefitShift, ShiftMode};
 use crate::domain::rig::{PadId, PerPad, Rig, SensorId};
 use crate::domain::sample::{PadTouch, Sample};
 use crate::infer::bundle::Ends;
@@ -185,7 +185,8 @@ impl Predictor {
             AnyShiftArg::Refit => ShiftMode::Refit(self.refit.expect("read with the bundle")),
             AnyShiftArg::Raw => ShiftMode::Raw,
             AnyShiftArg::Paper => ShiftMode::PaperShift,
-            AnyShiftArg::Exact => ShiftMode::ExactInverse,
+            AnyShiftArg::Exact if self.args.fit_parts == CorrectionParts::ALL => ShiftMode::ExactInverse,
+            AnyShiftArg::Exact => ShiftMode::Parts(self.args.fit_parts),
         }
     }
 
@@ -215,12 +216,27 @@ impl Predictor {
         if source == ImprintSource::Measured {
             return Ok(imprint::measured(sample));
         }
+        let made = self.predictions(sample, cx)?;
+        self.in_meters(sample, &made)
+    }
+
+    /// The predictions of a pair's touches, all in one batch.
+    pub(super) fn predictions(&mut self, sample: &Sample, cx: &JobCx) -> anyhow::Result<PerPad<Prediction>> {
         let conditions = self.conditions(sample)?;
         let pictures: Vec<&RgbGrid> = conditions.iter().map(|(_, picture)| &**picture).collect();
         let made = self.predict(&pictures, cx)?;
-        let mut out: PerPad<DepthMap> = sample.rig.pads().map(|_| None).collect();
+        let mut out: PerPad<Prediction> = sample.rig.pads().map(|_| None).collect();
         for ((finger, _), made) in conditions.iter().zip(made) {
-            out[*finger] = Some(imprint_of(&made, self.shift(), sample, *finger)?);
+            out[*finger] = Some(made);
+        }
+        Ok(out)
+    }
+
+    /// Predictions of a pair's touches in meters, as large as its imprints.
+    pub(super) fn in_meters(&self, sample: &Sample, made: &PerPad<Prediction>) -> anyhow::Result<PerPad<DepthMap>> {
+        let mut out: PerPad<DepthMap> = sample.rig.pads().map(|_| None).collect();
+        for (finger, made) in made.entries() {
+            out[finger] = Some(imprint_of(made, self.shift(), sample, finger)?);
         }
         Ok(out)
     }

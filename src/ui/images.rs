@@ -89,8 +89,15 @@ pub(super) fn scale_note(state: &State) -> &'static str {
 
 /// [`scale_note`], and how the files' pictures lie if they had to be laid upright.
 fn source_note(state: &State) -> String {
-    let laid = state.sample().ready().map(|s| s.laid).filter(|laid| *laid != Turn::default());
-    let laid = laid.map(|laid| format!("laid upright, the file is {laid}"));
+    let reading = state.sample().ready().and_then(|s| s.reading);
+    let laid = reading.filter(|read| read.turn != Turn::default() || !read.is_sure()).map(|read| {
+        let sure = if read.is_sure() { "sure" } else { "NOT sure" };
+        format!(
+            "laid upright, the file is {} ({sure}: {:.0} % clearer than the next way)",
+            read.turn,
+            100.0 * read.margin
+        )
+    });
     [scale_note(state).to_owned(), laid.unwrap_or_default()]
         .into_iter()
         .filter(|s| !s.is_empty())

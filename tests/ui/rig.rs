@@ -117,6 +117,7 @@ impl Services for QuickGenerator {
             mapping: Mapping::Doubled,
             reduction: Reduction::Mean,
             shift: Shift::None,
+            correction: None,
             size: [lab::BUBBLE.width, lab::BUBBLE.height],
             resampling: Resampling::Bilinear,
             rotation_deg: 180,
@@ -142,7 +143,16 @@ impl Services for QuickGenerator {
             let mean = picture(item.difference, item.seed);
             let raw = RawPrediction { channels: [-0.02, 0.0, 0.02].map(|off| mean.map(|v| v + off)).to_vec() };
             let (chains, bundle) = (chains.clone(), bundle.id.clone());
-            Prediction { raw, chains, color: None, bundle, engine: "double".into(), seconds: 0.0, kept: false }
+            Prediction {
+                raw,
+                chains,
+                fit: None,
+                color: None,
+                bundle,
+                engine: "double".into(),
+                seconds: 0.0,
+                kept: false,
+            }
         };
         Ok(wanted.iter().map(one).collect())
     }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::super::seeds::SeedFigures;
 use crate::domain::ambiguity::{Ambiguity, Touch};
 use crate::domain::findings::Finding;
-use crate::domain::metrics;
+use crate::domain::metrics::{self, Unstretched};
 use crate::domain::rig::Text;
 use crate::domain::sample::Scale;
 use crate::work::compare::Comparison;
@@ -33,6 +33,13 @@ pub(super) struct Pair {
     pub(super) vqvae_psnr_db: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) vqvae_ssim: Option<f64>,
+    /// Where the scale was assumed: of the pictures as they are, and after the best straight line.
+    #[serde(flatten)]
+    pub(super) unstretched: Option<Unstretched>,
+    #[serde(flatten)]
+    pub(super) vqvae: Option<StoredUnstretched>,
+    #[serde(skip)]
+    pub(super) stored: Option<Unstretched>,
     /// The figures apart for what the GelSlim saw and for what lies outside its footprint; errors in meters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) seen: Option<metrics::PixelMetrics>,
@@ -58,6 +65,10 @@ pub(super) struct Mean {
     pub(super) vqvae_psnr_db: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) vqvae_ssim: Option<f64>,
+    #[serde(flatten)]
+    pub(super) unstretched: Option<Unstretched>,
+    #[serde(flatten)]
+    pub(super) vqvae: Option<StoredUnstretched>,
     /// Means over the pairs: inside the GelSlim's footprint, and outside.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) seen: Option<PartMean>,
@@ -66,6 +77,30 @@ pub(super) struct Mean {
     /// Pairs whose GelSlim image leaves the place along a bare shaft open.
     pub(super) ambiguous: usize,
     pub(super) seconds: Option<f64>,
+}
+
+/// [`Unstretched`] metrics of the prediction that lay by.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct StoredUnstretched {
+    vqvae_psnr_raw_db: Option<f64>,
+    vqvae_ssim_raw: Option<f64>,
+    vqvae_psnr_line_db: Option<f64>,
+}
+
+impl From<Unstretched> for StoredUnstretched {
+    fn from(of: Unstretched) -> Self {
+        Self { vqvae_psnr_raw_db: of.psnr_raw_db, vqvae_ssim_raw: of.ssim_raw, vqvae_psnr_line_db: of.psnr_line_db }
+    }
+}
+
+/// Means over the pictures that have them.
+fn unstretched_mean(all: impl Iterator<Item = Unstretched>) -> Option<Unstretched> {
+    let all: Vec<Unstretched> = all.collect();
+    (!all.is_empty()).then(|| Unstretched {
+        psnr_raw_db: average(all.iter().filter_map(|u| u.psnr_raw_db)),
+        ssim_raw: average(all.iter().filter_map(|u| u.ssim_raw)),
+        psnr_line_db: average(all.iter().filter_map(|u| u.psnr_line_db)),
+    })
 }
 
 /// Means of the figures of one part.
@@ -114,12 +149,15 @@ pub(super) struct Report {
 pub(super) fn convention(scale: Scale) -> &'static str {
     match scale {
         Scale::Measured => "depth in meters, PSNR peak and SSIM range 0.0225 m (the lab's peak)",
-        Scale::Assumed => "both images scaled to 0..1 one by one, peak and range 1 (the source lost its scale)",
+        Scale::Assumed => {
+            "both images stretched to 0..1 one by one, peak and range 1 (the source lost its scale; no noise-free picture passes \
+             20 dB so); raw: as they are, in the assumed meters; line: after the best straight line"
+        }
     }
 }
 
 pub(super) fn take(pair: &mut Pair, found: &Comparison) {
-    (pair.psnr_db, pair.ssim) = (found.psnr_db, found.ssim);
+    (pair.psnr_db, pair.ssim, pair.unstretched) = (found.psnr_db, found.ssim, found.unstretched);
     pair.seen = found.split.map(|s| s.seen);
     pair.invented = found.split.map(|s| s.invented);
 }
@@ -131,6 +169,8 @@ pub(super) fn mean(pairs: &[Pair]) -> Mean {
         ssim: of(|p| p.ssim),
         vqvae_psnr_db: of(|p| p.vqvae_psnr_db),
         vqvae_ssim: of(|p| p.vqvae_ssim),
+        unstretched: unstretched_mean(pairs.iter().filter_map(|p| p.unstretched)),
+        vqvae: unstretched_mean(pairs.iter().filter_map(|p| p.stored)).map(Into::into),
         seen: PartMean::of(pairs, |p| p.seen),
         invented: PartMean::of(pairs, |p| p.invented),
         ambiguous: pairs.iter().filter(|p| p.ambiguity.is_some_and(|a| a.kind == Touch::BareShaft)).count(),
@@ -164,8 +204,9 @@ pub(super) fn text(report: &Report) -> String {
     }
     line("mean", &report.mean, "");
     text + &format!(
-        "\n{}; seen = inside the GelSlim's footprint, inv. = invented outside it\n{} of {} GelSlim images are ambiguous \
+        "{}\n{}; seen = inside the GelSlim's footprint, inv. = invented outside it\n{} of {} GelSlim images are ambiguous \
          (bare shaft); {} steps, seed {}, {} on {}\n",
+        unstretched_text(&report.mean),
         report.convention,
         report.mean.ambiguous,
         report.pairs.len(),
@@ -173,5 +214,25 @@ pub(super) fn text(report: &Report) -> String {
         report.seed,
         report.bundle,
         report.runtime
+    )
+}
+
+/// The means that do not stretch, as a line of their own.
+fn unstretched_text(mean: &Mean) -> String {
+    let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
+    let Some(own) = mean.unstretched else { return String::new() };
+    let stored = mean.vqvae.map_or(String::new(), |v| {
+        format!(
+            "; VQ-VAE raw {} dB, SSIM {}, line {} dB",
+            number(v.vqvae_psnr_raw_db, 1),
+            number(v.vqvae_ssim_raw, 3),
+            number(v.vqvae_psnr_line_db, 1)
+        )
+    });
+    format!(
+        "unstretched: raw {} dB, SSIM {}, line {} dB{stored}\n",
+        number(own.psnr_raw_db, 1),
+        number(own.ssim_raw, 3),
+        number(own.psnr_line_db, 1)
     )
 }

@@ -112,4 +112,3 @@ pub(super) fn registration(args: &PoseArgs, engine: Registration) -> Box<dyn Reg
     }
     Box::new(config)
 }
-

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use strum::IntoEnumIterator as _;
 
 use super::super::args::keyed;
 use crate::domain::diffusion::{GUIDANCE, Preset, Sampler};
-use crate::domain::postprocess::ShiftMode;
+use crate::domain::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use crate::infer::engine::EngineChoice;
 
 /// Which models, and how they are run.
@@ -44,6 +45,10 @@ pub(in crate::headless) struct ModelArgs {
     /// How the decoder's output becomes meters.
     #[arg(long, value_enum, default_value_t = AnyShiftArg::Exact)]
     pub(super) shift: AnyShiftArg,
+    /// What of the fit of a bundle to a rig is applied with `--shift exact`: `all`, `none`, or some of offset, field, gain,
+    /// response, separated by commas.
+    #[arg(long, value_name = "PARTS", default_value = "all", value_parser = fit_parts)]
+    pub(super) fit_parts: CorrectionParts,
     /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
     #[arg(long, value_name = "FILE")]
     pub(super) stats: Option<PathBuf>,
@@ -53,6 +58,22 @@ pub(in crate::headless) struct ModelArgs {
     /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
     #[arg(long)]
     pub(super) no_cache: bool,
+}
+
+fn fit_parts(text: &str) -> Result<CorrectionParts, String> {
+    match text {
+        "all" => Ok(CorrectionParts::ALL),
+        "none" => Ok(CorrectionParts::NONE),
+        list => {
+            let part = |name: &str| {
+                name.trim().parse::<CorrectionPart>().map_err(|_| {
+                    let names: Vec<&str> = CorrectionPart::iter().map(Into::into).collect();
+                    format!("\"{name}\" is no part of a fit; there are {}", names.join(", "))
+                })
+            };
+            Ok(list.split(',').map(part).collect::<Result<Vec<_>, _>>()?.into())
+        }
+    }
 }
 
 pub(super) fn guidance(text: &str) -> Result<f64, String> {
@@ -122,4 +143,3 @@ impl RuntimeArg {
         }
     }
 }
-

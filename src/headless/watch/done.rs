@@ -9,10 +9,12 @@ use crate::domain::contact::ContactMask;
 use crate::domain::dataset::Problem;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::DepthMap;
+use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::{PadId, Text};
 use crate::domain::sample::Sample;
 use crate::work::compare;
 use crate::work::mask::Contact;
+use crate::work::prediction::Prediction;
 
 /// Metrics of one finger.
 #[derive(Debug, Clone, Serialize)]
@@ -86,10 +88,16 @@ impl Done {
 }
 
 /// Numbers of one prediction, against the measurement where there is one.
-pub(super) fn figures(sample: &Sample, pad: PadId, contact: &Contact, tile: Option<&DepthMap>) -> Option<FingerFigures> {
+pub(super) fn figures(
+    sample: &Sample,
+    pad: PadId,
+    contact: &Contact,
+    drawn: Option<(&Prediction, ShiftMode)>,
+    tile: Option<&DepthMap>,
+) -> Option<FingerFigures> {
     let imprint = contact.imprints[pad].as_ref()?;
     let stats = crate::domain::postprocess::Stats::of(imprint);
-    let compared = compare::of_pad(imprint, sample, pad, tile).ok().flatten();
+    let compared = compare::of_pad(imprint, drawn, sample, pad, tile).ok().flatten();
     let mask = contact.masks[pad].as_ref();
     let count = |found: &ContactMask| found.mask.as_slice().iter().filter(|&&m| m).count();
     Some(FingerFigures {

@@ -14,18 +14,19 @@ use super::done::{Done, PoseMetrics, figures};
 use super::summary::Latency;
 use super::{Source, WatchArgs, write};
 use crate::domain::align::Ask;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::Mask;
 use crate::domain::pose::{Registration, ToolModel};
-use crate::domain::rig::PerPad;
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::infer::engine::resolve;
 use crate::io::dataset::{Dataset, read_in_meters};
 use crate::io::follow::Ready;
 use crate::work::compare;
 use crate::work::job::{Cancel, JobCx};
-use crate::work::labels::{ImprintSource, PairLabels};
+use crate::work::labels::PairLabels;
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose;
+use crate::work::prediction::Prediction;
 use crate::work::tool::{load_tool, named_tool};
 
 /// The models, loaded once, and the tools met so far.
@@ -116,7 +117,8 @@ impl<'a> Worker<'a> {
         let mut latency = Latency { found: since(ready.stamp.closed, found), load: ms(start), ..Latency::default() };
 
         let step = Instant::now();
-        let Some(imprints) = self.imprints(sample)? else { return Ok(None) };
+        let Some(drawn) = self.predictions(sample)? else { return Ok(None) };
+        let imprints = self.predictor.in_meters(sample, &drawn)?;
         latency.generate = ms(step);
         let step = Instant::now();
         let inputs = MaskInputs { sample, tool: None, labels: self.args.mask.drawn(labels) };
@@ -134,6 +136,8 @@ impl<'a> Worker<'a> {
         latency.write = ms(step);
         latency.total = since(ready.stamp.closed, SystemTime::now());
         let tile = compare::tile_of(dataset, ready.id, sample)?;
+        let shift = self.predictor.shift();
+        let drawn = |pad: PadId| Some((drawn[pad].as_ref()?, shift));
         let mut done = Done {
             name: ready.name.clone(),
             source: source.clone(),
@@ -142,7 +146,11 @@ impl<'a> Worker<'a> {
             notes: sample.notes.clone(),
             scale: sample.scale.key(),
             mask_notes: contact.notes(&sample.rig),
-            fingers: sample.rig.pads().filter_map(|pad| figures(sample, pad, &contact, tile.as_ref())).collect(),
+            fingers: sample
+                .rig
+                .pads()
+                .filter_map(|pad| figures(sample, pad, &contact, drawn(pad), tile.as_ref()))
+                .collect(),
             pose,
             no_pose,
             latency,
@@ -155,13 +163,13 @@ impl<'a> Worker<'a> {
         Ok(Some(done))
     }
 
-    /// Predicted imprints of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
-    fn imprints(&mut self, sample: &Sample) -> anyhow::Result<Option<PerPad<DepthMap>>> {
+    /// Predictions of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
+    fn predictions(&mut self, sample: &Sample) -> anyhow::Result<Option<PerPad<Prediction>>> {
         if self.predictor.conditions(sample)?.is_empty() {
             return Err(self.predictor.no_condition());
         }
         let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
-        match self.predictor.imprints(sample, ImprintSource::Predicted, &cx) {
+        match self.predictor.predictions(sample, &cx) {
             Err(_) if self.stop.is_cancelled() => Ok(None),
             made => made.map(Some),
         }

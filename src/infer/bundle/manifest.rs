@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::fit::FitSpec;
 use super::sensor::{SensorPair, SensorSpec};
 use super::{Problems, Role};
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
@@ -67,6 +68,8 @@ pub struct GeneratorSpec {
     pub timestep: TimestepType,
     /// How classifier-free guidance is done; `None` if the model was not trained for it.
     pub guidance: Option<GuidanceSpec>,
+    /// The fit to a rig, if it was fitted to one.
+    pub fit: Option<FitSpec>,
 }
 
 /// `guidance`: only for a denoiser that was trained with the condition left out now and then.
@@ -106,6 +109,7 @@ impl GeneratorSpec {
             mapping: Mapping::Correct,
             reduction: self.output.reduction,
             shift: Shift::None,
+            correction: None,
             size: self.output.imprint_size,
             resampling: self.output.resampling,
             rotation_deg: self.output.rotation_deg,
@@ -488,6 +492,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
     let defaults: Option<Defaults> = section(keys, "defaults", problems);
     let guidance: Option<GuidanceSpec> =
         if keys.contains_key("guidance") { section(keys, "guidance", problems) } else { None };
+    let fit: Option<FitSpec> = if keys.contains_key("fit") { section(keys, "fit", problems) } else { None };
 
     let mut check = |fine: bool, what: &str, hint: &str| {
         if !fine {
@@ -533,6 +538,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
                 check(valid, "output.range: empty", "give [smallest, largest] difference on the 0..255 scale");
                 check(output.channels == 3, "output.channels: not a color picture's", "a color sensor has 3 channels");
                 check(shift.is_none(), "shift: not for a color picture", "remove it");
+                check(fit.is_none(), "fit: not for a color picture", "remove it");
             }
         }
         check(turn(output.rotation_deg), "output.rotation_deg: not supported", TURNS);
@@ -582,6 +588,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         defaults: defaults?,
         timestep: TimestepType::Int64,
         guidance,
+        fit,
     })))
 }
 

@@ -13,13 +13,13 @@ use crate::domain::catalog::pattern_of;
 use crate::domain::contact::{ContactMask, MaskBasis};
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
 use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
-use crate::domain::metrics::{LEVELS, SsimRange, planes, ssim_ranges, unit_range};
+use crate::domain::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ssim_ranges, unit_range};
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{Sample, Scale};
 use crate::infer::classifier::Verdict;
 use crate::io::caught::caught;
-use crate::io::dataset::Dataset;
+use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
 use crate::work::cloud::contact_points;
 use crate::work::compare::as_tile;
 use crate::work::error::TaskError;
@@ -36,6 +36,7 @@ struct Image {
     /// `None` for the measured imprint itself, which is not compared with itself.
     truth: Option<Grid<f32>>,
     noise_free: Option<Grid<f32>>,
+    unstretched: Option<Unstretched>,
     verdict: Option<Verdict>,
 }
 
@@ -191,7 +192,8 @@ impl Tool {
                     } else {
                         [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)]
                     };
-                    let scored = || Ok(images.into_iter().map(|image| finished(image, class, ranges, assumed)).collect());
+                    let scored =
+                        || Ok(images.into_iter().map(|image| finished(image, class, ranges, assumed)).collect());
                     match guarded(scored) {
                         Ok(images) => {
                             score.images = images;
@@ -231,7 +233,8 @@ fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
             let levels = |picture: &RgbGrid| planes(picture, PEAK_M / LEVELS);
             let truth = Some(levels(&case.sample.pad(finger)?.color()?.difference));
             let prediction = levels(color);
-            return Some(Image { finger: finger.index(), prediction, truth, noise_free: None, verdict: None });
+            let finger = finger.index();
+            return Some(Image { finger, prediction, truth, noise_free: None, unstretched: None, verdict: None });
         }
         let bubble = case.sample.pad(finger)?.depth()?;
         if case.sample.scale == Scale::Assumed {
@@ -239,22 +242,28 @@ fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
             let tile = case.tile.as_ref()?;
             let prediction = match (&made.tile, &made.imprints[finger]) {
                 (Some(stored), _) => stored.clone(),
-                (None, Some(imprint)) => as_tile(imprint, &case.sample.rig, tile.size()),
+                (None, Some(imprint)) => {
+                    made.pictures[finger].clone().unwrap_or_else(|| as_tile(imprint, &case.sample.rig, tile.size()))
+                }
                 (None, None) => return None,
             };
+            let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
+            let raw = (in_assumed_meters(&prediction, made), assumed_meters(tile));
+            let unstretched = metrics::unstretched(&raw.0, &raw.1, hi - lo).ok();
             let (prediction, truth) = (unit_range(&prediction), unit_range(tile));
             return Some(Image {
                 finger: finger.index(),
                 prediction,
                 truth: Some(truth),
                 noise_free: None,
+                unstretched,
                 verdict: None,
             });
         }
         let prediction = made.imprints[finger].clone()?;
         let truth = (!upper).then(|| bubble.imprint.clone());
         let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
-        Some(Image { finger: finger.index(), prediction, truth, noise_free, verdict: None })
+        Some(Image { finger: finger.index(), prediction, truth, noise_free, unstretched: None, verdict: None })
     };
     let present = |f: &PadId| case.sample.pad(*f).is_some();
     fingers(&case.sample.rig, setup.both_fingers).filter(present).filter_map(image).collect()
@@ -267,6 +276,11 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     })
 }
 
+/// What a method made of a picture, in the assumed meters: stored predictions are gray levels.
+fn in_assumed_meters(prediction: &Grid<f32>, made: &Made) -> Grid<f32> {
+    if made.tile.is_some() { assumed_meters(prediction) } else { prediction.clone() }
+}
+
 /// Largest minus smallest value of some images.
 fn spread<'a>(images: impl Iterator<Item = &'a Grid<f32>>) -> f64 {
     let (lo, hi) = images
@@ -277,7 +291,7 @@ fn spread<'a>(images: impl Iterator<Item = &'a Grid<f32>>) -> f64 {
 }
 
 fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed: bool) -> ImageScore {
-    let Image { finger, prediction, truth, noise_free, verdict } = image;
+    let Image { finger, prediction, truth, noise_free, unstretched, verdict } = image;
     let ssim = truth.as_ref().and_then(|truth| ssim_ranges(&prediction, truth, &ranges).ok());
     let of = |at: usize| ssim.as_ref().map(|found| found[at].mean);
     let clean = noise_free.as_ref().and_then(|clean| ssim_ranges(&prediction, clean, &ranges[..1]).ok());
@@ -288,6 +302,7 @@ fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed:
         ssim: of(0),
         ssim_noise_free: clean.map(|found| found[0].mean),
         ssim_peak: of(1).filter(|_| !assumed),
+        unstretched,
         tool_right: verdict.as_ref().zip(class).map(|(v, class)| v.class == class),
         features: verdict.map_or_else(Vec::new, |v| v.features),
     }
