@@ -75,6 +75,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             let sample = dataset.load(id)?;
             scale = sample.scale;
             notes.take(&output, &sample.notes);
+            notes.take(&output, predictor.misgiving(&sample)?.as_slice());
             // An image folder has one finger, whichever it was.
             let present: Vec<PadId> = fingers.iter().copied().filter(|f| sample.pad(*f).is_some()).collect();
             let fingers = if present.is_empty() { sample.rig.pad_list() } else { present };

@@ -80,6 +80,9 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         };
         let labels = labels_of(&all_labels, &entry.name, &output);
         for &imprint in imprints {
+            if imprint == ImprintSource::Predicted {
+                notes.take(&output, predictor.misgiving(&sample).ok().flatten().as_slice());
+            }
             let asked = Asked {
                 name: &entry.name,
                 stem: stem.as_deref(),

@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use super::contact_mask::MaskArgs;
 use crate::domain::contact::ContactMask;
+use crate::domain::dataset::Problem;
 use crate::domain::diffusion::{GenerateConfig, Spacing};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{CorrectionParts, DepthChain, RefitShift, ShiftMode};
@@ -107,6 +108,21 @@ impl Predictor {
             (Some(_), _) => anyhow::bail!("--stats is for --shift refit; add that, or leave the statistics out"),
             (None, _) => Ok(None),
         }
+    }
+
+    /// That the generator was fitted to other data than this sample.
+    pub(super) fn misgiving(&mut self, sample: &Sample) -> anyhow::Result<Option<Problem>> {
+        let bundle = self.bundle()?;
+        Ok(bundle.misgiving(sample).map(|what| Problem {
+            file: bundle.origin.path(),
+            what,
+            hint: "name another bundle, or switch the fit off with --fit-parts none".into(),
+        }))
+    }
+
+    /// The models themselves.
+    pub(super) fn models(&self) -> &Models {
+        &self.models
     }
 
     /// The engine that runs the models.

@@ -23,6 +23,7 @@ use crate::domain::rig::{PadId, Rig, Sensor, SensorKind};
 use crate::domain::sample::Scale;
 use crate::domain::turn::Turn;
 use crate::domain::units;
+use crate::work::bundles::BundleKind;
 use crate::work::error::TaskError;
 
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
@@ -98,7 +99,9 @@ fn source_note(state: &State) -> String {
             100.0 * read.margin
         )
     });
-    [scale_note(state).to_owned(), laid.unwrap_or_default()]
+    let fitted = state.bundle(BundleKind::Generator).ok().and_then(|bundle| bundle.misgiving(state.sample().ready()?));
+    let fitted = fitted.map(|_| "the model was fitted to other data".to_owned());
+    [scale_note(state).to_owned(), laid.unwrap_or_default(), fitted.unwrap_or_default()]
         .into_iter()
         .filter(|s| !s.is_empty())
         .collect::<Vec<_>>()

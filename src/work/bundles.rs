@@ -6,7 +6,9 @@ use std::sync::Arc;
 use super::error::TaskError;
 use crate::domain::dataset::Problem;
 use crate::domain::diffusion::GenerateConfig;
+use crate::domain::fit::FitSource;
 use crate::domain::rig::Rig;
+use crate::domain::sample::Sample;
 use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, SensorPair};
 use crate::infer::generator::GenerateError;
 
@@ -36,6 +38,8 @@ pub struct GeneratorInfo {
     pub guided: bool,
     /// The sensors between which it predicts.
     pub sensors: SensorPair,
+    /// From what it was fitted to a rig, if it was.
+    pub fit: Option<FitSource>,
 }
 
 /// What a bundle does.
@@ -77,6 +81,7 @@ impl BundleInfo {
                 training_steps: spec.schedule.training_steps(),
                 guided: spec.guidance.is_some(),
                 sensors: spec.sensors(),
+                fit: spec.fit.as_ref().map(|fit| fit.source.clone()),
             }),
         }
     }
@@ -87,6 +92,11 @@ impl BundleInfo {
     /// [`Misfit`].
     pub fn ends(&self, rig: &Rig) -> Option<Result<Ends, Misfit>> {
         Some(self.generator.as_ref()?.sensors.ends(&self.name, rig))
+    }
+
+    /// Why a generator that was fitted is not for this sample, in words.
+    pub fn misgiving(&self, sample: &Sample) -> Option<String> {
+        self.generator.as_ref()?.fit.as_ref()?.misgiving(sample)
     }
 
     /// Whether it can be used with the sensors of `rig`.

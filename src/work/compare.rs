@@ -79,7 +79,7 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
 ///
 /// # Errors
 /// As [`compare`].
-fn compare_parts(
+pub fn compare_parts(
     predicted: &DepthMap,
     measured: &DepthMap,
     scale: Scale,

@@ -250,6 +250,7 @@ impl Services for Double {
             kind,
             origin: Origin::Folder(id.into()),
             generator: (kind == BundleKind::Generator).then(|| GeneratorInfo {
+                fit: None,
                 defaults: GenerateConfig { steps: 20, ..GenerateConfig::default() },
                 training_steps: 1000,
                 guided: false,

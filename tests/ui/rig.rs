@@ -90,6 +90,7 @@ impl Services for QuickGenerator {
             kind: BundleKind::Generator,
             origin: Origin::Folder(PathBuf::new()),
             generator: Some(GeneratorInfo {
+                fit: None,
                 defaults: GenerateConfig { steps: 4, ..GenerateConfig::default() },
                 training_steps: 1000,
                 guided: false,

@@ -28,6 +28,20 @@ pub struct FitSource {
     pub from_sha256: String,
 }
 
+impl FitSource {
+    /// What makes these data others than those it was fitted to, in words.
+    pub fn misgiving(&self, sample: &Sample) -> Option<String> {
+        let rig = (self.rig != sample.rig.name).then(|| format!("taken with the rig {}", self.rig));
+        let scale = || format!("whose meters were {}", self.scale.key());
+        let other = rig.or_else(|| (self.scale != sample.scale).then(scale))?;
+        Some(format!(
+            "the model was fitted to {} pairs of {}, {other}: on these data it is worse than unfitted",
+            self.pairs.len(),
+            self.data
+        ))
+    }
+}
+
 /// What a fit knows of one pad.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PadFit {
@@ -62,24 +76,5 @@ impl Fitted {
     /// The correction of a touch's prediction; `None` where the fit had no pair of its pad.
     pub fn correction(&self, sample: &Sample, pad: PadId) -> Option<&Arc<Correction>> {
         Some(&self.pads.get(self.pad(sample, pad))?.correction)
-    }
-
-    /// What makes these data others than those it was fitted to, in words.
-    pub fn misgiving(&self, sample: &Sample) -> Option<String> {
-        let FitSource { data, rig, scale, pairs, .. } = &self.source;
-        let of = format!("this model was fitted to {} pairs of {data}", pairs.len());
-        if *rig != sample.rig.name {
-            return Some(format!(
-                "{of}, taken with the rig {rig}: on data of {} it is worse than unfitted",
-                sample.rig.name
-            ));
-        }
-        (*scale != sample.scale).then(|| {
-            format!(
-                "{of}, whose meters were {}: on data with {} meters it is worse than unfitted",
-                scale.key(),
-                sample.scale.key()
-            )
-        })
     }
 }

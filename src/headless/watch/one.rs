@@ -143,7 +143,7 @@ impl<'a> Worker<'a> {
             source: source.clone(),
             recipe: recipe.clone(),
             files,
-            notes: sample.notes.clone(),
+            notes: sample.notes.iter().cloned().chain(self.predictor.misgiving(sample)?).collect(),
             scale: sample.scale.key(),
             mask_notes: contact.notes(&sample.rig),
             fingers: sample
