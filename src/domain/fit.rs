@@ -16,7 +16,7 @@ use std::sync::Arc;
 use super::blur::gaussian;
 use super::grid::{DepthMap, Grid};
 use super::postprocess::{Correction, CorrectionParts, Response};
-use offset::offset;
+use offset::offsets;
 
 pub use doubts::{Doubt, doubts};
 pub use fitted::{FitSource, Fitted, PadFit};
@@ -78,8 +78,7 @@ type Pixels = Vec<f64>;
 /// About 10 ms per pair of 128 x 128 pixels, and 16 bytes per pixel and pair.
 pub fn closed_form(cases: &[Case<'_>], pads: usize) -> Result<Vec<Option<Correction>>, FitError> {
     let size = check(cases)?;
-    let of_pad = |pad: usize| cases.iter().filter(move |c| c.pad == pad);
-    let offsets: Vec<[f64; 2]> = (0..pads).map(|pad| offset(&of_pad(pad).collect::<Vec<_>>())).collect();
+    let offsets = offsets(cases, pads);
     // Everything after the offset, before the line is known.
     let start = |pad: usize| Correction {
         offset_px: offsets[pad],
@@ -91,7 +90,7 @@ pub fn closed_form(cases: &[Case<'_>], pads: usize) -> Result<Vec<Option<Correct
         parts: CorrectionParts::ALL,
     };
     let mut found: Vec<Option<Correction>> =
-        (0..pads).map(|pad| of_pad(pad).next().is_some().then(|| start(pad))).collect();
+        (0..pads).map(|pad| cases.iter().any(|case| case.pad == pad).then(|| start(pad))).collect();
     let placed: Vec<DepthMap> = cases
         .iter()
         .map(|case| found[case.pad].as_ref().map_or_else(|| case.prediction.clone(), |c| c.placed(case.prediction)))

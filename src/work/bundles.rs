@@ -94,6 +94,11 @@ impl BundleInfo {
         Some(self.generator.as_ref()?.sensors.ends(&self.name, rig))
     }
 
+    /// Whether it was fitted to a rig.
+    pub fn is_fitted(&self) -> bool {
+        self.generator.as_ref().is_some_and(|generator| generator.fit.is_some())
+    }
+
     /// Why a generator that was fitted is not for this sample, in words.
     pub fn misgiving(&self, sample: &Sample) -> Option<String> {
         self.generator.as_ref()?.fit.as_ref()?.misgiving(sample)
@@ -144,6 +149,15 @@ pub fn find(folders: &[PathBuf]) -> FoundBundles {
     FoundBundles { bundles: found.bundles.iter().map(BundleInfo::of).collect(), problems: found.problems }
 }
 
+/// The bundle in a folder.
+///
+/// # Errors
+/// If it cannot be used.
+pub fn open(folder: &Path) -> Result<BundleInfo, TaskError> {
+    let opened = Bundle::open(folder).map_err(|err| TaskError::from_error("Open the bundle", &err))?;
+    Ok(BundleInfo::of(&opened))
+}
+
 impl FoundBundles {
     /// The bundle in the named folder, else the first found of its kind that fits the sensors of `rig`.
     ///
@@ -160,7 +174,10 @@ impl FoundBundles {
             }
             return Ok(info);
         }
-        self.bundles.iter().find(|bundle| bundle.kind == kind && bundle.fits(rig)).cloned().ok_or_else(|| {
+        let fitting = || self.bundles.iter().filter(|bundle| bundle.kind == kind && bundle.fits(rig));
+        // What was fitted to a rig is used where it is named.
+        let first = fitting().find(|bundle| !bundle.is_fitted()).or_else(|| fitting().next());
+        first.cloned().ok_or_else(|| {
             let refused: Vec<String> =
                 self.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
             let why = match kind {

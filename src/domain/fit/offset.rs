@@ -6,19 +6,31 @@ use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::postprocess::moved;
 use crate::domain::resample;
 
-/// Farthest offset looked for, pixels of 128: three times what the rigs seen so far have.
-const REACH_PX: isize = 24;
+/// Farthest offset of all pads together, share of the picture's side: three times what the rigs seen so far have.
+const REACH: f64 = 24.0 / 128.0;
+/// Farthest offset of one pad from that of all: twice what was seen. A few pairs of one pad alone mislead.
+const APART: f64 = 8.0 / 128.0;
 /// Finest step, pixels.
 const FINEST_PX: f64 = 1.0 / 16.0;
 /// Least correlation of predictions and measurements at which their offset means something.
 const LEAST_CORRELATION: f64 = 0.2;
 
-/// The offset `[right, down]` that makes predictions and measurements most alike, pixels; zero where nothing tells.
-pub(super) fn offset(cases: &[&Case<'_>]) -> [f64; 2] {
-    let Some(first) = cases.first() else { return [0.0; 2] };
+/// The offset `[right, down]` of each pad, pixels: what makes its predictions and measurements most alike, near what does
+/// so for all pads together.
+pub(super) fn offsets(cases: &[Case<'_>], pads: usize) -> Vec<[f64; 2]> {
+    let all: Vec<&Case<'_>> = cases.iter().collect();
+    let together = offset(&all, [0.0; 2], REACH);
+    let of_pad = |pad: usize| cases.iter().filter(|case| case.pad == pad).collect::<Vec<_>>();
+    (0..pads).map(|pad| offset(&of_pad(pad), together, APART)).collect()
+}
+
+/// The best offset within `reach` (share of the side) of `start`; the start itself where nothing tells.
+fn offset(cases: &[&Case<'_>], start: [f64; 2], reach: f64) -> [f64; 2] {
+    let Some(first) = cases.first() else { return start };
     let [width, height] = first.prediction.size();
-    if width < 16 || height < 16 {
-        return [0.0; 2];
+    let side = width.min(height) as f64;
+    if side < 16.0 {
+        return start;
     }
     let targets: Vec<DepthMap> = cases.iter().map(|case| blurred(case)).collect();
     let predictions: Vec<&DepthMap> = cases.iter().map(|case| case.prediction).collect();
@@ -27,21 +39,25 @@ pub(super) fn offset(cases: &[&Case<'_>]) -> [f64; 2] {
     let small: (Vec<DepthMap>, Vec<DepthMap>) =
         (predictions.iter().map(|p| half(p)).collect(), targets.iter().map(half).collect());
     let small_refs: Vec<&DepthMap> = small.0.iter().collect();
-    let reach = REACH_PX * width.min(height) as isize / 256;
-    let whole = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| [dx as f64, dy as f64]));
-    let scored = whole.map(|at| (likeness(&small_refs, &small.1, at, reach as usize), at));
-    let Some((best, [dx, dy])) = scored.max_by(|a, b| a.0.total_cmp(&b.0)) else { return [0.0; 2] };
+    let steps = (reach * side / 2.0) as isize;
+    let from = start.map(|v| (v / 2.0).round());
+    let whole =
+        (-steps..=steps).flat_map(|dy| (-steps..=steps).map(move |dx| [from[0] + dx as f64, from[1] + dy as f64]));
+    let border = (REACH * side / 2.0) as usize;
+    let scored = whole.map(|at| (likeness(&small_refs, &small.1, at, border), at));
+    let Some((best, [dx, dy])) = scored.max_by(|a, b| a.0.total_cmp(&b.0)) else { return start };
     if best < LEAST_CORRELATION {
-        return [0.0; 2];
+        return start;
     }
-    let border = 2 * reach as usize;
+    let border = 2 * border;
     let mut at = [2.0 * dx, 2.0 * dy];
     let mut score = likeness(&predictions, &targets, at, border);
     let mut step = 1.0;
     while step >= FINEST_PX {
         let around = [[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]].map(|d| [at[0] + d[0], at[1] + d[1]]);
         let tried = around.map(|next| (likeness(&predictions, &targets, next, border), next));
-        match tried.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+        let near = |at: &[f64; 2]| at.iter().zip(start).all(|(a, b)| (a - b).abs() <= reach * side);
+        match tried.into_iter().filter(|(_, at)| near(at)).max_by(|a, b| a.0.total_cmp(&b.0)) {
             Some((better, next)) if better > score => (score, at) = (better, next),
             _ => step /= 2.0,
         }
