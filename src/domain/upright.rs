@@ -21,6 +21,9 @@ const SIGMA_PX: f64 = 1.5;
 const MARGIN: usize = 8;
 /// Share of the slope that must be free of curl. Right readings of published images have 0.88 to 0.95.
 const CONSISTENT: f64 = 0.7;
+/// Below these a reading is little more than a guess.
+const GUESSED: f64 = 0.65;
+const GUESSED_MARGIN: f64 = 0.02;
 /// Share from which there is a touch to read; noise has one half in every reading.
 const TOUCHED: f64 = 0.55;
 /// By how much the right reading must be more consistent than the best wrong one.
@@ -38,6 +41,11 @@ pub struct TurnReading {
 }
 
 impl TurnReading {
+    /// Whether it is little more than a guess: no published pair is read so.
+    pub fn is_guess(self) -> bool {
+        self.consistency < GUESSED || self.margin < GUESSED_MARGIN
+    }
+
     /// Whether both thresholds are passed at which no reading of a simulated touch is wrong.
     pub fn is_sure(self) -> bool {
         self.consistency >= CONSISTENT && self.margin >= CLEARER

@@ -122,7 +122,7 @@ use crate::io::files;
 pub use find::{Found, find, find_all};
 pub use fit::{FitSpec, write as write_fit};
 pub use manifest::{
-    BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, FileEntry, GeneratorInput, GeneratorSpec,
+    BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, GeneratorInput, GeneratorSpec,
     GuidanceSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind, ScheduleSpec,
     TensorSpec, TimestepType, Unconditional,
 };
@@ -162,6 +162,16 @@ impl Role {
             Role::ToolClassifier => "tool_classifier",
         }
     }
+}
+
+/// A file of a bundle.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileEntry {
+    /// Relative to the bundle's folder.
+    pub path: String,
+    /// Of the whole file, hex.
+    pub sha256: String,
 }
 
 /// A bundle with everything wrong about it.

@@ -141,6 +141,8 @@ impl Stage {
                 ("DIR", "watch") => at("robot"),
                 ("DIR", "check") => repository().join("assets/models/generator_ldm").to_str().unwrap().to_owned(),
                 ("CASES", _) => at("cases"),
+                ("FITTED", "--out") => at(&format!("fitted {number}")),
+                ("FITTED", _) => self.small_bundle.to_str().unwrap().to_owned(),
                 ("FILE" | "OUT" | "OUT.json" | "TABLE.md", _) => at(&format!("{number} {word}")),
                 ("PY", _) => "/no/such/python".to_owned(),
                 (path, _) if path.starts_with("assets/") => repository().join(path).to_str().unwrap().to_owned(),

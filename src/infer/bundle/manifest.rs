@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use super::fit::FitSpec;
 use super::sensor::{SensorPair, SensorSpec};
-use super::{Problems, Role};
+use super::{FileEntry, Problems, Role};
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
 use crate::domain::postprocess::{
     ColorChain, DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
@@ -23,16 +23,6 @@ const VERSION: u64 = 2;
 const MAX_SIDE: usize = 4096;
 /// Most values of one tensor: four pictures with the longest sides.
 const MAX_VALUES: usize = 4 * MAX_SIDE * MAX_SIDE;
-
-/// One graph's file.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FileEntry {
-    /// Relative to the bundle's folder.
-    pub path: String,
-    /// Of the whole file, hex.
-    pub sha256: String,
-}
 
 /// What a bundle is.
 #[derive(Clone, Debug, PartialEq)]

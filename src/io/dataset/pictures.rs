@@ -228,7 +228,7 @@ impl Pictures {
         } else if let Some((difference, read)) = self.difference(id)? {
             reading = read;
             let path = self.file(id, GELSLIM)?.unwrap_or(Path::new(""));
-            notes.extend(read.filter(|read| !read.is_sure()).map(|read| unsure(path, read)));
+            notes.extend(read.filter(|read| read.is_guess()).map(|read| unsure(path, read)));
             if difference.as_slice().iter().all(|p| *p == [0.0; 3]) {
                 notes.push(problem(path, "the picture is a single color", "check that the right picture was saved"));
             }
