@@ -1,0 +1,8 @@
+//! Networks as functions of named weights.
+
+pub mod generator;
+mod layers;
+mod layout;
+
+pub use layers::Layers;
+pub use layout::Layout;
