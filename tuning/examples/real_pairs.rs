@@ -4,9 +4,9 @@
 //!
 //! The folder holds `pictures.npy` `[n, 3, 128, 128]` (difference images, 0..1 scale, upright), `imprints.npy`
 //! `[n, 128, 128]` (as the decoder draws them, 0..1 = −6.3 to 18 mm) and `pads.npy` `[n]` (−1 = simulated), all `<f4`.
-//! Names: `steps`, `batch`, `seed`, `folds`, `threads`, `trained` (all, encoder), `anchor`, `decay`, `rate`, `simulated`
+//! Names: `steps`, `batch`, `seed`, `folds`, `only` (one fold), `threads`, `trained` (all, encoder), `anchor`, `decay`, `rate`, `simulated`
 //! (share of each batch), `sim` (another such folder: simulated pairs to mix in), `simtest` (one to score on), `start`
-//! (identity, closed), `sampler` (steps; 0 = one step from one seed).
+//! (identity, closed), `sampler` (steps).
 //!
 //! Scores: mm stretches both images to 0..1 by their extremes, ls draws the best straight line; PSNR in dB.
 #![allow(clippy::print_stdout, reason = "figures are what it is for")]
@@ -105,10 +105,19 @@ fn peak_mb() -> u64 {
     line.split_whitespace().next().and_then(|kb| kb.parse::<u64>().ok()).unwrap_or_default() / 1024
 }
 
+/// Processor time of this process so far, seconds; 0 where the system does not tell.
+fn cpu_seconds() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // The name in brackets may hold blanks; behind it user and system time are the 12th and 13th field, in 1/100 s.
+    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace().skip(11).take(2);
+    fields.filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
+}
+
 /// What is asked for on the command line.
 struct Asked {
     config: Config,
     folds: usize,
+    only: Option<usize>,
     sampler: usize,
     closed: bool,
     real: Vec<Pair>,
@@ -119,8 +128,9 @@ struct Asked {
 fn asked() -> Outcome<Asked> {
     let mut words = std::env::args().skip(1);
     let folder = words.next().ok_or("say which folder the pairs are in")?;
-    let named: BTreeMap<String, String> =
-        words.filter_map(|word| word.split_once('=').map(|(name, value)| (name.to_owned(), value.to_owned()))).collect();
+    let named: BTreeMap<String, String> = words
+        .filter_map(|word| word.split_once('=').map(|(name, value)| (name.to_owned(), value.to_owned())))
+        .collect();
     let number = |name: &str, default: f64| named.get(name).map_or(Ok(default), |value| value.parse::<f64>());
     let other = |name: &str| named.get(name).map_or(Ok(Vec::new()), |folder| pairs(Path::new(folder)));
     let plain = Config::default();
@@ -139,6 +149,7 @@ fn asked() -> Outcome<Asked> {
     Ok(Asked {
         config,
         folds: number("folds", 3.0)? as usize,
+        only: named.get("only").map(|value| value.parse()).transpose()?,
         sampler: number("sampler", 2.0)? as usize,
         closed: named.get("start").is_none_or(|start| start == "closed"),
         real: pairs(Path::new(&folder))?,
@@ -148,23 +159,29 @@ fn asked() -> Outcome<Asked> {
 }
 
 fn main() -> Outcome<()> {
-    let Asked { config, folds, sampler, closed, real, sim, simtest } = asked()?;
+    let Asked { config, folds, only, sampler, closed, real, sim, simtest } = asked()?;
     let mut sums = [[0.0; 2]; 4];
-    for fold in 0..folds.max(1) {
+    let run: Vec<usize> = (0..folds.max(1)).filter(|fold| only.is_none_or(|only| only == *fold)).collect();
+    for &fold in &run {
         let held = |i: usize| folds > 1 && i % folds == fold;
-        let pick = |kept: bool| real.iter().enumerate().filter(|(i, _)| held(*i) != kept).map(|(_, pair)| pair.clone());
+        let pick =
+            |kept: bool| real.iter().enumerate().filter(move |(i, _)| held(*i) != kept).map(|(_, pair)| pair.clone());
         let (train, test): (Vec<Pair>, Vec<Pair>) = (pick(true).collect(), pick(false).collect());
         let mut start = shipped(sampler)?;
         let began = Instant::now();
         if closed {
             start.placement = Placement::closed_form(&start, &train)?;
         }
-        println!("fold {fold}: {} to learn, {} held out; start {:.2} s", train.len(), test.len(), began.elapsed().as_secs_f64());
+        println!(
+            "fold {fold}: {} to learn, {} held out; start {:.2} s",
+            train.len(),
+            test.len(),
+            began.elapsed().as_secs_f64()
+        );
         println!("  line {:?} shift {:?}", start.placement.line, start.placement.shift);
         let with: Vec<Pair> = train.iter().chain(&sim).cloned().collect();
         let mut tuner = Tuner::new(&start, with, config.clone())?;
-        let mut sets = vec![&train, &test, &simtest];
-        sets.truncate(3);
+        let sets = [&train, &test, &simtest];
         let print = |what: &str, tuner: &Tuner| -> Outcome<Vec<[f64; 2]>> {
             let found = sets.iter().map(|set| if set.is_empty() { Ok([0.0; 2]) } else { score(tuner, set) });
             let found = found.collect::<Outcome<Vec<_>>>()?;
@@ -175,17 +192,19 @@ fn main() -> Outcome<()> {
         let before = print("before", &tuner)?;
         let mut seconds = Vec::new();
         let mut losses = Vec::new();
+        let cpu = cpu_seconds();
         while tuner.steps_done() < tuner.steps() {
             let report = tuner.step()?;
             seconds.push(report.seconds);
             losses.push(report.loss);
         }
+        let cpu = cpu_seconds() - cpu;
         let total: f64 = seconds.iter().sum();
         seconds.sort_by(f64::total_cmp);
         let mean = |part: &[f32]| part.iter().sum::<f32>() / part.len().max(1) as f32;
         let few = losses.len().min(5);
         println!(
-            "  {} steps in {total:.1} s, median {:.0} ms, fastest {:.0} ms; loss {:.4} to {:.4}; peak {} MB",
+            "  {} steps in {total:.1} s ({cpu:.1} s of processor time), median {:.0} ms, fastest {:.0} ms; loss {:.4} to {:.4}; peak {} MB",
             losses.len(),
             1e3 * seconds[seconds.len() / 2],
             1e3 * seconds[0],
@@ -195,11 +214,13 @@ fn main() -> Outcome<()> {
         );
         let after = print("after", &tuner)?;
         for (sum, found) in sums.iter_mut().zip([before[1], after[1], before[2], after[2]]) {
-            sum.iter_mut().zip(found).for_each(|(sum, found)| *sum += found / folds.max(1) as f64);
+            sum.iter_mut().zip(found).for_each(|(sum, found)| *sum += found / run.len() as f64);
         }
     }
     let [held_before, held, sim_before, sim_after] = sums;
-    println!("mean of folds, mm / ls: held out {:.2} / {:.2} -> {:.2} / {:.2}, simulated {:.2} / {:.2} -> {:.2} / {:.2}",
-        held_before[0], held_before[1], held[0], held[1], sim_before[0], sim_before[1], sim_after[0], sim_after[1]);
+    println!(
+        "mean of folds, mm / ls: held out {:.2} / {:.2} -> {:.2} / {:.2}, simulated {:.2} / {:.2} -> {:.2} / {:.2}",
+        held_before[0], held_before[1], held[0], held[1], sim_before[0], sim_before[1], sim_after[0], sim_after[1]
+    );
     Ok(())
 }

@@ -57,7 +57,8 @@ pub(crate) fn file(layout: &Layout, seed: u64) -> Vec<u8> {
     let weights = layout.weights().iter().map(|(name, shape)| {
         let count: usize = shape.iter().product();
         let fan: usize = shape[1..].iter().product();
-        let scale_of_norm = name.contains("norm") || name == "std" || name.contains("trunk.6") || name.contains("decoder.10");
+        let scale_of_norm =
+            name.contains("norm") || name == "std" || name.contains("trunk.6") || name.contains("decoder.10");
         let value = |normal: f32| match name.as_str() {
             _ if scale_of_norm && !name.ends_with("bias") => 1.0 + 0.2 * normal,
             _ if shape.len() > 1 && !name.ends_with("bias") => normal / (fan as f32).sqrt().max(1.0),

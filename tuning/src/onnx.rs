@@ -112,9 +112,7 @@ impl Onnx {
         let raw = &self.bytes[weight.place.clone()];
         match weight.precision {
             Precision::Half => raw.chunks_exact(2).map(|b| f16::from_le_bytes([b[0], b[1]]).to_f32()).collect(),
-            Precision::Single => {
-                raw.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
-            }
+            Precision::Single => raw.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect(),
         }
     }
 

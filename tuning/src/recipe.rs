@@ -8,8 +8,8 @@ use crate::ops;
 use crate::optim::Rate;
 use crate::pair::Pair;
 use crate::params::Leaves;
-use crate::tape::Tensor;
 use crate::random::{Purpose, Random};
+use crate::tape::Tensor;
 use crate::trainer::Objective;
 
 /// The straight line behind the decoder: factor and offset.

@@ -178,7 +178,10 @@ impl Workers {
         };
         let mut all: Vec<(usize, T)> = std::thread::scope(|scope| {
             let running: Vec<_> = self.pools.iter().map(|pool| scope.spawn(|| pool.install(take))).collect();
-            running.into_iter().flat_map(|worker| worker.join().unwrap_or_else(|why| std::panic::resume_unwind(why))).collect()
+            running
+                .into_iter()
+                .flat_map(|worker| worker.join().unwrap_or_else(|why| std::panic::resume_unwind(why)))
+                .collect()
         });
         all.sort_by_key(|(number, _)| *number);
         all.into_iter().map(|(_, result)| result).collect()

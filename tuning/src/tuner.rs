@@ -141,7 +141,9 @@ impl Tuner {
     pub fn tuned(&self) -> Tuned {
         let params = self.trainer.average();
         let written = |file: &Onnx, prefix: &str| {
-            file.with(|name| params.get(&format!("{prefix}{name}")).map(|entry| entry.values.to_vec()).unwrap_or_default())
+            file.with(|name| {
+                params.get(&format!("{prefix}{name}")).map(|entry| entry.values.to_vec()).unwrap_or_default()
+            })
         };
         Tuned {
             encoder: written(&self.files.encoder, ENCODER),
@@ -217,7 +219,10 @@ fn open(start: &Start) -> Result<Opened> {
     let place = &start.placement;
     let pads = place.shift.len();
     if pads == 0 || place.field.len() != pads || place.field.iter().any(|field| field.len() != sizes.pixels()) {
-        return refuse("placement", "it needs a shift and a field of the imprint's size for each pad, and a pad or more");
+        return refuse(
+            "placement",
+            "it needs a shift and a field of the imprint's size for each pad, and a pad or more",
+        );
     }
     let numbers = place.line.iter().chain(place.shift.iter().flatten()).chain(place.field.iter().flatten());
     if numbers.into_iter().any(|v| !v.is_finite()) {

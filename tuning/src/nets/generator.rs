@@ -357,7 +357,8 @@ fn time_embedding(l: &Layers<'_>, sinusoids: usize, t: usize) -> Tensor {
     let half = sinusoids / 2;
     let rate = |i: usize| (i as f32 * (-(10000f32.ln()) / half as f32)).exp();
     let angles: Vec<f32> = (0..half).map(|i| t as f32 * rate(i)).collect();
-    let waves: Vec<f32> = angles.iter().map(|angle| angle.cos()).chain(angles.iter().map(|angle| angle.sin())).collect();
+    let waves: Vec<f32> =
+        angles.iter().map(|angle| angle.cos()).chain(angles.iter().map(|angle| angle.sin())).collect();
     let waves = Tensor::new(&[1, sinusoids], waves);
     ops::silu(&l.gemm(&ops::silu(&l.gemm(&waves, "time.0")), "time.2"))
 }

@@ -33,7 +33,12 @@ pub fn linear(x: &Tensor, weight: &Tensor, bias: &Tensor, lie: Weights) -> Tenso
         *last = outputs;
     }
     let mut values = bias.values().repeat(rows);
-    product(&mut values, Into::Sum, Matrix::new(x.values(), rows, inputs), lie.matrix(weight.values(), inputs, outputs));
+    product(
+        &mut values,
+        Into::Sum,
+        Matrix::new(x.values(), rows, inputs),
+        lie.matrix(weight.values(), inputs, outputs),
+    );
     let (of_x, of_weight) = (x.shared(), weight.shared());
     Tensor::made([x, weight, bias], &shape, values, move |slope, [to_x, to_weight, to_bias], slopes| {
         let along = Matrix::new(&slope, rows, outputs);

@@ -23,7 +23,8 @@ pub fn placed(drawn: &Tensor, line: &Tensor, shifts: &Tensor, fields: &Tensor, p
     let sizes = [shifts.values().len(), fields.values().len()];
     let inputs = [drawn, line, shifts, fields];
     Tensor::made(inputs, drawn.shape(), values, move |slope, [to_drawn, to_line, to_shifts, to_fields], slopes| {
-        let mut found = Found { drawn: slope, line: [0.0; 2], shifts: vec![0.0; sizes[0]], fields: vec![0.0; sizes[1]] };
+        let mut found =
+            Found { drawn: slope, line: [0.0; 2], shifts: vec![0.0; sizes[0]], fields: vec![0.0; sizes[1]] };
         for (item, pad) in pads.iter().enumerate() {
             if let Some(pad) = *pad {
                 let range = item * pixels..(item + 1) * pixels;

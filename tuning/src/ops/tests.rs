@@ -107,8 +107,11 @@ fn plain_conv(inputs: &[Array], stride: usize, padding: usize) -> Vec<f64> {
 fn convolution_and_its_gradients() {
     // Kernel, stride, padding as in the networks, and one whose tiles end within a picture.
     for (size, kernel, stride, padding) in [(9, 3, 1, 1), (8, 3, 2, 1), (16, 8, 4, 2), (5, 1, 1, 0), (3, 3, 2, 1)] {
-        let inputs =
-            vec![Array::random(&[2, 3, size, size + 1], 1), Array::random(&[4, 3, kernel, kernel], 2), Array::random(&[4], 3)];
+        let inputs = vec![
+            Array::random(&[2, 3, size, size + 1], 1),
+            Array::random(&[4, 3, kernel, kernel], 2),
+            Array::random(&[4], 3),
+        ];
         let plain = |inputs: &[Array]| plain_conv(inputs, stride, padding);
         run(inputs, &plain, |x| conv2d(&x[0], &x[1], &x[2], stride, padding)).check(2e-4);
     }
@@ -248,7 +251,10 @@ fn arrangements_and_their_gradients() {
     let picked = |pick: fn(&[Array], usize) -> f64, count: usize| {
         move |x: &[Array]| (0..count).map(|i| pick(x, i)).collect::<Vec<_>>()
     };
-    let beside_plain = picked(|x, i| if i % 10 < 4 { x[0].values[i / 10 * 4 + i % 10] } else { x[1].values[i / 10 * 6 + i % 10 - 4] }, 20);
+    let beside_plain = picked(
+        |x, i| if i % 10 < 4 { x[0].values[i / 10 * 4 + i % 10] } else { x[1].values[i / 10 * 6 + i % 10 - 4] },
+        20,
+    );
     let inputs = vec![Array::random(&[2, 2, 1, 2], 1), Array::random(&[2, 3, 1, 2], 2)];
     let case = run(inputs, &beside_plain, |x| beside(&x[0], &x[1]));
     case.check(1e-6);
@@ -287,8 +293,12 @@ fn placement_and_its_gradients() {
     };
     for shifts in [[0.25, -1.625], [2.375, 0.75]] {
         let shifts = Array { shape: vec![2, 2], values: shifts.into_iter().chain([-0.5, 1.125]).collect() };
-        let inputs =
-            vec![Array::random(&[4, side, side], 1), Array::random(&[1, 2], 2), shifts, Array::random(&[2, side * side], 3)];
+        let inputs = vec![
+            Array::random(&[4, side, side], 1),
+            Array::random(&[1, 2], 2),
+            shifts,
+            Array::random(&[2, side * side], 3),
+        ];
         run(inputs, &plain, |x| placed(&x[0], &x[1], &x[2], &x[3], &pads)).check(1e-4);
     }
 }
@@ -317,10 +327,14 @@ fn the_distance_and_its_gradients() {
             let smooth = |y: usize, x: usize| (0..9).map(|k| d((y + k / 3) * side + x + k % 3)).sum::<f64>() / 9.0;
             let pixels = (0..side * side).map(|i| 20.0 * d(i).powi(2) + d(i).abs()).sum::<f64>() / (side * side) as f64;
             let small = side - 2;
-            let down: f64 = (0..small - 1).flat_map(|y| (0..small).map(move |x| (y, x)))
-                .map(|(y, x)| (smooth(y + 1, x) - smooth(y, x)).abs()).sum();
-            let right: f64 = (0..small).flat_map(|y| (0..small - 1).map(move |x| (y, x)))
-                .map(|(y, x)| (smooth(y, x + 1) - smooth(y, x)).abs()).sum();
+            let down: f64 = (0..small - 1)
+                .flat_map(|y| (0..small).map(move |x| (y, x)))
+                .map(|(y, x)| (smooth(y + 1, x) - smooth(y, x)).abs())
+                .sum();
+            let right: f64 = (0..small)
+                .flat_map(|y| (0..small - 1).map(move |x| (y, x)))
+                .map(|(y, x)| (smooth(y, x + 1) - smooth(y, x)).abs())
+                .sum();
             loss += f64::from(*weight) * (pixels + 0.5 * (down + right) / (small * (small - 1)) as f64);
         }
         vec![loss]

@@ -62,14 +62,20 @@ fn any_objective_is_descended() {
 #[test]
 fn a_state_goes_on_and_a_strange_one_is_refused() {
     let mut whole = trainer(1, 20);
-    (0..20).for_each(|_| drop(whole.step()));
+    for _ in 0..20 {
+        whole.step().unwrap();
+    }
     let mut first = trainer(3, 20);
-    (0..7).for_each(|_| drop(first.step()));
+    for _ in 0..7 {
+        first.step().unwrap();
+    }
     let bytes = first.to_bytes(origin("a"));
     let mut second = trainer(2, 20);
     second.restore(origin("a"), &bytes).unwrap();
     assert_eq!(second.steps_done(), 7);
-    (7..20).for_each(|_| drop(second.step()));
+    for _ in 7..20 {
+        second.step().unwrap();
+    }
     assert!(second.to_bytes(origin("a")) == whole.to_bytes(origin("a")));
 
     let refused = |bytes: &[u8], name| {
@@ -118,7 +124,9 @@ fn a_loss_that_is_no_number_leaves_the_weights_alone() {
     start.push("x", vec![1], vec![1.0]);
     let plan = Plan { ramp: Ramp { warm_up: 1, steps: 9, rest: 0.02 }, clip: 1.0, threads: 2 };
     let mut trainer = Trainer::new(Broken, start, plan);
-    (0..2).for_each(|_| drop(trainer.step().unwrap()));
+    for _ in 0..2 {
+        trainer.step().unwrap();
+    }
     let before = trainer.to_bytes(origin("x"));
     assert_eq!(trainer.step(), Err(Error::Diverged { step: 3 }));
     assert!(trainer.to_bytes(origin("x")) == before);

@@ -43,7 +43,9 @@ fn a_run_that_was_stopped_goes_on_as_if_it_had_not_been() {
     let (whole, _) = run(tuner(config()));
     for stop in [0, 1, 5, 8] {
         let mut first = tuner(config());
-        (0..stop).for_each(|_| drop(first.step().unwrap()));
+        for _ in 0..stop {
+            first.step().unwrap();
+        }
         let bytes = first.to_bytes();
         drop(first);
         let resumed = Tuner::resume(&fixture::start(), fixture::pairs(6), config(), &bytes).unwrap();
@@ -80,7 +82,7 @@ fn what_cannot_be_learned_from_is_refused_with_its_index() {
     assert!(refused(&|pair| pair.picture[17] = f32::NAN).contains("1 values that are not numbers"));
     assert!(refused(&|pair| pair.imprint[5] = f32::INFINITY).contains("imprint"));
     assert!(refused(&|pair| pair.imprint[5] = 1e9).contains("scale"));
-    assert!(refused(&|pair| drop(pair.picture.pop())).contains("3071 values instead of 3072"));
+    assert!(refused(&|pair| pair.picture.truncate(3071)).contains("3071 values instead of 3072"));
     assert!(refused(&|pair| pair.frame = Some(2)).contains("pad 2"));
     assert!(refused(&|pair| pair.weight = -1.0).contains("weight"));
 
@@ -154,7 +156,9 @@ fn only_what_learns_changes() {
 #[test]
 fn a_cancelled_run_leaves_a_generator_that_predicts_as_it_did() {
     let mut tuner = tuner(fixture::config());
-    (0..3).for_each(|_| drop(tuner.step().unwrap()));
+    for _ in 0..3 {
+        tuner.step().unwrap();
+    }
     let tuned = tuner.tuned();
     let Tuned { encoder, denoiser, decoder, placement } = tuned;
     let start = Start { encoder, denoiser, decoder, placement, ..fixture::start() };
@@ -187,10 +191,29 @@ fn placed_pairs(start: &Start, placement: &Placement, count: usize) -> Vec<Pair>
     pairs.into_iter().enumerate().map(place).collect()
 }
 
+/// A file with other values for its weights.
+fn changed(bytes: &[u8], change: impl Fn(&str, Vec<f32>) -> Vec<f32>) -> Vec<u8> {
+    let file = Onnx::parse(bytes.to_vec()).unwrap();
+    file.with(|name| change(name, file.values(file.weights().iter().find(|weight| weight.name() == name).unwrap())))
+}
+
+/// The tiny generator with a denoiser that trusts the encoder's estimate, so that what is drawn hardly depends on noise,
+/// and a decoder that draws smoothly, as imprints are.
+fn smooth() -> Start {
+    let start = fixture::start();
+    let silent = |name: &str, values: Vec<f32>| if name.starts_with("out.") { vec![0.0; values.len()] } else { values };
+    let evened = |name: &str, values: Vec<f32>| match name {
+        "decoder.12.weight" | "decoder.14.weight" | "decoder.16.weight" => {
+            values.chunks_exact(9).flat_map(|kernel| [kernel.iter().sum::<f32>() / 9.0; 9]).collect()
+        }
+        _ => values,
+    };
+    Start { denoiser: changed(&start.denoiser, silent), decoder: changed(&start.decoder, evened), ..start }
+}
+
 #[test]
 fn a_known_shift_and_field_are_recovered() {
-    // One step of the sampler from zeros: tuning sees what the pairs were drawn from.
-    let start = Start { sampler: Sampler { steps: 1, eta: 0.0, seed: 1 }, ..fixture::start() };
+    let start = smooth();
     let bump = |at: [f32; 2], height: f32| -> Vec<f32> {
         let bell = |i: usize| {
             let (y, x) = ((i / 32) as f32 - at[0], (i % 32) as f32 - at[1]);
@@ -212,10 +235,10 @@ fn a_known_shift_and_field_are_recovered() {
     };
     let (tuner, losses) = run(Tuner::new(&start, pairs.clone(), config).unwrap());
     let mean = |losses: &[f32]| losses.iter().sum::<f32>() / losses.len() as f32;
-    assert!(mean(&losses[240..]) < 0.5 * mean(&losses[..10]), "{losses:?}");
+    assert!(mean(&losses[240..]) < 0.4 * mean(&losses[..10]), "{losses:?}");
     let found = tuner.tuned().placement;
     for (found, truth) in found.shift.iter().flatten().zip(truth.shift.iter().flatten()) {
-        assert!((found - truth).abs() < 0.3, "{:?}", tuner.tuned().placement.shift);
+        assert!((found - truth).abs() < 0.2, "{:?}", tuner.tuned().placement.shift);
     }
     let error = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt();
     for (found, truth) in found.field.iter().zip(&truth.field) {
@@ -225,7 +248,7 @@ fn a_known_shift_and_field_are_recovered() {
     // The closed form finds them at once.
     let closed = Placement::closed_form(&start, &pairs).unwrap();
     for (found, truth) in closed.shift.iter().flatten().zip(truth.shift.iter().flatten()) {
-        assert!((found - truth).abs() <= 0.5, "{:?}", closed.shift);
+        assert!((found - truth).abs() <= 0.25, "{:?}", closed.shift);
     }
 }
 

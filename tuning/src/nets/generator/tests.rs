@@ -17,7 +17,9 @@ fn run(name: &str, inputs: &[(&str, &[usize], &[f32])], timestep: Option<i32>, o
     let model = Model::load(shipped(name)).unwrap();
     let mut all: Vec<(_, ValueOrView<'_>)> = inputs
         .iter()
-        .map(|(name, shape, values)| (model.node_id(name).unwrap(), ValueView::from_shape(shape, *values).unwrap().into()))
+        .map(|(name, shape, values)| {
+            (model.node_id(name).unwrap(), ValueView::from_shape(shape, *values).unwrap().into())
+        })
         .collect();
     if let Some(t) = timestep {
         let count = inputs[0].1[0];
@@ -107,7 +109,9 @@ fn check_gradient(prefix: &str, scalar: impl Fn(&Leaves<'_>) -> Tensor) {
     for (entry, gradient) in params.entries().iter().zip(&gradients) {
         let used = gradient.as_ref().is_some_and(|g| g.iter().any(|v| *v != 0.0));
         let fixed = ["mean", "std"].iter().any(|fixed| entry.name.strip_prefix(DECODER) == Some(fixed));
-        assert_eq!(used, entry.name.starts_with(prefix) && !fixed, "{}", entry.name);
+        // The tiny denoiser mixes a single token, which reads itself whatever it asks for.
+        let idle = fixed || entry.name.starts_with("denoiser/mix.attention.q");
+        assert_eq!(used, entry.name.starts_with(prefix) && !idle, "{}", entry.name);
     }
 }
 
