@@ -3,6 +3,7 @@
 pub mod generator;
 mod layers;
 mod layout;
+pub mod mask;
 
 pub use layers::Layers;
 pub use layout::Layout;

@@ -12,6 +12,7 @@ mod math;
 mod norm;
 mod place;
 mod product;
+mod unet;
 
 pub use arithmetic::{add, add_each, blend, line, mul, rescaled, silu};
 pub use arrange::{beside, channels, doubled, repeated, swapped};
@@ -21,6 +22,7 @@ pub use distance::distance;
 pub use linear::{Weights, linear};
 pub use norm::{Activation, GROUPS, group_norm, layer_norm};
 pub use place::placed;
+pub use unet::{Margins, cropped, halved, padded, relu};
 
 #[cfg(test)]
 mod tests;

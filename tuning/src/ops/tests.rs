@@ -341,3 +341,27 @@ fn the_distance_and_its_gradients() {
     };
     run(vec![Array::random(&[2, side, side], 7)], &plain, |x| distance(&x[0], &measured, &weights)).check(1e-4);
 }
+
+#[test]
+fn what_a_unet_needs_and_its_gradients() {
+    let one = || vec![Array::random(&[1, 2, 4, 6], 5)];
+    run(one(), &|x| x[0].values.iter().map(|v| v.max(0.0)).collect(), |x| relu(&x[0])).check(1e-6);
+    let largest = |x: &[Array]| {
+        let at = |i: usize, k: usize| x[0].values[(i / 3 * 2 + k / 2) * 6 + i % 3 * 2 + k % 2];
+        (0..12).map(|i| (0..4).map(|k| at(i, k)).fold(f64::MIN, f64::max)).collect()
+    };
+    run(one(), &largest, |x| halved(&x[0])).check(1e-6);
+    let margins = Margins::to_multiples(3, 5, 4);
+    assert_eq!(margins, Margins { rows: [0, 1], columns: [1, 2] });
+    let grown = |x: &[Array]| {
+        let inside = |i: usize| i / 8 % 4 < 3 && (1..6).contains(&(i % 8));
+        (0..64).map(|i| if inside(i) { x[0].values[(i / 32 * 3 + i / 8 % 4) * 5 + i % 8 - 1] } else { 0.0 }).collect()
+    };
+    let small = || vec![Array::random(&[1, 2, 3, 5], 5)];
+    run(small(), &grown, |x| padded(&x[0], margins)).check(1e-6);
+    run(small(), &|x| x[0].values.clone(), |x| cropped(&padded(&x[0], margins), margins)).check(1e-6);
+    // Ties go to the first pixel, and its slope with them.
+    let tape = Rc::new(Tape::default());
+    let flat = Tensor::new(&[1, 1, 2, 2], vec![1.0; 4]).tracked(&tape);
+    assert_eq!(backward(&halved(&flat)).take(&flat), Some(vec![1.0, 0.0, 0.0, 0.0]));
+}

@@ -4,6 +4,12 @@ use crate::config::Trained;
 use crate::fixture;
 use crate::image;
 
+/// A run lives on a thread of its own.
+const _: () = {
+    const fn moves_between_threads<T: Send + Sync>() {}
+    moves_between_threads::<Tuner>();
+};
+
 fn tuner(config: Config) -> Tuner {
     Tuner::new(&fixture::start(), fixture::pairs(6), config).unwrap()
 }
@@ -156,6 +162,9 @@ fn only_what_learns_changes() {
 #[test]
 fn a_cancelled_run_leaves_a_generator_that_predicts_as_it_did() {
     let mut tuner = tuner(fixture::config());
+    let (start, untouched) = (fixture::start(), tuner.tuned());
+    assert!(untouched.encoder == start.encoder && untouched.denoiser == start.denoiser);
+    assert!(untouched.decoder == start.decoder && untouched.placement == start.placement);
     for _ in 0..3 {
         tuner.step().unwrap();
     }

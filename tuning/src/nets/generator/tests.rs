@@ -18,7 +18,7 @@ fn run(name: &str, inputs: &[(&str, &[usize], &[f32])], timestep: Option<i32>, o
     let mut all: Vec<(_, ValueOrView<'_>)> = inputs
         .iter()
         .map(|(name, shape, values)| {
-            (model.node_id(name).unwrap(), ValueView::from_shape(shape, *values).unwrap().into())
+            (model.node_id(name).unwrap(), ValueView::from_shape(shape, values).unwrap().into())
         })
         .collect();
     if let Some(t) = timestep {
