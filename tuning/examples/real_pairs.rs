@@ -4,11 +4,12 @@
 //!
 //! The folder holds `pictures.npy` `[n, 3, 128, 128]` (difference images, 0..1 scale, upright), `imprints.npy`
 //! `[n, 128, 128]` (as the decoder draws them, 0..1 = −6.3 to 18 mm) and `pads.npy` `[n]` (−1 = simulated), all `<f4`.
-//! Names: `steps`, `batch`, `seed`, `folds`, `only` (one fold), `threads`, `trained` (all, encoder), `anchor`, `decay`, `rate`, `simulated`
+//! Names: `steps`, `batch`, `seed`, `folds`, `only` (one fold), `threads`, `trained` (all, encoder), `augment` (none), `anchor`, `decay`, `rate`, `simulated`
 //! (share of each batch), `sim` (another such folder: simulated pairs to mix in), `simtest` (one to score on), `start`
 //! (identity, closed), `sampler` (steps).
 //!
-//! Scores: mm stretches both images to 0..1 by their extremes, ls draws the best straight line; PSNR in dB.
+//! Scores: mm stretches both images to 0..1 by their extremes, ls draws the best straight line, raw compares them as
+//! they are; PSNR in dB.
 #![allow(clippy::print_stdout, reason = "figures are what it is for")]
 
 use std::collections::BTreeMap;
@@ -16,11 +17,13 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use touch2touch_tuning::{Config, NoiseSchedule, Pair, Placement, Sampler, Start, Trained, Tuner};
+use touch2touch_tuning::{Augment, Config, NoiseSchedule, Pair, Placement, Sampler, Start, Trained, Tuner};
 
 const SIDE: usize = 128;
 const BUNDLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/models/generator_ldm");
 
+/// mm, ls and raw.
+type Score = [f64; 3];
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// The shipped bundle, by its manifest.
@@ -72,8 +75,8 @@ fn psnr(a: impl Iterator<Item = f64>, b: impl Iterator<Item = f64>) -> f64 {
     -10.0 * (squares.iter().sum::<f64>() / squares.len() as f64).log10()
 }
 
-/// mm and ls.
-fn scores(predicted: &[f32], measured: &[f32]) -> [f64; 2] {
+/// mm, ls and raw.
+fn scores(predicted: &[f32], measured: &[f32]) -> Score {
     let wide = |values: &[f32]| values.iter().map(|&v| f64::from(v)).collect::<Vec<_>>();
     let (p, m) = (wide(predicted), wide(measured));
     let stretched = |values: &[f64]| {
@@ -87,14 +90,14 @@ fn scores(predicted: &[f32], measured: &[f32]) -> [f64; 2] {
     let both: f64 = p.iter().zip(&m).map(|(p, m)| (p - of_p) * (m - of_m)).sum();
     let factor = both / p.iter().map(|p| (p - of_p).powi(2)).sum::<f64>();
     let ls = psnr(p.iter().map(|p| of_m + factor * (p - of_p)), m.iter().copied());
-    [mm, ls]
+    [mm, ls, psnr(p.iter().copied(), m.iter().copied())]
 }
 
-fn score(tuner: &Tuner, pairs: &[Pair]) -> Outcome<[f64; 2]> {
+fn score(tuner: &Tuner, pairs: &[Pair]) -> Outcome<Score> {
     let queries: Vec<_> = pairs.iter().map(|pair| (pair.picture.as_slice(), pair.frame)).collect();
     let predicted = tuner.predict(&queries)?;
     let all = pairs.iter().zip(&predicted).map(|(pair, predicted)| scores(predicted, &pair.imprint));
-    let sum = all.fold([0.0; 2], |sum, score| [sum[0] + score[0], sum[1] + score[1]]);
+    let sum = all.fold([0.0; 3], |sum, score| std::array::from_fn(|i| sum[i] + score[i]));
     Ok(sum.map(|sum| sum / pairs.len() as f64))
 }
 
@@ -143,8 +146,9 @@ fn asked() -> Outcome<Asked> {
         anchor: number("anchor", f64::from(plain.anchor))? as f32,
         decay: number("decay", f64::from(plain.decay))? as f32,
         simulated: number("simulated", plain.simulated)?,
+        augment: if named.get("augment").is_some_and(|v| v == "none") { Augment::none() } else { plain.augment },
         threads: named.get("threads").map(|value| value.parse()).transpose()?,
-        ..plain
+        ..Config::default()
     };
     Ok(Asked {
         config,
@@ -160,7 +164,7 @@ fn asked() -> Outcome<Asked> {
 
 fn main() -> Outcome<()> {
     let Asked { config, folds, only, sampler, closed, real, sim, simtest } = asked()?;
-    let mut sums = [[0.0; 2]; 4];
+    let mut sums = [[0.0; 3]; 4];
     let run: Vec<usize> = (0..folds.max(1)).filter(|fold| only.is_none_or(|only| only == *fold)).collect();
     for &fold in &run {
         let held = |i: usize| folds > 1 && i % folds == fold;
@@ -182,11 +186,11 @@ fn main() -> Outcome<()> {
         let with: Vec<Pair> = train.iter().chain(&sim).cloned().collect();
         let mut tuner = Tuner::new(&start, with, config.clone())?;
         let sets = [&train, &test, &simtest];
-        let print = |what: &str, tuner: &Tuner| -> Outcome<Vec<[f64; 2]>> {
-            let found = sets.iter().map(|set| if set.is_empty() { Ok([0.0; 2]) } else { score(tuner, set) });
+        let print = |what: &str, tuner: &Tuner| -> Outcome<Vec<Score>> {
+            let found = sets.iter().map(|set| if set.is_empty() { Ok([0.0; 3]) } else { score(tuner, set) });
             let found = found.collect::<Outcome<Vec<_>>>()?;
-            let text: Vec<String> = found.iter().map(|[mm, ls]| format!("{mm:.2} / {ls:.2}")).collect();
-            println!("  {what}: mm / ls learned {}, held out {}, simulated {}", text[0], text[1], text[2]);
+            let text: Vec<String> = found.iter().map(|[mm, ls, raw]| format!("{mm:.2} / {ls:.2} / {raw:.2}")).collect();
+            println!("  {what}: mm / ls / raw: learned {}, held out {}, simulated {}", text[0], text[1], text[2]);
             Ok(found)
         };
         let before = print("before", &tuner)?;
@@ -217,10 +221,7 @@ fn main() -> Outcome<()> {
             sum.iter_mut().zip(found).for_each(|(sum, found)| *sum += found / run.len() as f64);
         }
     }
-    let [held_before, held, sim_before, sim_after] = sums;
-    println!(
-        "mean of folds, mm / ls: held out {:.2} / {:.2} -> {:.2} / {:.2}, simulated {:.2} / {:.2} -> {:.2} / {:.2}",
-        held_before[0], held_before[1], held[0], held[1], sim_before[0], sim_before[1], sim_after[0], sim_after[1]
-    );
+    let text = sums.map(|[mm, ls, raw]| format!("{mm:.2} / {ls:.2} / {raw:.2}"));
+    println!("mean of folds: held out {} -> {}, simulated {} -> {}", text[0], text[1], text[2], text[3]);
     Ok(())
 }

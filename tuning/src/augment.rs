@@ -6,7 +6,7 @@ use crate::random::Random;
 /// How far pairs are varied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Augment {
-    /// Largest shift of the picture, pixels.
+    /// Largest shift of the picture, pixels; simulated pairs are not shifted.
     pub shift: f64,
     /// How far the imprint moves when the picture moves by one pixel: rows, columns. The picture sees a part of the
     /// imprint, magnified.

@@ -1,7 +1,7 @@
 //! [`Recipe`]: the objective of the generator. It is unrolled as it is used: from zeros or noise to an imprint in one
 //! denoising step, sometimes two, and through what lies behind the decoder.
 
-use crate::augment::{Clipping, Set};
+use crate::augment::{Augment, Clipping, Set};
 use crate::config::{Config, Trained};
 use crate::nets::generator::{self, DECODER, ENCODER, LATENT, Schedule, Sizes};
 use crate::ops;
@@ -34,6 +34,8 @@ pub(crate) struct Recipe {
     /// Mean imprint by pad; the last is that of simulated pairs.
     means: Vec<Vec<f32>>,
     clippings: Vec<Clipping>,
+    /// How simulated pairs are varied.
+    still: Augment,
 }
 
 /// What is fixed about the generator.
@@ -99,7 +101,8 @@ impl Recipe {
         let (real, simulated) = (of_kind(false), of_kind(true));
         let means = (0..=model.pads).map(|pad| mean_imprint(&pairs, pad, &model)).collect();
         let clipped = pairs.iter().map(|pair| Clipping::of(&pair.picture)).filter(|clipping| clipping.any());
-        Self { clippings: clipped.collect(), model, config, real, simulated, means, pairs }
+        let still = Augment { shift: 0.0, ..config.augment.clone() };
+        Self { clippings: clipped.collect(), still, model, config, real, simulated, means, pairs }
     }
 
     /// The pair of each place in the batch of a step.
@@ -181,7 +184,9 @@ impl Objective for Recipe {
             let mean = &self.means[pair.frame.unwrap_or(self.model.pads)];
             let set = Set { mean, deviation: self.model.deviation, clippings: &self.clippings };
             let random = &mut Random::new(c.seed, Purpose::Variation, step, place);
-            let (picture, imprint) = c.augment.vary(&pair.picture, &pair.imprint, &set, random);
+            // Moving a simulated picture moves its markers too, by which the network tells one finger from the other.
+            let augment = if pair.frame.is_none() { &self.still } else { &c.augment };
+            let (picture, imprint) = augment.vary(&pair.picture, &pair.imprint, &set, random);
             made.pictures.extend(self.model.standardized(&picture));
             made.imprints.extend(imprint);
             made.pads.push(pair.frame);
