@@ -89,7 +89,15 @@ pub(crate) fn start() -> Start {
 
 /// A short plan without variations, whose rates suit a tiny network.
 pub(crate) fn config() -> Config {
-    Config { steps: 8, batch: 4, augment: Augment::none(), threads: Some(2), anchor: 0.0, ..Config::default() }
+    Config {
+        steps: 8,
+        batch: 4,
+        augment: Augment::none(),
+        threads: Some(2),
+        anchor: 0.0,
+        simulated: 0.0,
+        ..Config::default()
+    }
 }
 
 /// Pictures with bumps in random places; the imprint of each is a smooth function of the picture. The last third are
