@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::{AdaptPairs, AdaptState};
+pub use state::{AdaptPairs, AdaptState, TUNING_STEPS};
 
 use std::sync::Arc;
 
@@ -18,6 +18,8 @@ use crate::work::bundles::BundleInfo;
 pub enum AdaptCommand {
     /// Which pairs are fitted.
     Choose(AdaptPairs),
+    /// Whether the networks themselves are tuned as well.
+    Tune(bool),
     /// Fits the chosen generator to them, and scores it on pairs that were left out.
     Start,
     /// Predicts with the fitted model from now on.
@@ -27,6 +29,7 @@ pub enum AdaptCommand {
 pub(super) fn step(state: &mut State, command: AdaptCommand, effects: &mut Vec<Effect>) {
     match command {
         AdaptCommand::Choose(pairs) => state.adapt.pairs = pairs,
+        AdaptCommand::Tune(tune) => state.adapt.tune = tune,
         AdaptCommand::Start => {
             if state.adapting().is_some() {
                 return;

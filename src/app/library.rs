@@ -196,7 +196,7 @@ pub(super) fn show(
     state.results = Results::default();
     state.table.result = None;
     state.table.running = None;
-    state.adapt = AdaptState { pairs: state.adapt.pairs, ..AdaptState::default() };
+    state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.history.clear();
     state.tasks.failed.clear();
     state.document =

@@ -27,6 +27,10 @@ pub(super) struct AdaptArgs {
     /// left out where at least three are known.
     #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(2..=1000))]
     validate: u32,
+    /// After the closed form tune the networks themselves with so many steps, such as 50: once for each part that is left
+    /// out, and once on all pairs.
+    #[arg(long, value_name = "STEPS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=100_000))]
+    tune: u32,
     #[command(flatten)]
     limit: LimitArgs,
     #[command(flatten)]
@@ -63,6 +67,7 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
         pairs,
         folds: args.validate as usize,
         mask: (choice, predictor.mask_model(&choice)?),
+        steps: args.tune,
         out: args.out.clone(),
     };
     let adapted = adapt(&dataset, &setup, predictor.models(), &output.job())?;

@@ -122,9 +122,9 @@ use crate::io::files;
 pub use find::{Found, find, find_all};
 pub use fit::{FitSpec, write as write_fit};
 pub use manifest::{
-    BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, GeneratorInput, GeneratorSpec,
-    GuidanceSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind, ScheduleSpec,
-    TensorSpec, TimestepType, Unconditional,
+    BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, GeneratorInput, GeneratorSpec, GuidanceSpec,
+    InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind, ScheduleSpec, TensorSpec,
+    TimestepType, Unconditional,
 };
 pub use origin::{BundleFile, Origin};
 pub use sensor::{Ends, Misfit, SensorPair, SensorSpec};

@@ -7,7 +7,7 @@ use super::cx::Cx;
 use super::theme::{SMALL, caption, section};
 use super::widget::{empty, progress};
 use crate::app::action::Action;
-use crate::app::adapt::AdaptPairs;
+use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
 use crate::app::command::{AdaptCommand, Pane, TasksCommand};
 use crate::domain::units::{fixed, mm};
 use crate::work::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
@@ -66,6 +66,14 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.label(text).on_hover_text(format!(
             "From {ENOUGH_PAIRS} pairs on a fit is sound; about a tenth of a second each, the first time"
         ));
+        let mut tune = cx.state.adapt.tune;
+        let tip = format!(
+            "After the closed form, {TUNING_STEPS} steps of tuning the networks themselves: about a minute each on two free \
+             cores, four times over, because the score is of pairs that were left out"
+        );
+        if ui.checkbox(&mut tune, "tune the networks").on_hover_text(tip).changed() {
+            cx.push(AdaptCommand::Tune(tune));
+        }
         match cx.state.adapting() {
             Some((ticket, task)) => {
                 let (fraction, text, cancelling) =

@@ -3,8 +3,11 @@
 mod gather;
 mod pose;
 mod score;
+#[cfg(feature = "tune")]
+mod tune;
 mod write;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -18,11 +21,12 @@ use super::models::Models;
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::fit::{FitError, FitSource, Fitted, PadFit, closed_form, doubts, folds, left_out};
-use crate::domain::grid::Grid;
+use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::lattice::template;
 use crate::domain::postprocess::Correction;
-use crate::domain::rig::PerPad;
+use crate::domain::rig::{PerPad, Rig};
 use crate::domain::sample::Scale;
+use crate::infer::bundle::Role;
 use crate::infer::engine::EngineChoice;
 use crate::io::dataset::Dataset;
 use crate::io::memory::peak_mib;
@@ -51,6 +55,9 @@ pub struct AdaptSetup {
     pub folds: usize,
     /// How contact is found where the data have poses, and with which model.
     pub mask: (MaskChoice, Option<BundleInfo>),
+    /// Steps of tuning the networks themselves after the closed form, for each part that is left out and for all; 0 is
+    /// none.
+    pub steps: u32,
     /// The folder of the new bundle; `None` only tries.
     pub out: Option<PathBuf>,
 }
@@ -163,6 +170,18 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
                 .into(),
         );
     }
+    let mut graphs = BTreeMap::new();
+    let mut corrections = corrections;
+    let mut after = None;
+    if setup.steps > 0 {
+        let tuned = tuned(setup, &touches, &corrections, &folds, &dataset.rig, cx)?;
+        let unseen: Vec<Option<&Grid<f32>>> = tuned.2.iter().map(Option::as_ref).collect();
+        after = score::scored(&touches, &unseen, &dataset.rig)?;
+        if let Some(after) = &mut after {
+            after.angle = pose::angles(dataset, setup, models, &touches, &unseen, cx)?;
+        }
+        (graphs, corrections) = (tuned.0, tuned.1);
+    }
     let fitted = Fitted { source: source(dataset, setup, &touches), pads: with_lattices(&touches, corrections) };
     let summary = fitted.pads.entries().map(|(pad, fit)| PadSummary {
         pad: dataset.rig.pad_key(pad).into_owned(),
@@ -172,8 +191,11 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         offset_m: fit.correction.line[1],
     });
     let pads = summary.collect();
-    let bundle =
-        setup.out.as_deref().map(|out| write::bundle(out, &setup.bundle, &dataset.rig, &fitted)).transpose()?;
+    let bundle = setup
+        .out
+        .as_deref()
+        .map(|out| write::bundle(out, &setup.bundle, &dataset.rig, &fitted, &graphs))
+        .transpose()?;
     left_out.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(Adapted {
         pairs: names.len(),
@@ -182,8 +204,8 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         doubtful,
         before,
         closed_form: closed,
-        after: None,
-        steps: 0,
+        after,
+        steps: setup.steps,
         seconds: begin.elapsed().as_secs_f64(),
         fit_seconds,
         peak_mib: peak_mib(),
@@ -191,6 +213,34 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         warnings,
         bundle: bundle.map(Path::to_owned),
     })
+}
+
+/// Graphs, corrections, and what networks that were tuned without them make of the touches.
+type TunedParts = (BTreeMap<Role, Vec<u8>>, Vec<Option<Correction>>, Vec<Option<DepthMap>>);
+
+#[cfg(feature = "tune")]
+fn tuned(
+    setup: &AdaptSetup,
+    touches: &[Touch],
+    corrections: &[Option<Correction>],
+    folds: &[usize],
+    rig: &Rig,
+    cx: &JobCx,
+) -> Result<TunedParts, TaskError> {
+    let tune::TunedModel { graphs, corrections, left_out } = tune::tune(setup, touches, corrections, folds, rig, cx)?;
+    Ok((graphs, corrections, left_out))
+}
+
+#[cfg(not(feature = "tune"))]
+fn tuned(
+    _: &AdaptSetup,
+    _: &[Touch],
+    _: &[Option<Correction>],
+    _: &[usize],
+    _: &Rig,
+    _: &JobCx,
+) -> Result<TunedParts, TaskError> {
+    Err(TaskError::new(WHAT, "this program was built without tuning").with_hint("Fit in closed form."))
 }
 
 fn source(dataset: &Dataset, setup: &AdaptSetup, touches: &[Touch]) -> FitSource {

@@ -306,6 +306,7 @@ draws! {
     }
     adapt: AdaptCommand {
         1 Choose(any_of::<AdaptPairs>()),
+        1 Tune(any::<bool>()),
         1 Start,
         1 Use,
     }

@@ -12,6 +12,9 @@ use crate::work::bundles::{BundleInfo, BundleKind};
 /// Parts in which pairs are left out in turn.
 const FOLDS: usize = 3;
 
+/// Steps of tuning: about a minute on two free cores for each part and for all.
+pub const TUNING_STEPS: u32 = 50;
+
 /// Which pairs are fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
 pub enum AdaptPairs {
@@ -40,6 +43,8 @@ impl AdaptPairs {
 pub struct AdaptState {
     /// Which pairs.
     pub pairs: AdaptPairs,
+    /// Whether the networks themselves are tuned after the closed form.
+    pub tune: bool,
     /// The fit under way.
     pub running: Option<Ticket>,
     /// The last fit to the open data set.
@@ -73,6 +78,7 @@ impl State {
             pairs,
             folds: FOLDS,
             mask: (self.settings.mask.choice, self.bundle(BundleKind::Mask).ok().cloned()),
+            steps: if self.adapt.tune { TUNING_STEPS } else { 0 },
             out: None,
         })
     }

@@ -38,6 +38,8 @@ pub(super) struct Touch {
     pub(super) tile: Option<DepthMap>,
     /// Whether the decoder's picture lies turned by 180 degrees in the raw orientation.
     pub(super) turned: bool,
+    /// What the generator starts from.
+    pub(super) picture: RgbGrid,
     /// The lattice of its GelSlim, where the pad is not known.
     pub(super) signature: Option<Grid<f32>>,
 }
@@ -73,7 +75,7 @@ pub(super) fn gather(
     let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
     let (mut touches, mut left_out) = (Vec::new(), Vec::new());
     let total = setup.pairs.len() as u64;
-    let mut waiting: Vec<(Touch, RgbGrid)> = Vec::new();
+    let mut waiting: Vec<Touch> = Vec::new();
     for (done, &id) in setup.pairs.iter().enumerate() {
         cx.check(WHAT)?;
         cx.progress(done as u64, total, format!("predicting pair {} of {total}", done + 1));
@@ -128,7 +130,7 @@ fn read(
     tool: Option<&str>,
     sample: &Sample,
     (pad, input): (PadId, crate::domain::rig::SensorId),
-) -> Result<Option<(Touch, RgbGrid)>, String> {
+) -> Result<Option<Touch>, String> {
     let Some(touch) = sample.pad(pad) else { return Ok(None) };
     let (Some(picture), Some(bubble)) = (touch.picture(input), touch.depth()) else { return Ok(None) };
     if picture.as_slice().iter().flatten().any(|v| !v.is_finite()) {
@@ -150,23 +152,26 @@ fn read(
         measured: bubble.imprint.clone(),
         tile: tile_of(dataset, id, sample).map_err(|err| err.why)?,
         turned: false,
+        picture: picture.into_owned(),
         signature: lattice,
     };
-    Ok(Some((touch, picture.into_owned())))
+    Ok(Some(touch))
 }
 
 fn predict(
     setup: &AdaptSetup,
     models: &Models,
-    waiting: Vec<(Touch, RgbGrid)>,
+    waiting: Vec<Touch>,
     touches: &mut Vec<Touch>,
     left_out: &mut Vec<Remark>,
     cx: &JobCx,
 ) -> Result<(), TaskError> {
-    let wanted: Vec<Wanted<'_>> =
-        waiting.iter().map(|(_, difference)| Wanted { difference, seed: setup.config.seed, size: [0, 0] }).collect();
+    let wanted: Vec<Wanted<'_>> = waiting
+        .iter()
+        .map(|touch| Wanted { difference: &touch.picture, seed: setup.config.seed, size: [0, 0] })
+        .collect();
     let made = models.predict(&setup.bundle, setup.engine, &setup.config, &wanted, &cx.quiet())?;
-    for ((touch, _), made) in waiting.into_iter().zip(made) {
+    for (touch, made) in waiting.into_iter().zip(made) {
         let chain = chain(&made, ShiftMode::ExactInverse)?;
         let size = made.raw.channels.first().map_or([0, 0], Grid::size);
         let turned = chain.rotation_deg == 180;
@@ -176,18 +181,18 @@ fn predict(
             left_out.push(Remark { name: touch.name, why: "its prediction has values that are not numbers".into() });
             continue;
         }
-        let target = on_grid(&touch, turned, size);
+        let target = on_grid(&touch.measured, touch.tile.as_ref(), turned, size);
         touches.push(Touch { prediction, target, turned, ..touch });
     }
     Ok(())
 }
 
 /// The measurement at the decoder's size and in its orientation: from the file's own pixels where there is a picture.
-fn on_grid(touch: &Touch, turned: bool, size: [usize; 2]) -> DepthMap {
-    let lies = match &touch.tile {
+pub(super) fn on_grid(measured: &DepthMap, tile: Option<&DepthMap>, turned: bool, size: [usize; 2]) -> DepthMap {
+    let lies = match tile {
         Some(tile) => tile.clone(),
-        None if turned => touch.measured.rotated_180(),
-        None => touch.measured.clone(),
+        None if turned => measured.rotated_180(),
+        None => measured.clone(),
     };
     if lies.size() == size { lies } else { bilinear(&lies, size[0], size[1]) }
 }

@@ -1,5 +1,6 @@
 //! The new bundle: the source's graphs, the fit, and a manifest that says from what it was made.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -7,7 +8,7 @@ use serde_json::{Value, json};
 use super::WHAT;
 use crate::domain::fit::Fitted;
 use crate::domain::rig::Rig;
-use crate::infer::bundle::{Bundle, FileEntry, FitSpec, MANIFEST, write_fit};
+use crate::infer::bundle::{Bundle, FileEntry, FitSpec, MANIFEST, Role, write_fit};
 use crate::io::digest::sha256;
 use crate::io::{atomic, files};
 use crate::work::bundles::BundleInfo;
@@ -36,7 +37,13 @@ pub(super) fn check_folder(out: &Path, from: &BundleInfo) -> Result<(), TaskErro
 }
 
 /// Writes the bundle; the manifest last, so that a folder without one is no bundle.
-pub(super) fn bundle<'a>(out: &'a Path, from: &BundleInfo, rig: &Rig, fitted: &Fitted) -> Result<&'a Path, TaskError> {
+pub(super) fn bundle<'a>(
+    out: &'a Path,
+    from: &BundleInfo,
+    rig: &Rig,
+    fitted: &Fitted,
+    graphs: &BTreeMap<Role, Vec<u8>>,
+) -> Result<&'a Path, TaskError> {
     let source = from.open(WHAT)?;
     let io = |file: &Path, err: std::io::Error| {
         TaskError::new(WHAT, format!("cannot be written: {err} ({})", file.display()))
@@ -59,7 +66,12 @@ pub(super) fn bundle<'a>(out: &'a Path, from: &BundleInfo, rig: &Rig, fitted: &F
         if let Some(folder) = file.parent() {
             std::fs::create_dir_all(folder).map_err(|err| io(folder, err))?;
         }
-        atomic::write_bytes(&file, &read(&name)?).map_err(|err| io(&file, err))?;
+        if let Some(tuned) = graphs.get(&role) {
+            atomic::write_bytes(&file, tuned).map_err(|err| io(&file, err))?;
+            manifest["files"][role.key()]["sha256"] = json!(sha256(tuned));
+        } else {
+            atomic::write_bytes(&file, &read(&name)?).map_err(|err| io(&file, err))?;
+        }
     }
     let pads: Vec<String> = rig.pads().map(|pad| rig.pad_key(pad).into_owned()).collect();
     let file = out.join(FIT_FILE);
