@@ -411,7 +411,7 @@ impl Action {
                 let ready = state.adapt_setup().is_some() && state.adapting().is_none();
                 when(ready, AdaptCommand::Start)
             }
-            Self::UseFit => when(state.fitted().is_some(), AdaptCommand::Use),
+            Self::UseFit => when(state.fitted().is_some() && !state.uses_fit(), AdaptCommand::Use),
             Self::EvaluateDataset => {
                 let ready = state.evaluation_setup().is_some() && state.evaluating().is_none();
                 when(ready, EvaluateCommand::Start)

@@ -87,6 +87,10 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             None => {
                 cx.action_button(ui, Action::FitPairs, "Fit to my pairs");
                 cx.action_button(ui, Action::UseFit, "Use the fitted model");
+                if cx.state.uses_fit() {
+                    let tip = "The fitted model predicts now; another can be chosen in the Generate pane";
+                    ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
+                }
             }
         }
     });

@@ -37,6 +37,8 @@ pub use score::Scored;
 const WHAT: &str = "Fit the model to pairs";
 /// Fewer pairs leave ghosts of the training shapes in the predictions.
 pub const ENOUGH_PAIRS: usize = 10;
+/// A smaller gain is none.
+const LEAST_GAIN_DB: f64 = 0.2;
 /// Most touches that a closed form takes; more change nothing and fill the memory.
 const MOST_TOUCHES: usize = 1500;
 
@@ -162,6 +164,14 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
              expect about 1.5 dB less than with thirty",
             names.len()
         ));
+    }
+    let gain = closed.as_ref().and_then(|closed| Some(closed.psnr_db? - before.psnr_db?));
+    if gain.is_some_and(|gain| gain < LEAST_GAIN_DB) {
+        warnings.push(
+            "on pairs that were left out the closed form is no better than the model as it is: these sensors need no fit, or \
+             more pairs"
+                .into(),
+        );
     }
     if grouped {
         warnings.push(

@@ -30,6 +30,8 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     assert!(closed.angle.is_some() && closed.psnr_db.unwrap() > 20.0, "{found:?}");
     rig.harness.get_by_label("Fitted (closed form)");
     rig.harness.get_by_label_contains("6 pairs are few");
+    // What was simulated lies where the model expects it.
+    rig.harness.get_by_label_contains("need no fit");
     rig.shoot("fit-after");
     // Fitted, but not taken yet.
     assert_eq!(rig.harness.state().state().bundle(BundleKind::Generator).unwrap().id, shipped.id);

@@ -89,6 +89,12 @@ impl State {
         Some((ticket, self.tasks.running.get(&ticket)?))
     }
 
+    /// Whether that is what predicts now.
+    pub fn uses_fit(&self) -> bool {
+        let now = self.bundle(BundleKind::Generator).ok().map(|bundle| &bundle.id);
+        self.fitted().is_some_and(|fitted| Some(&fitted.id) == now)
+    }
+
     /// The bundle that was fitted to the open data set.
     pub fn fitted(&self) -> Option<&BundleInfo> {
         self.library.bundle(self.adapt.bundle.as_deref()?)
