@@ -12,11 +12,12 @@ step "packages"
 need_packages test
 
 step "format"
-cargo fmt --check
+cargo fmt --all --check
 
 step "lints: the science alone, then everything"
 cargo clippy --locked --no-default-features --all-targets -- -D warnings
 cargo clippy --locked --features ui-test --all-targets -- -D warnings
+cargo clippy --locked -p touch2touch-tuning --all-targets -- -D warnings
 
 step "documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --document-private-items --features ui-test
@@ -29,6 +30,9 @@ fi
 
 step "tests: the science alone"
 cargo test --locked --no-default-features
+
+step "tests: tuning"
+cargo test --locked -p touch2touch-tuning
 
 step "the ONNX Runtime library, fetched by the product itself"
 runtime_dir="$PWD/target/onnxruntime"

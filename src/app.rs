@@ -14,6 +14,7 @@
 //! * [`services`] joins the model to files and models; the command line calls the same functions.
 
 pub mod action;
+pub mod adapt;
 pub mod answers;
 pub mod apply;
 pub mod command;

@@ -3,6 +3,7 @@
 //! With `--json`, standard output carries exactly one JSON object (`watch`: one a line, as things happen); progress, notes and errors go to standard error.
 //! The exit code is 0 only when everything asked for was done; 1: not all of it; 2: an error; 141: standard output was closed.
 
+mod adapt;
 mod args;
 mod basin;
 mod bench;
@@ -79,6 +80,8 @@ enum Verb {
     Pose(pose::PoseArgs),
     /// The paper's results table of a dataset: generators side by side, with the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
+    /// Fits a generator to pairs of your own sensors, and says what it is worth on pairs that were left out.
+    Adapt(Box<adapt::AdaptArgs>),
     /// Where starts of the registration lead, for one pair: the numbers behind the basin map.
     Basin(Box<basin::BasinArgs>),
     /// List what people said about the pairs, or say it: corrected masks, review states, accepted poses.
@@ -221,6 +224,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
+        Some(Verb::Adapt(args)) => adapt::run(&args),
         Some(Verb::Basin(args)) => basin::run(&args),
         Some(Verb::Label(args)) => label::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),

@@ -14,6 +14,7 @@ pub mod folders;
 pub mod follow;
 pub mod images;
 pub mod masks;
+pub mod memory;
 pub mod names;
 pub mod npz;
 pub mod pt;

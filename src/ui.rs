@@ -8,6 +8,7 @@ pub mod theme;
 mod timemachine;
 pub mod widget;
 
+mod adapt;
 mod bars;
 mod basin;
 mod browser;

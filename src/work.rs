@@ -10,6 +10,7 @@
 //! * [`evaluate`], [`statistics`]: passes over a whole data set.
 //! * [`job`], [`error`]: how work is watched, stopped, and how it fails.
 
+pub mod adapt;
 pub mod bundles;
 pub mod cloud;
 pub mod compare;

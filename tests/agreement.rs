@@ -45,6 +45,8 @@ fn how(action: Action) -> How {
         A::Generate => Verb(&["generate", "demo", "--out", "folder"]),
         A::GenerateNewSeed | A::LockSeed => Options(&["generate", "demo", "--out", "folder", "--seed", "7"]),
         A::RunSeeds => Verb(&["generate", "demo", "--out", "folder", "--seeds", "8"]),
+        A::FitPairs => Verb(&["adapt", "demo", "--out", "folder"]),
+        A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::ExportTable => Verb(&["evaluate", "demo", "--csv", "a.csv", "--markdown", "a.md"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),

@@ -6,6 +6,8 @@
 mod support;
 
 #[cfg(feature = "onnx")]
+mod adapt;
+#[cfg(feature = "onnx")]
 mod agreement;
 mod apply;
 mod cli;

@@ -168,6 +168,13 @@ fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
     assert_eq!(found["pairs"][0]["finger"], "thumb");
     let depth: Grid<f32> = images::read_gray(&Path::new(&out).join("a_thumb.png")).unwrap();
     assert_eq!(depth.size(), [175, 140]);
+    // What follows a folder knows its sensors too.
+    let watch = ["watch", &set, "--once", "--runtime", "rten", "--mask", "threshold", "--json", "--out", &out];
+    let watched = run(&[&watch[..], &["--bundle", &tiny]].concat(), &home);
+    let said = String::from_utf8_lossy(&watched.stdout);
+    let done = said.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let done = done.filter(|event| event["event"] == "done").collect::<Vec<_>>();
+    assert_eq!((done.len(), &done[0]["fingers"][0]["finger"]), (1, &json!("thumb")), "{said}{}", text(&watched));
     // A bundle for other sensors says so, and what would fit; without a name the fitting one is looked for.
     let lab = bundle("generator");
     let refused = run(&[&generate[..], &[lab.to_str().unwrap()]].concat(), &home);
@@ -195,5 +202,7 @@ fn a_rig_that_makes_no_sense_is_a_problem_of_the_folder() {
         let dataset = Dataset::open(dir.path()).unwrap();
         assert!(dataset.problems.iter().any(|p| p.file.ends_with(RIG_JSON)), "{bad}: {:?}", dataset.problems);
         assert_eq!(*dataset.rig, *Rig::lab());
+        let watched = run(&["watch", dir.path().to_str().unwrap(), "--once"], dir.path());
+        assert!(text(&watched).contains(RIG_JSON) && watched.stdout.is_empty(), "{bad}: {}", text(&watched));
     }
 }

@@ -7,6 +7,7 @@ mod layout;
 mod look;
 mod rig;
 
+mod adapt;
 mod chain;
 mod follow;
 mod generate;

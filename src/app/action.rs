@@ -3,8 +3,8 @@
 use strum::{EnumIter, IntoEnumIterator};
 
 use super::command::{
-    CameraPreset, Command, EvaluateCommand, FollowCommand, InspectCommand, LabelsCommand, LibraryCommand, Pane,
-    PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand, WorkbenchCommand,
+    AdaptCommand, CameraPreset, Command, EvaluateCommand, FollowCommand, InspectCommand, LabelsCommand, LibraryCommand,
+    Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand, WorkbenchCommand,
 };
 use super::inspect::state::Inspected;
 use super::keys::{ImprintSource, Registration, Request, ShiftMode};
@@ -249,6 +249,8 @@ actions! {
     GenerateNewSeed, Generate, "Generate with a new seed", "Draws another seed, then generates", [ctrl_shift(K::G)];
     RunSeeds, Generate, "Several seeds", "Predicts the touch with several seeds, one after the other, or stops; shows where they disagree", [];
     LockSeed, Generate, "Lock the seed", "Keeps the seed when generating again, or draws a new one each time", [ctrl(K::L)];
+    FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [];
+    UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [];
     EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [];
     ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
@@ -405,6 +407,11 @@ impl Action {
 
             Self::Generate => when(state.can_generate().is_ok(), PredictCommand::Generate),
             Self::GenerateNewSeed => when(state.can_generate().is_ok(), PredictCommand::GenerateNewSeed),
+            Self::FitPairs => {
+                let ready = state.adapt_setup().is_some() && state.adapting().is_none();
+                when(ready, AdaptCommand::Start)
+            }
+            Self::UseFit => when(state.fitted().is_some() && !state.uses_fit(), AdaptCommand::Use),
             Self::EvaluateDataset => {
                 let ready = state.evaluation_setup().is_some() && state.evaluating().is_none();
                 when(ready, EvaluateCommand::Start)

@@ -11,8 +11,9 @@ use super::services::{Followed, Opened};
 use super::settings::state::Settings;
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use super::{evaluate, follow, library, predict, settings, tasks, workbench};
+use super::{adapt, evaluate, follow, library, predict, settings, tasks, workbench};
 use crate::io::statistics::ShiftStatistics;
+use crate::work::adapt::Adapted;
 use crate::work::bundles::BundleInfo;
 use crate::work::error::{TaskError, TaskErrorKind};
 use crate::work::evaluate::Evaluation;
@@ -55,6 +56,8 @@ pub enum Answer {
     JobFailed(TaskError),
     /// The results table is there.
     Evaluated(Ticket, Arc<Evaluation>),
+    /// A generator was fitted, and is this bundle where one was written.
+    Adapted(Ticket, Arc<Adapted>, Option<Box<BundleInfo>>),
 }
 
 pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>) {
@@ -121,6 +124,10 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::Evaluated(ticket, evaluation) => {
             state.tasks.running.remove(&ticket);
             evaluate::arrived(state, ticket, evaluation);
+        }
+        Answer::Adapted(ticket, adapted, bundle) => {
+            state.tasks.running.remove(&ticket);
+            adapt::arrived(state, ticket, adapted, bundle.map(|bundle| *bundle));
         }
         // What came too late, or needs nothing.
         Answer::Computed(..)

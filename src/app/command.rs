@@ -1,5 +1,6 @@
 //! [`Command`]: everything that can happen to the state, as data, by room.
 
+pub use super::adapt::AdaptCommand;
 pub use super::answers::Answer;
 pub use super::evaluate::EvaluateCommand;
 pub use super::follow::FollowCommand;
@@ -49,6 +50,8 @@ commands! {
     Workbench(WorkbenchCommand),
     /// To the results table.
     Evaluate(EvaluateCommand),
+    /// The fit to one's own pairs.
+    Adapt(AdaptCommand),
     /// To the preferences.
     Settings(SettingsCommand),
     /// To running jobs and the log.

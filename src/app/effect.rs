@@ -12,6 +12,7 @@ use super::settings::state::Settings;
 use super::tasks::state::Ticket;
 use super::view::state::UiRequest;
 use crate::domain::sample::Sample;
+use crate::work::adapt::AdaptSetup;
 use crate::work::bundles::BundleInfo;
 use crate::work::evaluate::{Evaluation, Setup};
 
@@ -94,6 +95,15 @@ pub enum Effect {
         /// By what, and how.
         setup: Box<Setup>,
     },
+    /// Fit a generator to pairs, where the program keeps models.
+    Adapt {
+        /// The job.
+        ticket: Ticket,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// What to what.
+        setup: Box<AdaptSetup>,
+    },
     /// Write a results table into a folder.
     ExportTable {
         /// The job.
@@ -122,6 +132,7 @@ impl std::fmt::Debug for Effect {
             Self::SaveSettings(_) => write!(f, "SaveSettings"),
             Self::ExportMasks { folder, .. } => write!(f, "ExportMasks({})", folder.display()),
             Self::Evaluate { ticket, .. } => write!(f, "Evaluate({ticket:?})"),
+            Self::Adapt { ticket, .. } => write!(f, "Adapt({ticket:?})"),
             Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),
             Self::Ui(request) => write!(f, "Ui({request:?})"),
         }

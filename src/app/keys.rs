@@ -55,10 +55,19 @@ pub struct TouchKey {
 /// What a range mapping does, for its tooltip.
 pub fn shift_tooltip(mode: ShiftMode) -> &'static str {
     match mode {
-        ShiftMode::Raw => "As the lab's generator stores it: the range is mapped twice, so depths are too large",
-        ShiftMode::PaperShift => "Mean and spread matched to the training statistics, as the paper's pixel shift does",
-        ShiftMode::ExactInverse => "The doubled range mapping undone exactly: meters",
-        ShiftMode::Refit(_) => "Mean and spread matched to statistics of this data set's own predictions",
+        ShiftMode::Raw => {
+            "The prediction as the released script saves it: its range is mapped twice, so depths come out as (depth + max) / 2, far too deep"
+        }
+        ShiftMode::PaperShift => {
+            "The raw values with mean and deviation matched to the training statistics, as in the paper"
+        }
+        ShiftMode::ExactInverse => {
+            "The raw values with the doubled mapping undone: 2 * value - max, the depth itself; of a fitted model, with its fit"
+        }
+        ShiftMode::Parts(_) => "The exact inverse with only some parts of the model's fit to a rig",
+        ShiftMode::Refit(_) => {
+            "The raw values with mean and deviation matched to this data set's own predictions and measurements"
+        }
     }
 }
 

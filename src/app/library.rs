@@ -6,6 +6,7 @@ pub use state::{Follow, Library, OpenDataset, Place, Sort};
 
 use std::ops::Range;
 
+use super::adapt::AdaptState;
 use super::effect::Effect;
 use super::keys::DatasetSeq;
 use super::labels::state::{Document, Review};
@@ -195,6 +196,7 @@ pub(super) fn show(
     state.results = Results::default();
     state.table.result = None;
     state.table.running = None;
+    state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.history.clear();
     state.tasks.failed.clear();
     state.document =

@@ -159,6 +159,10 @@ macro_rules! panes {
                 "Results", "The paper's results table of the open data set", Form, needs [],
                 at [Evaluate Top(1)]
             } }
+            adapt { Adapt {
+                "Fit to my pairs" as "Fit", "The generator fitted to the open pairs, and what that is worth", Form, needs [],
+                at [Evaluate Top(1)]
+            } }
             table {
                 Table { "All metrics", "The metrics of all pairs so far", Form, needs [], at [Evaluate Top(1)] }
             }

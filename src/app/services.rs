@@ -22,6 +22,7 @@ use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
 use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
+use crate::work::adapt::{self, AdaptSetup, Adapted};
 use crate::work::bundles::BundleInfo;
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
@@ -185,6 +186,19 @@ pub trait Services: Send + Sync {
     /// As [`evaluate::evaluate`].
     fn evaluate(&self, dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
         evaluate::evaluate(dataset, setup, &Models::new(None), cx)
+    }
+
+    /// Fits a generator to pairs; the new bundle, where one is kept.
+    ///
+    /// # Errors
+    /// As [`adapt::adapt`].
+    fn adapt(
+        &self,
+        dataset: &Dataset,
+        setup: &AdaptSetup,
+        cx: &JobCx,
+    ) -> Result<(Adapted, Option<BundleInfo>), TaskError> {
+        Ok((adapt::adapt(dataset, setup, &Models::new(None), cx)?, None))
     }
 
     /// The stored settings (defaults where there are none), and what was wrong if they were set aside.

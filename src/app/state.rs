@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::adapt::state::AdaptState;
 use super::evaluate::state::TableState;
 use super::history::History;
 use super::inspect::state::Inspect;
@@ -36,6 +37,8 @@ pub struct State {
     pub results: Results,
     /// The results table of the data set.
     pub table: TableState,
+    /// The fit to the open pairs.
+    pub adapt: AdaptState,
     /// What the 3D panes do and show besides.
     pub workbench: Workbench,
     /// What a person chose about seeds.

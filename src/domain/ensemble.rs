@@ -200,6 +200,7 @@ mod tests {
             mapping: Mapping::Correct,
             reduction: Reduction::Luma,
             shift: Shift::None,
+            correction: None,
             size: [2, 2],
             resampling: Resampling::Bilinear,
             rotation_deg: 180,

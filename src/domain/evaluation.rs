@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use super::catalog;
 use super::dataset::{PairEntry, Split};
-use super::metrics::{AngleSummary, frechet_distance};
+use super::metrics::{AngleSummary, Unstretched, frechet_distance};
 use super::rig::{PadId, Rig};
 use super::sample::Scale;
 
@@ -112,6 +112,8 @@ pub struct ImageScore {
     pub ssim_peak: Option<f64>,
     /// As `ssim`, against the simulator's imprint without camera noise.
     pub ssim_noise_free: Option<f64>,
+    /// Where the scale was assumed: of the pictures as they are.
+    pub unstretched: Option<Unstretched>,
     /// Whether the classifier names the right tool; `None` without one, or for a tool it does not know.
     pub tool_right: Option<bool>,
     /// What the classifier's last layer sees of the imprint.
@@ -177,6 +179,12 @@ pub struct TableMetrics {
     pub psnr_db: Option<Estimate>,
     /// dB, against the simulator's imprint without camera noise.
     pub psnr_noise_free_db: Option<Estimate>,
+    /// Of pictures whose scale was assumed, as they are: dB.
+    pub psnr_raw_db: Option<Estimate>,
+    /// SSIM likewise.
+    pub ssim_raw: Option<Estimate>,
+    /// Of such pictures after the straight line that fits best: dB.
+    pub psnr_line_db: Option<Estimate>,
     /// With the range of the tool's predictions (the lab's).
     pub ssim: Option<Estimate>,
     /// With the range 0.0225 m.
@@ -211,6 +219,9 @@ impl TableMetrics {
             images: 0,
             psnr_db: None,
             psnr_noise_free_db: None,
+            psnr_raw_db: None,
+            ssim_raw: None,
+            psnr_line_db: None,
             ssim: None,
             ssim_peak: None,
             ssim_noise_free: None,
@@ -281,6 +292,9 @@ fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples:
         images: grasps.iter().map(|g| g.images.len()).sum(),
         psnr_db: over(&|tool| psnr(tool, |image| Some(image.error))),
         psnr_noise_free_db: over(&|tool| psnr(tool, |image| image.noise_free)),
+        psnr_raw_db: over(&|tool| mean(images(tool).filter_map(|i| i.unstretched?.psnr_raw_db))),
+        ssim_raw: over(&|tool| mean(images(tool).filter_map(|i| i.unstretched?.ssim_raw))),
+        psnr_line_db: over(&|tool| mean(images(tool).filter_map(|i| i.unstretched?.psnr_line_db))),
         ssim: over(&|tool| mean(images(tool).filter_map(|i| i.ssim))),
         ssim_peak: over(&|tool| mean(images(tool).filter_map(|i| i.ssim_peak))),
         ssim_noise_free: over(&|tool| mean(images(tool).filter_map(|i| i.ssim_noise_free))),

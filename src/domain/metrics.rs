@@ -9,6 +9,7 @@ mod image;
 mod joint;
 mod split;
 mod ssim;
+mod unstretched;
 
 pub use angle::AngleSummary;
 pub use color::{LEVELS, color, planes};
@@ -17,3 +18,4 @@ pub use image::{MetricError, Psnr, PsnrMean, mse, psnr, psnr_of_mse, unit_range}
 pub use joint::{Joint, Line, line};
 pub use split::{PixelMetrics, Split, split};
 pub use ssim::{Ssim, SsimRange, ssim, ssim_ranges};
+pub use unstretched::{Unstretched, unstretched};

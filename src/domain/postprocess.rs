@@ -6,15 +6,20 @@
 //!
 //! Source: the lab's `tactile_style_transfer_estimator.py` lines 363-411 and `test.py` lines 148-256.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
+use strum::IntoEnumIterator as _;
 
 mod color;
+mod correction;
 mod flags;
 mod ledger;
 mod record;
 mod refit;
 
 pub use color::{ColorChain, Picture};
+pub use correction::{Correction, CorrectionPart, CorrectionParts, Response, moved};
 pub use flags::{Flag, FlagKind, Severity};
 pub use ledger::{ChainReading, Ledger, correlation, ledger, readings};
 pub use record::{Against, Histogram, Orientation, Stage, StageRecord, Stats};
@@ -89,6 +94,10 @@ pub enum ShiftMode {
     /// [`ShiftMode::Raw`] with its mapping undone: the depth itself.
     #[default]
     ExactInverse,
+    /// [`ShiftMode::ExactInverse`] with only some parts of the bundle's fit to a rig; for a bundle without a fit the same
+    /// as that.
+    #[strum(disabled)]
+    Parts(CorrectionParts),
     /// [`ShiftMode::Raw`] with the paper's shift by statistics of a data set's own predictions. The statistics are part
     /// of the choice, so that results made with different ones never stand for each other. Not among the modes that
     /// can be listed without a data set.
@@ -106,6 +115,8 @@ impl ShiftMode {
             ShiftMode::Raw => "Raw (released script)",
             ShiftMode::PaperShift => "Paper shift",
             ShiftMode::ExactInverse => "Exact inverse",
+            ShiftMode::Parts(CorrectionParts::NONE) => "Exact inverse, without the fit",
+            ShiftMode::Parts(_) => "Exact inverse, parts of the fit",
             ShiftMode::Refit(_) => "Refit on this dataset",
         }
     }
@@ -178,6 +189,9 @@ pub enum PostprocessError {
         /// Its channels.
         count: usize,
     },
+    /// A correction for pictures of another size.
+    #[error("the fit is for pictures of another size than {0:?} pixels; fit the bundle again")]
+    Correction([usize; 2]),
     /// A rotation other than by 0 or 180 degrees.
     #[error("a rotation by {0} degrees is not supported; only 0 and 180 are")]
     Rotation(u32),
@@ -194,12 +208,37 @@ pub struct DepthChain {
     pub reduction: Reduction,
     /// What happens to the meters.
     pub shift: Shift,
+    /// What a fit to the pad's pairs adds.
+    pub correction: Option<Arc<Correction>>,
     /// `[width, height]` of the result, pixels.
     pub size: [usize; 2],
     /// How it is resized.
     pub resampling: Resampling,
     /// Rotation to the raw orientation: 0 or 180 degrees.
     pub rotation_deg: u32,
+}
+
+/// A correction with its parts as stages.
+fn corrected(fit: &Correction, meters: &DepthMap, record: &mut Recorder<'_>) -> Result<DepthMap, PostprocessError> {
+    if !fit.fits(meters.size()) {
+        return Err(PostprocessError::Correction(meters.size()));
+    }
+    let placed = fit.placed(meters);
+    let leveled = fit.leveled(&placed);
+    let weighed = fit.weighed(&placed, &leveled);
+    let answered = fit.answered(&placed, &weighed);
+    let [right, down] = fit.offset_px;
+    let [gain, offset_m] = fit.line;
+    let how = |part: CorrectionPart| match part {
+        CorrectionPart::Offset => format!("by {} px right, {} px down", fixed(right, 2), fixed(down, 2)),
+        CorrectionPart::Field => format!("{gain:.3} · d {} mm, plus the mean residual", signed(mm(offset_m))),
+        part => part.tip().to_owned(),
+    };
+    for (part, image) in CorrectionPart::iter().zip([&placed, &leveled, &weighed, &answered]) {
+        let note = (!fit.has(part)).then(|| "switched off".to_owned());
+        record(Stage::Corrected(part), &|| how(part), image, note);
+    }
+    Ok(answered)
 }
 
 /// Is told of each stage: which, what it does, the image after it, and a note.
@@ -215,7 +254,7 @@ impl DepthChain {
         self.shift = match mode {
             ShiftMode::Raw => Shift::None,
             ShiftMode::PaperShift => Shift::PaperMeanStd(stats.ok_or(PostprocessError::NoStatistics)?),
-            ShiftMode::ExactInverse => Shift::ExactInverse,
+            ShiftMode::ExactInverse | ShiftMode::Parts(_) => Shift::ExactInverse,
             ShiftMode::Refit(refit) => Shift::PaperMeanStd(refit.stats()),
         };
         Ok(self)
@@ -299,6 +338,11 @@ impl DepthChain {
 
         let (shifted, note) = self.shift.apply(meters, max_m);
         record(Stage::Shifted, &|| self.shift_text(), &shifted, note);
+
+        let shifted = match &self.correction {
+            Some(correction) => corrected(correction, &shifted, record)?,
+            None => shifted,
+        };
 
         let [width, height] = self.size;
         let [from_width, from_height] = shifted.size();

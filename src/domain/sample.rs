@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
+use serde::{Deserialize, Serialize};
 
 use super::dataset::Problem;
 use super::frames::PlanarPose;
@@ -11,6 +12,7 @@ use super::grid::{DepthMap, Mask, RgbGrid};
 use super::rig::{Crop, PadId, PerPad, Rig, SensorId};
 use super::sensor::Intrinsics;
 use super::turn::Turn;
+use super::upright::TurnReading;
 
 /// One grasp, as far as the source has it.
 #[derive(Clone, Debug)]
@@ -25,6 +27,8 @@ pub struct Sample {
     pub scale: Scale,
     /// How the source's images lay before they were laid upright; upright for whatever comes from a sensor.
     pub laid: Turn,
+    /// How sure that is, where the colors of a picture told; `None` for whatever comes from a sensor.
+    pub reading: Option<TurnReading>,
     /// What is odd about its files and numbers: whoever answers from this sample says so.
     pub notes: Vec<Problem>,
 }
@@ -38,13 +42,15 @@ impl Default for Sample {
             grasp_from_object: None,
             scale: Scale::default(),
             laid: Turn::default(),
+            reading: None,
             notes: Vec::new(),
         }
     }
 }
 
 /// Where the meters of a sample come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Scale {
     /// The source stores meters.
     #[default]

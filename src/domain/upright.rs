@@ -4,9 +4,10 @@
 //! three lights stay where they are in the sensor, so the colors tell. A light brightens the slopes that face it:
 //! without its gray part, the difference image is a linear function of the gel's slope, and the known directions of
 //! the lights give the slope back. The slope of a surface has no curl. Read in a wrong quarter turn or mirrored, the
-//! same colors give a field that is nearly all curl. Reading an image upside down turns the surface inside out; a
+//! same colors give a field that is nearly all curl. TurnReading an image upside down turns the surface inside out; a
 //! touched gel is dented, with sharp convex rims, so the slope's divergence is skewed to one side.
 
+use super::blur::gaussian;
 use super::grid::{Grid, RgbGrid};
 use super::resample;
 use super::rig::lab;
@@ -15,18 +16,47 @@ use super::turn::Turn;
 /// The estimate is made at this size, pixels: ridges are some pixels wide, camera noise is averaged out.
 const SIDE: usize = 128;
 /// Width of the blur before slopes are taken, pixels of [`SIDE`].
-const SIGMA: f64 = 1.5;
+const SIGMA_PX: f64 = 1.5;
 /// Pixels at the border that are not looked at.
 const MARGIN: usize = 8;
 /// Share of the slope that must be free of curl. Right readings of published images have 0.88 to 0.95.
 const CONSISTENT: f64 = 0.7;
+/// Below these a reading is little more than a guess.
+const GUESSED: f64 = 0.65;
+const GUESSED_MARGIN: f64 = 0.02;
+/// Share from which there is a touch to read; noise has one half in every reading.
+const TOUCHED: f64 = 0.55;
 /// By how much the right reading must be more consistent than the best wrong one.
 const CLEARER: f64 = 0.05;
 
-/// How a square difference image (signed, any scale) lies, by the directions of the nominal sensor's lights.
+/// How a picture lies, and how sure that is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TurnReading {
+    /// How it lies.
+    pub turn: Turn,
+    /// Share of the slope that is free of curl in this reading, 0..1. Right readings of published images have .69 to .95.
+    pub consistency: f64,
+    /// By how much that is more than in the best of the readings that it was not.
+    pub margin: f64,
+}
+
+impl TurnReading {
+    /// Whether it is little more than a guess: no published pair is read so.
+    pub fn is_guess(self) -> bool {
+        self.consistency < GUESSED || self.margin < GUESSED_MARGIN
+    }
+
+    /// Whether both thresholds are passed at which no reading of a simulated touch is wrong.
+    pub fn is_sure(self) -> bool {
+        self.consistency >= CONSISTENT && self.margin >= CLEARER
+    }
+}
+
+/// How a square difference image (signed, any scale) lies, by the directions of the nominal sensor's lights: the best
+/// reading, sure or not. On 36 published pairs it is right for all, where the sure ones alone leave some unread.
 ///
-/// `None` where the colors do not tell: nothing touched, not square, values that are not numbers, other lights.
-pub fn seen(difference: &RgbGrid) -> Option<Turn> {
+/// `None` where there is nothing to read: nothing touched, not square, values that are not numbers, no color.
+pub fn best(difference: &RgbGrid) -> Option<TurnReading> {
     let [width, height] = difference.size();
     if width != height || width < 4 * MARGIN || difference.as_slice().iter().flatten().any(|v| !v.is_finite()) {
         return None;
@@ -50,9 +80,10 @@ pub fn seen(difference: &RgbGrid) -> Option<Turn> {
     let mut order = [0, 1, 2, 3];
     order.sort_by(|&a, &b| share(b).total_cmp(&share(a)));
     let [best, second, ..] = order;
-    let clear = share(best) >= CONSISTENT && share(best) - share(second) >= CLEARER;
     let upside_down = kinds[best].cubes < 0.0;
-    clear.then(|| Turn { quarters: (best % 2) as u8 + if upside_down { 2 } else { 0 }, mirrored: best >= 2 })
+    let turn = Turn { quarters: (best % 2) as u8 + if upside_down { 2 } else { 0 }, mirrored: best >= 2 };
+    let reading = TurnReading { turn, consistency: share(best), margin: share(best) - share(second) };
+    (reading.consistency >= TOUCHED).then_some(reading)
 }
 
 /// Moments of a vector field's derivatives.
@@ -94,28 +125,8 @@ fn slopes(difference: &RgbGrid) -> [Grid<f64>; 2] {
             let gray = pixel.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0;
             pixel.iter().zip(&inverse).map(|(&v, w)| (f64::from(v) - gray) * w[i]).sum::<f64>()
         });
-        blurred(&read)
+        gaussian(&read, SIGMA_PX)
     })
-}
-
-/// Gaussian blur; the border repeats.
-fn blurred(image: &Grid<f64>) -> Grid<f64> {
-    let radius = (3.0 * SIGMA).ceil() as isize;
-    let weights: Vec<f64> = (-radius..=radius).map(|i| (-((i * i) as f64) / (2.0 * SIGMA * SIGMA)).exp()).collect();
-    let sum: f64 = weights.iter().sum();
-    let pass = |image: &Grid<f64>, dx: isize, dy: isize| {
-        let last = [image.width() as isize - 1, image.height() as isize - 1];
-        Grid::from_fn(image.width(), image.height(), |x, y| {
-            let at = |i: isize| {
-                image[(
-                    (x as isize + i * dx).clamp(0, last[0]) as usize,
-                    (y as isize + i * dy).clamp(0, last[1]) as usize,
-                )]
-            };
-            (-radius..=radius).zip(&weights).map(|(i, w)| w * at(i)).sum::<f64>() / sum
-        })
-    };
-    pass(&pass(image, 1, 0), 0, 1)
 }
 
 #[cfg(test)]
@@ -134,7 +145,7 @@ mod tests {
             let difference = &touch.pad(lab::RIGHT).unwrap().color().unwrap().difference;
             let square = resample::bilinear_rgb(difference, SIDE, SIDE);
             for turn in Turn::all() {
-                match seen(&turn.apply(&square)) {
+                match best(&turn.apply(&square)).filter(|found| found.is_sure()).map(|found| found.turn) {
                     Some(found) if found == turn => right += 1,
                     Some(_) => wrong += 1,
                     None => silent += 1,
@@ -147,11 +158,11 @@ mod tests {
 
     #[test]
     fn where_the_colors_do_not_tell_nothing_is_said() {
-        assert_eq!(seen(&Grid::filled(128, 128, [0.0; 3])), None);
-        assert_eq!(seen(&Grid::filled(128, 128, [f32::NAN; 3])), None);
-        assert_eq!(seen(&Grid::filled(427, 320, [3.0; 3])), None);
-        assert_eq!(seen(&Grid::filled(0, 0, [3.0; 3])), None);
+        assert_eq!(best(&Grid::filled(128, 128, [0.0; 3])), None);
+        assert_eq!(best(&Grid::filled(128, 128, [f32::NAN; 3])), None);
+        assert_eq!(best(&Grid::filled(427, 320, [3.0; 3])), None);
+        assert_eq!(best(&Grid::filled(0, 0, [3.0; 3])), None);
         let gray = Grid::from_fn(128, 128, |x, y| [((x * 31 + y * 17) % 97) as f32; 3]);
-        assert_eq!(seen(&gray), None);
+        assert!(best(&gray).is_none_or(|found| !found.is_sure()));
     }
 }

@@ -1,5 +1,6 @@
 //! Options that several verbs share, read in one way.
 
+use std::convert::Infallible;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -10,6 +11,7 @@ use serde::Serialize;
 use strum::IntoEnumIterator;
 
 use super::Common;
+use crate::domain::rig::{PadId, Rig};
 use crate::io::atomic;
 use crate::io::dataset::{Dataset, ToolScale};
 
@@ -122,6 +124,33 @@ pub(super) fn at_least_one<T: FromStr + PartialOrd + From<u8>>(text: &str) -> Re
         Ok(number) if number >= T::from(1) => Ok(number),
         Ok(_) => Err("that leaves nothing to do; give 1 or more, or leave the option out".to_owned()),
         Err(_) => Err("a whole number of 1 or more is needed".to_owned()),
+    }
+}
+
+/// Which finger's image: the name of one, or `both`, which means all.
+#[derive(Debug, Clone)]
+pub(super) struct FingerArg(String);
+
+impl FromStr for FingerArg {
+    type Err = Infallible;
+
+    fn from_str(name: &str) -> Result<Self, Infallible> {
+        Ok(Self(name.to_lowercase()))
+    }
+}
+
+impl FingerArg {
+    /// The fingers it stands for. A rig with a single one has no other, however it is called.
+    pub(super) fn fingers(&self, rig: &Rig) -> anyhow::Result<Vec<PadId>> {
+        let all = rig.pad_list();
+        if self.0 == "both" || all.len() == 1 {
+            return Ok(all);
+        }
+        let finger = rig.pad_of_key(&self.0).ok_or_else(|| {
+            let names: Vec<_> = all.iter().map(|pad| rig.pad_key(*pad)).collect();
+            anyhow::anyhow!("there is no finger \"{}\"; name one of {} or both", self.0, names.join(", "))
+        })?;
+        Ok(vec![finger])
     }
 }
 

@@ -9,7 +9,7 @@ use super::args::{DatasetArgs, JsonArgs, keyed};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
-use super::{Output, VerbResult, pose};
+use super::{Output, VerbResult};
 use crate::domain::align::basin::{Basin, Plane};
 use crate::domain::align::{Ask, Run};
 use crate::domain::findings::Finding;
@@ -20,6 +20,7 @@ use crate::work;
 use crate::work::job::JobCx;
 use crate::work::labels::{ImprintSource, Labels};
 use crate::work::mask::MaskInputs;
+use crate::work::tool::load_tool;
 
 /// Arguments of `basin`.
 #[derive(Debug, Args)]
@@ -94,11 +95,12 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let sample = dataset.load(id)?;
     let name = entry.tool.as_deref();
     let name = name.ok_or_else(|| anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name))?;
-    let tool = pose::tool_model(&dataset, name)?;
+    let (tool, odd) = load_tool(&dataset, name)?;
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let imprints = predictor.imprints(&sample, args.imprint, &JobCx::unwatched())?;
     let mut notes = Notes::default();
     notes.take(&output, &sample.notes);
+    notes.take(&output, &odd);
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
     let inputs = MaskInputs { sample: &sample, tool: Some(&tool), labels: args.mask.drawn(&labels) };
     let contact = predictor.contact(&args.mask, imprints, inputs)?;

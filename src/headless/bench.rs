@@ -9,6 +9,7 @@ mod front;
 mod generator;
 mod peers;
 mod registration;
+mod rows;
 
 use clap::Subcommand;
 use glam::DVec3;

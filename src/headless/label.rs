@@ -6,11 +6,10 @@ use std::sync::Arc;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, keyed};
+use super::args::{DatasetArgs, FingerArg, keyed};
 use super::contact_mask::MaskArgs;
-use super::generate::FingerArg;
 use super::output::says;
-use super::pose::{parse_start, tool_model};
+use super::pose::parse_start;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult, find_pair};
 use crate::domain::align::Ask;
@@ -28,6 +27,7 @@ use crate::work::job::JobCx;
 use crate::work::labels::{HandMask, ImprintSource, Labels, PairLabels, Review, Revision};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
+use crate::work::tool::load_tool;
 
 /// Arguments of `label`.
 #[derive(Debug, Args)]
@@ -174,7 +174,7 @@ impl<'a> Touch<'a> {
     fn load(args: &'a LabelArgs, dataset: &Dataset, id: PairId) -> anyhow::Result<Self> {
         let entry = &dataset.index.pairs[id.0 as usize];
         let tool = match &entry.tool {
-            Some(name) => tool_model(dataset, name),
+            Some(name) => load_tool(dataset, name).map(|(tool, _)| tool).map_err(Into::into),
             None => Err(anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name)),
         };
         Ok(Self { args, sample: dataset.load(id)?, tool, predictor: Predictor::new(&args.model, &dataset.rig) })

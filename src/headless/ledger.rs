@@ -5,8 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::args::DatasetArgs;
-use super::generate::FingerArg;
+use super::args::{DatasetArgs, FingerArg};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
@@ -121,7 +120,6 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     };
     let key = sample.rig.pad_key(finger);
     let touch = sample.pad(finger).ok_or_else(|| anyhow::anyhow!("{name}: there is no {key} finger"))?;
-    let truth = touch.depth().map(|b| &b.imprint);
 
     let output = Output::new(args.common, "generating", 1);
     let mut notes = Notes::default();
@@ -134,7 +132,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let made = predictor.predict_one(&picture)?;
     let correct = matches!(args.mapping, Some(MappingArg::Correct));
     let shift_name = if correct { "Correct mapping" } else { shift.label() };
-    let LedgerResult { ledger: found, readings } = of_prediction(&made, shift, correct, truth)?;
+    let LedgerResult { ledger: found, readings } = of_prediction(&made, shift, correct, (&sample, finger))?;
     if let Some(out) = &args.out {
         std::fs::create_dir_all(out)
             .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;

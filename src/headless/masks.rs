@@ -20,6 +20,7 @@ use crate::work::error::TaskError;
 use crate::work::export::{Automatic, ExportSetup, HandMasks, export_masks};
 use crate::work::labels::Labels;
 use crate::work::mask::MaskInputs;
+use crate::work::tool::load_tool;
 
 /// What can be done with masks.
 #[derive(Debug, Subcommand)]
@@ -99,7 +100,8 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let mut automatic = |sample: &Sample, finger: PadId, tool: Option<&str>| {
         const WHAT: &str = "Contact mask";
         let tool = tool.and_then(|name| {
-            let model = tools.entry(name.to_owned()).or_insert_with(|| super::pose::tool_model(&dataset, name).ok());
+            let model =
+                tools.entry(name.to_owned()).or_insert_with(|| load_tool(&dataset, name).ok().map(|(tool, _)| tool));
             model.as_ref()
         });
         let touch = sample.pad(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;

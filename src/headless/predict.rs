@@ -1,17 +1,17 @@
 //! The options and models that `generate` and `pose` share. Models are loaded when first needed.
 
+mod args;
+
 use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use clap::{Args, ValueEnum};
-
-use super::args::keyed;
 use super::contact_mask::MaskArgs;
 use crate::domain::contact::ContactMask;
-use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Preset, Sampler, Spacing};
+use crate::domain::dataset::Problem;
+use crate::domain::diffusion::{GenerateConfig, Spacing};
 use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::postprocess::{DepthChain, RefitShift, ShiftMode};
+use crate::domain::postprocess::{CorrectionParts, DepthChain, RefitShift, ShiftMode};
 use crate::domain::rig::{PadId, PerPad, Rig, SensorId};
 use crate::domain::sample::{PadTouch, Sample};
 use crate::infer::bundle::Ends;
@@ -26,119 +26,8 @@ use crate::work::mask::{Contact, MaskChoice, MaskInputs, MaskSource};
 use crate::work::models::{Masking, Models, Wanted};
 use crate::work::prediction::Prediction;
 
-/// Which models, and how they are run.
-#[derive(Debug, Clone, Args)]
-pub(super) struct ModelArgs {
-    /// The generator's bundle (default: the shipped one).
-    #[arg(long)]
-    bundle: Option<PathBuf>,
-    /// The mask model's bundle (default: the shipped one).
-    #[arg(long)]
-    mask_bundle: Option<PathBuf>,
-    /// How good: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below
-    /// change single numbers of it.
-    #[arg(long, value_parser = keyed::<Preset>(), default_value = Preset::default().key())]
-    preset: Preset,
-    /// Sampling steps (default: the preset's).
-    #[arg(long)]
-    steps: Option<u32>,
-    /// Seed of the noise (default: the bundle's).
-    #[arg(long)]
-    seed: Option<u64>,
-    /// Share of fresh noise per step, 0 to 1, for DDIM (default: the preset's).
-    #[arg(long)]
-    eta: Option<f64>,
-    /// Scale of classifier-free guidance, 1 for none; only for a bundle that was trained for it (default: the bundle's).
-    #[arg(long, value_parser = guidance)]
-    guidance: Option<f64>,
-    /// The training steps visited: `trailing` starts at the noisiest, `lab` is the public release's (default: the
-    /// preset's).
-    #[arg(long, value_enum)]
-    spacing: Option<SpacingArg>,
-    /// The way from noise to an image (default: the preset's).
-    #[arg(long, value_parser = keyed::<Sampler>())]
-    sampler: Option<Sampler>,
-    /// How the decoder's output becomes meters.
-    #[arg(long, value_enum, default_value_t = AnyShiftArg::Exact)]
-    shift: AnyShiftArg,
-    /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
-    #[arg(long, value_name = "FILE")]
-    stats: Option<PathBuf>,
-    /// The engine that runs the models.
-    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
-    runtime: RuntimeArg,
-    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
-    #[arg(long)]
-    no_cache: bool,
-}
-
-fn guidance(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|scale| GUIDANCE.contains(scale));
-    value.ok_or_else(|| format!("choose {} to {}; 1 is none", GUIDANCE.start(), GUIDANCE.end()))
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SpacingArg {
-    /// From the noisiest training step on.
-    Trailing,
-    /// The public latent-diffusion release's.
-    Lab,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum ShiftArg {
-    /// What the lab's released script saves: its range is mapped twice.
-    Raw,
-    /// The paper's mean-and-deviation shift of that.
-    Paper,
-    /// The doubled mapping undone exactly.
-    Exact,
-}
-
-/// [`ShiftArg`] where statistics of a dataset can be named.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum AnyShiftArg {
-    /// What the lab's released script saves: its range is mapped twice.
-    Raw,
-    /// The paper's mean-and-deviation shift of that.
-    Paper,
-    /// The doubled mapping undone exactly.
-    Exact,
-    /// The paper's shift by the statistics of a dataset (see --stats).
-    Refit,
-}
-
-impl ShiftArg {
-    /// The reading of the decoder's output.
-    pub(super) fn mode(self) -> ShiftMode {
-        match self {
-            ShiftArg::Raw => ShiftMode::Raw,
-            ShiftArg::Paper => ShiftMode::PaperShift,
-            ShiftArg::Exact => ShiftMode::ExactInverse,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum RuntimeArg {
-    /// ONNX Runtime where its library is found, else the built-in engine.
-    Auto,
-    /// The built-in engine.
-    Rten,
-    /// ONNX Runtime.
-    Ort,
-}
-
-impl RuntimeArg {
-    /// The choice for the engines.
-    pub(super) fn choice(self) -> EngineChoice {
-        match self {
-            RuntimeArg::Auto => EngineChoice::Auto,
-            RuntimeArg::Rten => EngineChoice::Rten,
-            RuntimeArg::Ort => EngineChoice::Ort,
-        }
-    }
-}
+use args::SpacingArg;
+pub(super) use args::{AnyShiftArg, ModelArgs, RuntimeArg, ShiftArg};
 
 /// The models of one run of the program, as the arguments want them.
 pub(super) struct Predictor {
@@ -221,6 +110,21 @@ impl Predictor {
         }
     }
 
+    /// That the generator was fitted to other data than this sample.
+    pub(super) fn misgiving(&mut self, sample: &Sample) -> anyhow::Result<Option<Problem>> {
+        let bundle = self.bundle()?;
+        Ok(bundle.misgiving(sample).map(|what| Problem {
+            file: bundle.origin.path(),
+            what,
+            hint: "name another bundle, or switch the fit off with --fit-parts none".into(),
+        }))
+    }
+
+    /// The models themselves.
+    pub(super) fn models(&self) -> &Models {
+        &self.models
+    }
+
     /// The engine that runs the models.
     pub(super) fn engine(&self) -> EngineChoice {
         self.args.runtime.choice()
@@ -297,7 +201,8 @@ impl Predictor {
             AnyShiftArg::Refit => ShiftMode::Refit(self.refit.expect("read with the bundle")),
             AnyShiftArg::Raw => ShiftMode::Raw,
             AnyShiftArg::Paper => ShiftMode::PaperShift,
-            AnyShiftArg::Exact => ShiftMode::ExactInverse,
+            AnyShiftArg::Exact if self.args.fit_parts == CorrectionParts::ALL => ShiftMode::ExactInverse,
+            AnyShiftArg::Exact => ShiftMode::Parts(self.args.fit_parts),
         }
     }
 
@@ -327,12 +232,27 @@ impl Predictor {
         if source == ImprintSource::Measured {
             return Ok(imprint::measured(sample));
         }
+        let made = self.predictions(sample, cx)?;
+        self.in_meters(sample, &made)
+    }
+
+    /// The predictions of a pair's touches, all in one batch.
+    pub(super) fn predictions(&mut self, sample: &Sample, cx: &JobCx) -> anyhow::Result<PerPad<Prediction>> {
         let conditions = self.conditions(sample)?;
         let pictures: Vec<&RgbGrid> = conditions.iter().map(|(_, picture)| &**picture).collect();
         let made = self.predict(&pictures, cx)?;
-        let mut out: PerPad<DepthMap> = sample.rig.pads().map(|_| None).collect();
+        let mut out: PerPad<Prediction> = sample.rig.pads().map(|_| None).collect();
         for ((finger, _), made) in conditions.iter().zip(made) {
-            out[*finger] = Some(imprint_of(&made, self.shift(), sample, *finger)?);
+            out[*finger] = Some(made);
+        }
+        Ok(out)
+    }
+
+    /// Predictions of a pair's touches in meters, as large as its imprints.
+    pub(super) fn in_meters(&self, sample: &Sample, made: &PerPad<Prediction>) -> anyhow::Result<PerPad<DepthMap>> {
+        let mut out: PerPad<DepthMap> = sample.rig.pads().map(|_| None).collect();
+        for (finger, made) in made.entries() {
+            out[finger] = Some(imprint_of(made, self.shift(), sample, finger)?);
         }
         Ok(out)
     }

@@ -6,8 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, LimitArgs};
-use super::generate::FingerArg;
+use super::args::{DatasetArgs, FingerArg, LimitArgs};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::domain::dataset::PairId;

@@ -1,6 +1,7 @@
 //! `touch2touch watch`: each GelSlim touch that appears in a folder is predicted, posed, and written beside it. This is
 //! how a robot uses the models online.
 
+mod done;
 mod one;
 mod summary;
 mod write;
@@ -21,15 +22,16 @@ use super::pose::{Engines, parse_engines};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult, report};
 use crate::domain::dataset::{PairId, Problem};
-use crate::domain::rig::{PerPad, Rig};
+use crate::domain::rig::PerPad;
 use crate::domain::sample::DepthCamera;
-use crate::io::dataset::{Dataset, cameras_of};
+use crate::io::dataset::{Dataset, cameras_of, rig_of};
 use crate::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
 use crate::io::names::Outputs;
 use crate::work::job::Cancel;
 use crate::work::labels::{Labels, PairLabels};
 use crate::work::mask::MaskSource;
-use one::{Done, Worker};
+use done::Done;
+use one::Worker;
 use summary::Summary;
 use write::Save;
 
@@ -108,7 +110,10 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
         cameras: cameras(args.camera.as_deref())?,
     };
     let mut follower = Follower::new(args.dataset.path(), config)?;
-    let mut worker = Worker::new(args, Predictor::new(&args.model, &Rig::lab()), stop.clone())?;
+    // The models are chosen for the sensors before the first touch is there.
+    let rig = rig_of(args.dataset.path())
+        .map_err(|wrong| anyhow::anyhow!("{}: {} ({})", wrong.file.display(), wrong.what, wrong.hint))?;
+    let mut worker = Worker::new(args, Predictor::new(&args.model, &rig), stop.clone())?;
     let ready = json!({
         "event": "ready", "folder": args.dataset.path(), "recipe": worker.recipe(None, &PairLabels::default())?, "period_ms": PERIOD.as_secs_f64() * 1e3,
         "load_and_warm_up_s": worker.warm_s,

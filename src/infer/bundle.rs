@@ -80,6 +80,9 @@
 //! `zero_condition` (a condition of zeros) or `zero_difference` (what the condition encoder makes of a GelSlim that
 //! feels nothing); `scale` is the default, 1 for none. Without the key, guidance is refused.
 //!
+//! A generator that was fitted to pairs of a rig says so: `"fit": { "file": { "path": "fit.npz", "sha256": "…" },
+//! "pads": ["right", "left"], "source": { … } }` ([`FitSpec`], [`crate::domain::fit`]).
+//!
 //! `shift` may be left out (the paper's shift is then not offered), and so may `reduction`, `resampling`,
 //! `rotation_deg`, `cast` and `threshold` (mean, bilinear, 0, saturate, 0.5); `features`
 //! where the classifier hands none out. The fields of the structs below say what
@@ -99,6 +102,7 @@
 
 pub(super) mod contract;
 mod find;
+mod fit;
 mod manifest;
 mod origin;
 mod sensor;
@@ -106,18 +110,21 @@ mod sensor;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use crate::domain::dataset::Problem;
+use crate::domain::fit::Fitted;
 use crate::io::digest::sha256;
 use crate::io::files;
 
 pub use find::{Found, find, find_all};
+pub use fit::{FitSpec, write as write_fit};
 pub use manifest::{
-    BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, FileEntry, GeneratorInput, GeneratorSpec,
-    GuidanceSpec, InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind, ScheduleSpec,
-    TensorSpec, TimestepType, Unconditional,
+    BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, GeneratorInput, GeneratorSpec, GuidanceSpec,
+    InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind, ScheduleSpec, TensorSpec,
+    TimestepType, Unconditional,
 };
 pub use origin::{BundleFile, Origin};
 pub use sensor::{Ends, Misfit, SensorPair, SensorSpec};
@@ -157,6 +164,16 @@ impl Role {
     }
 }
 
+/// A file of a bundle.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileEntry {
+    /// Relative to the bundle's folder.
+    pub path: String,
+    /// Of the whole file, hex.
+    pub sha256: String,
+}
+
 /// A bundle with everything wrong about it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct BundleError {
@@ -192,6 +209,7 @@ pub struct Bundle {
     files: BTreeMap<Role, BundleFile>,
     bytes: u64,
     spec: BundleSpec,
+    fit: Option<Arc<Fitted>>,
     provenance: serde_json::Value,
 }
 
@@ -252,10 +270,14 @@ impl Bundle {
             }
             files.insert(role, file);
         }
+        let fit = match &manifest.spec {
+            Some(BundleSpec::Generator(spec)) => read_fit(&origin, spec, &mut problems),
+            _ => None,
+        };
         match (manifest.spec, problems.list.is_empty()) {
             (Some(spec), true) => {
                 let (name, provenance) = (manifest.name, manifest.provenance);
-                Ok(Self { hash: sha256(&text), origin, name, files, bytes: size, spec, provenance })
+                Ok(Self { hash: sha256(&text), origin, name, files, bytes: size, spec, fit, provenance })
             }
             _ => Err(refuse(problems.list)),
         }
@@ -287,6 +309,11 @@ impl Bundle {
             BundleSpec::Generator(spec) => Some(spec),
             BundleSpec::MaskUnet(_) | BundleSpec::ToolClassifier(_) => None,
         }
+    }
+
+    /// The fit to a rig, if it was fitted to one.
+    pub fn fit(&self) -> Option<&Arc<Fitted>> {
+        self.fit.as_ref()
     }
 
     /// The mask UNet's description, if the bundle is one.
@@ -324,6 +351,35 @@ impl Bundle {
     pub fn provenance(&self) -> &serde_json::Value {
         &self.provenance
     }
+}
+
+/// The pictures of a generator's fit, and what is wrong with them.
+fn read_fit(origin: &Origin, spec: &GeneratorSpec, problems: &mut Problems) -> Option<Arc<Fitted>> {
+    let fit = spec.fit.as_ref()?;
+    if !stays_inside(&fit.file.path) {
+        problems.add(format!("fit.file.path: \"{}\" leads out of the folder", fit.file.path), "name a file inside it");
+        return None;
+    }
+    let file = origin.file(&fit.file.path);
+    let mut add = |what: String| {
+        problems.list.push(Problem {
+            file: file.path().to_owned(),
+            what,
+            hint: "fit the bundle again, or copy it again".into(),
+        })
+    };
+    let bytes = match file.read(files::MODEL) {
+        Ok(bytes) => bytes,
+        Err(err) => {
+            add(format!("cannot be read: {err}"));
+            return None;
+        }
+    };
+    if !sha256(&bytes).eq_ignore_ascii_case(&fit.file.sha256) {
+        add("its SHA-256 is not the manifest's: the file is damaged or was replaced".into());
+        return None;
+    }
+    fit::read(file.path(), &bytes, fit, spec.output.size).map(Arc::new).map_err(add).ok()
 }
 
 /// Collects problems of one file.

@@ -3,6 +3,7 @@
 mod preview;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 pub use preview::Observer;
 use preview::Watching;
@@ -14,6 +15,7 @@ use super::trial::admit;
 use crate::domain::diffusion::{
     Denoiser, DiffusionError, GenerateConfig, Guided, ModelError, Prediction, Progress, Tensor, sample_watched,
 };
+use crate::domain::fit::Fitted;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{Picture, PostprocessError, RawPrediction, ShiftMode};
 
@@ -71,6 +73,7 @@ pub enum GenerateError {
 #[derive(Debug)]
 pub struct Generator {
     spec: GeneratorSpec,
+    fit: Option<Arc<Fitted>>,
     hash: String,
     engine: EngineKind,
     encoder: Graph,
@@ -109,6 +112,7 @@ impl Generator {
             hash: bundle.hash().to_owned(),
             name: bundle.name().to_owned(),
             encoded: Vec::new(),
+            fit: bundle.fit().cloned(),
             spec,
             engine,
         })
@@ -117,6 +121,11 @@ impl Generator {
     /// The bundle's description.
     pub fn spec(&self) -> &GeneratorSpec {
         &self.spec
+    }
+
+    /// The bundle's fit to a rig, if it was fitted to one.
+    pub fn fit(&self) -> Option<&Arc<Fitted>> {
+        self.fit.as_ref()
     }
 
     /// The engine in use.

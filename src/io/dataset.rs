@@ -30,7 +30,7 @@ use super::stl::MeshError;
 pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
 pub use grow::{Growth, RIG_FILE, cameras_of};
-pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_meters};
+pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_meters, rig_of};
 pub use tool_scale::{ToolFile, ToolScale, UNIT_FILE, read_in_meters, read_tool};
 
 /// Which kind of source a dataset is.

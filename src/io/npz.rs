@@ -104,8 +104,20 @@ const MAX_ARRAYS: usize = 1000;
 /// [`NpzError`]; arrays of other things than numbers (texts, objects) are errors too.
 pub fn read(path: &Path) -> Result<BTreeMap<String, Tensor>, NpzError> {
     let file = files::open(path).map_err(|source| NpzError::Io { file: path.to_owned(), source })?;
+    read_from(path, std::io::BufReader::new(file))
+}
+
+/// [`read`] of a file whose bytes are there; `path` is for messages.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bytes(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, Tensor>, NpzError> {
+    read_from(path, std::io::Cursor::new(bytes))
+}
+
+fn read_from(path: &Path, file: impl std::io::Read + std::io::Seek) -> Result<BTreeMap<String, Tensor>, NpzError> {
     let archive = |reason: String| NpzError::Archive { file: path.to_owned(), reason: files::clip(&reason) };
-    let mut zip = zip::ZipArchive::new(std::io::BufReader::new(file)).map_err(|err| archive(err.to_string()))?;
+    let mut zip = zip::ZipArchive::new(file).map_err(|err| archive(err.to_string()))?;
     if zip.len() > MAX_ARRAYS {
         return Err(archive(format!("it has {} entries; at most {MAX_ARRAYS} are read", zip.len())));
     }

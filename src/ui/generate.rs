@@ -8,7 +8,7 @@ use super::theme::{SMALL, caption, section, value};
 use super::widget::progress;
 use crate::app::action::Action;
 use crate::app::command::{Pane, PredictCommand, SettingsCommand, TasksCommand};
-use crate::app::keys::{ComparisonKey, PredictionKey, Preset, Sampler, ShiftMode};
+use crate::app::keys::{ComparisonKey, PredictionKey, Preset, Sampler, ShiftMode, shift_tooltip};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::domain::diffusion::GUIDANCE;
 use crate::work::bundles::{BundleInfo, BundleKind};
@@ -229,23 +229,6 @@ fn sampler_name(sampler: Sampler) -> &'static str {
         Sampler::Ddim => "DDIM",
         Sampler::Ddpm => "DDPM",
         Sampler::DpmSolver2m => "DPM++ 2M",
-    }
-}
-
-/// What a range mapping is, for its tooltip.
-fn shift_tooltip(mode: ShiftMode) -> &'static str {
-    match mode {
-        ShiftMode::Raw => {
-            "The prediction as the released script saves it: its range is mapped twice, so depths come out as \
-             (depth + max) / 2, far too deep"
-        }
-        ShiftMode::PaperShift => {
-            "The raw values with mean and deviation matched to the training statistics, as in the paper"
-        }
-        ShiftMode::ExactInverse => "The raw values with the doubled mapping undone: 2 * value - max, the depth itself",
-        ShiftMode::Refit(_) => {
-            "The raw values with mean and deviation matched to this data set's own predictions and measurements"
-        }
     }
 }
 

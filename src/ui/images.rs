@@ -23,6 +23,7 @@ use crate::domain::rig::{PadId, Rig, Sensor, SensorKind};
 use crate::domain::sample::Scale;
 use crate::domain::turn::Turn;
 use crate::domain::units;
+use crate::work::bundles::BundleKind;
 use crate::work::error::TaskError;
 
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
@@ -89,9 +90,18 @@ pub(super) fn scale_note(state: &State) -> &'static str {
 
 /// [`scale_note`], and how the files' pictures lie if they had to be laid upright.
 fn source_note(state: &State) -> String {
-    let laid = state.sample().ready().map(|s| s.laid).filter(|laid| *laid != Turn::default());
-    let laid = laid.map(|laid| format!("laid upright, the file is {laid}"));
-    [scale_note(state).to_owned(), laid.unwrap_or_default()]
+    let reading = state.sample().ready().and_then(|s| s.reading);
+    let laid = reading.filter(|read| read.turn != Turn::default() || !read.is_sure()).map(|read| {
+        let sure = if read.is_sure() { "sure" } else { "NOT sure" };
+        format!(
+            "laid upright, the file is {} ({sure}: {:.0} % clearer than the next way)",
+            read.turn,
+            100.0 * read.margin
+        )
+    });
+    let fitted = state.bundle(BundleKind::Generator).ok().and_then(|bundle| bundle.misgiving(state.sample().ready()?));
+    let fitted = fitted.map(|_| "the model was fitted to other data".to_owned());
+    [scale_note(state).to_owned(), laid.unwrap_or_default(), fitted.unwrap_or_default()]
         .into_iter()
         .filter(|s| !s.is_empty())
         .collect::<Vec<_>>()

@@ -19,7 +19,7 @@ use crate::app::command::{Command, Pane, SettingsCommand, TasksCommand, ViewComm
 use crate::app::keys::{ImprintSource, ShiftMode, shift_tooltip};
 use crate::app::state::Lookup;
 use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::postprocess::{ChainReading, Flag, Severity, Stage, StageRecord};
+use crate::domain::postprocess::{ChainReading, CorrectionPart, CorrectionParts, Flag, Severity, Stage, StageRecord};
 use crate::domain::rig::PadId;
 use crate::domain::units::{fixed, mm};
 use crate::work::ledger::LedgerResult;
@@ -57,6 +57,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ScrollArea::vertical().id_salt("depth chain").show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 2.0;
             head(cx, ui, finger);
+            fit_parts(cx, ui, found);
             flags(cx, ui, &found.ledger.flags);
             let width = ui.available_width();
             if width >= WIDE {
@@ -127,6 +128,28 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
             cx.action_button(ui, Action::Refit, "Refit on this dataset");
         }
     }
+}
+
+/// The parts of a model's fit to a rig, each with a switch; nothing for a model without one.
+fn fit_parts(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult) {
+    let current = cx.state.settings.shift;
+    let parts = match current {
+        ShiftMode::Parts(parts) => parts,
+        _ if found.ledger.stages.iter().any(|stage| matches!(stage.stage, Stage::Corrected(_))) => CorrectionParts::ALL,
+        _ => return,
+    };
+    ui.horizontal_wrapped(|ui| {
+        ui.label(caption("Fit", cx.p))
+            .on_hover_text("What the model's fit to a rig adds; switch a part off to see what it does");
+        for part in CorrectionPart::iter() {
+            let mut on = parts.has(part);
+            if ui.checkbox(&mut on, RichText::new(part.label()).size(SMALL)).on_hover_text(part.tip()).changed() {
+                let next = parts.with(part, on);
+                let mode = if next == CorrectionParts::ALL { ShiftMode::ExactInverse } else { ShiftMode::Parts(next) };
+                cx.out.push(Command::Settings(SettingsCommand::SetShift(mode)));
+            }
+        }
+    });
 }
 
 fn flags(cx: &Cx<'_>, ui: &mut Ui, flags: &[Flag]) {

@@ -171,7 +171,8 @@ pub(super) fn save_state(cx: &Cx<'_>, ui: &mut Ui) {
     let (text, color) = if cx.state.document.stroke.is_some() {
         ("unsaved stroke".to_owned(), cx.p.caution)
     } else {
-        super::saved::text(cx)
+        let unsaved = cx.state.document.unsaved.contains(cx.state.pair_name());
+        super::saved::text(&cx.shared.saved, unsaved, cx.p)
     };
     if !text.is_empty() {
         ui.label(RichText::new(text).size(SMALL).color(color))

@@ -4,7 +4,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use eframe::egui::Color32;
 
-use super::cx::Cx;
+use super::theme::Palette;
 
 /// What is known about saving.
 #[derive(Debug, Default)]
@@ -34,14 +34,14 @@ fn clock(since_epoch: Duration) -> String {
     format!("{:02}:{:02}:{:02} UTC", s / 3600, s / 60 % 60, s % 60)
 }
 
-/// The state in words, with its color.
-pub(super) fn text(cx: &Cx<'_>) -> (String, Color32) {
-    if cx.state.document.unsaved.contains(cx.state.pair_name()) {
-        return ("saving…".into(), cx.p.caution);
+/// The state of a pair in words, with its color.
+pub(super) fn text(saved: &Saved, unsaved: bool, p: &Palette) -> (String, Color32) {
+    if unsaved {
+        return ("saving…".into(), p.caution);
     }
-    match cx.shared.saved.at {
-        Some(at) => (format!("saved {}", clock(at)), cx.p.good),
-        None => (String::new(), cx.p.weak),
+    match saved.at {
+        Some(at) => (format!("saved {}", clock(at)), p.good),
+        None => (String::new(), p.weak),
     }
 }
 

@@ -8,7 +8,7 @@ mod measure;
 mod overlay;
 mod steps;
 
-use eframe::egui::{self, Ui};
+use eframe::egui::{self, Color32, Ui};
 use glam::{DAffine3, DVec3};
 use strum::IntoEnumIterator as _;
 
@@ -224,4 +224,9 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
         units::mm(point.y),
         units::mm(point.z)
     ));
+}
+
+/// A color as the renderer takes it.
+fn rgb(c: Color32) -> [f32; 3] {
+    [f32::from(c.r()) / 255.0, f32::from(c.g()) / 255.0, f32::from(c.b()) / 255.0]
 }

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use super::error::TaskError;
 use crate::domain::dataset::Problem;
 use crate::domain::diffusion::GenerateConfig;
+use crate::domain::fit::FitSource;
 use crate::domain::rig::Rig;
+use crate::domain::sample::Sample;
 use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, SensorPair};
 use crate::infer::generator::GenerateError;
 
@@ -36,6 +38,8 @@ pub struct GeneratorInfo {
     pub guided: bool,
     /// The sensors between which it predicts.
     pub sensors: SensorPair,
+    /// From what it was fitted to a rig, if it was.
+    pub fit: Option<FitSource>,
 }
 
 /// What a bundle does.
@@ -77,6 +81,7 @@ impl BundleInfo {
                 training_steps: spec.schedule.training_steps(),
                 guided: spec.guidance.is_some(),
                 sensors: spec.sensors(),
+                fit: spec.fit.as_ref().map(|fit| fit.source.clone()),
             }),
         }
     }
@@ -87,6 +92,16 @@ impl BundleInfo {
     /// [`Misfit`].
     pub fn ends(&self, rig: &Rig) -> Option<Result<Ends, Misfit>> {
         Some(self.generator.as_ref()?.sensors.ends(&self.name, rig))
+    }
+
+    /// Whether it was fitted to a rig.
+    pub fn is_fitted(&self) -> bool {
+        self.generator.as_ref().is_some_and(|generator| generator.fit.is_some())
+    }
+
+    /// Why a generator that was fitted is not for this sample, in words.
+    pub fn misgiving(&self, sample: &Sample) -> Option<String> {
+        self.generator.as_ref()?.fit.as_ref()?.misgiving(sample)
     }
 
     /// Whether it can be used with the sensors of `rig`.
@@ -134,6 +149,15 @@ pub fn find(folders: &[PathBuf]) -> FoundBundles {
     FoundBundles { bundles: found.bundles.iter().map(BundleInfo::of).collect(), problems: found.problems }
 }
 
+/// The bundle in a folder.
+///
+/// # Errors
+/// If it cannot be used.
+pub fn open(folder: &Path) -> Result<BundleInfo, TaskError> {
+    let opened = Bundle::open(folder).map_err(|err| TaskError::from_error("Open the bundle", &err))?;
+    Ok(BundleInfo::of(&opened))
+}
+
 impl FoundBundles {
     /// The bundle in the named folder, else the first found of its kind that fits the sensors of `rig`.
     ///
@@ -150,7 +174,10 @@ impl FoundBundles {
             }
             return Ok(info);
         }
-        self.bundles.iter().find(|bundle| bundle.kind == kind && bundle.fits(rig)).cloned().ok_or_else(|| {
+        let fitting = || self.bundles.iter().filter(|bundle| bundle.kind == kind && bundle.fits(rig));
+        // What was fitted to a rig is used where it is named.
+        let first = fitting().find(|bundle| !bundle.is_fitted()).or_else(|| fitting().next());
+        first.cloned().ok_or_else(|| {
             let refused: Vec<String> =
                 self.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();
             let why = match kind {

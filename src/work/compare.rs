@@ -1,13 +1,16 @@
 //! A prediction against the measurement of the same touch: [`of_pad`].
 
 use super::error::TaskError;
+use super::imprint::picture_of;
+use super::prediction::Prediction;
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Grid, Mask};
-use crate::domain::metrics::{self, Split, SsimRange};
+use crate::domain::metrics::{self, Split, SsimRange, Unstretched};
+use crate::domain::postprocess::ShiftMode;
 use crate::domain::resample::bilinear;
 use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::{Sample, Scale};
-use crate::io::dataset::{Dataset, LoadError, assumed_meters};
+use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, LoadError, assumed_meters};
 
 /// The peak of the lab's PSNR, meters.
 pub const LAB_PEAK_M: f64 = 0.0225;
@@ -23,6 +26,8 @@ pub struct Comparison {
     pub ssim: Option<f64>,
     /// Mean absolute error, meters; NaN without a pixel to compare.
     pub mae_m: f64,
+    /// With an assumed scale, the metrics of the pictures as they are, beside those of the stretched ones.
+    pub unstretched: Option<Unstretched>,
     /// Whether PSNR and SSIM are of meters, or (assumed scale) of images stretched to 0..1 each.
     pub scale: Scale,
     /// The same figures inside and outside the GelSlim's footprint, errors in meters; `None` where nobody asked.
@@ -46,12 +51,15 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
         }
         difference
     });
+    let mut unstretched = None;
     let (psnr, ssim) = match scale {
         Scale::Measured => (
             metrics::psnr(predicted, measured, LAB_PEAK_M).map_err(fail)?,
             metrics::ssim(predicted, measured, SsimRange::Explicit(LAB_PEAK_M)),
         ),
         Scale::Assumed => {
+            let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
+            unstretched = Some(metrics::unstretched(predicted, measured, hi - lo).map_err(fail)?);
             let (p, m) = (metrics::unit_range(predicted), metrics::unit_range(measured));
             (metrics::psnr(&p, &m, 1.0).map_err(fail)?, metrics::ssim(&p, &m, SsimRange::Explicit(1.0)))
         }
@@ -61,6 +69,7 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
         psnr_db: psnr.db(),
         ssim: ssim.ok().map(|s| s.mean),
         mae_m: if count == 0 { f64::NAN } else { sum / count as f64 },
+        unstretched,
         scale,
         split: None,
     })
@@ -70,7 +79,7 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
 ///
 /// # Errors
 /// As [`compare`].
-fn compare_parts(
+pub fn compare_parts(
     predicted: &DepthMap,
     measured: &DepthMap,
     scale: Scale,
@@ -122,13 +131,15 @@ pub fn tiles(predicted: &DepthMap, tile: &DepthMap, sample: &Sample, pad: PadId)
 }
 
 /// The predicted imprint of a pad (meters, raw orientation) against what was measured: the figures that every part of
-/// the program shows. With a `tile` ([`tile_of`]) they are of its own pixels, so that what the file has is not resampled;
-/// the error map is of the imprint's pixels always. `None` where nothing was measured.
+/// the program shows. With a `tile` ([`tile_of`]) they are of its own pixels, so that what the file has is not resampled,
+/// nor the prediction more than once where it is known how it was `drawn`; the error map is of the imprint's pixels
+/// always. `None` where nothing was measured.
 ///
 /// # Errors
 /// As [`compare`].
 pub fn of_pad(
     imprint: &DepthMap,
+    drawn: Option<(&Prediction, ShiftMode)>,
     sample: &Sample,
     pad: PadId,
     tile: Option<&DepthMap>,
@@ -140,7 +151,11 @@ pub fn of_pad(
         return compare_parts(imprint, measured, sample.scale, seen.as_ref()).map(Some);
     };
     let error = compare(imprint, measured, sample.scale)?.error;
-    let figures = tiles(&as_tile(imprint, &sample.rig, tile.size()), tile, sample, pad)?;
+    let picture = match drawn {
+        Some((prediction, shift)) => picture_of(prediction, shift, sample, pad, tile.size())?,
+        None => as_tile(imprint, &sample.rig, tile.size()),
+    };
+    let figures = tiles(&picture, tile, sample, pad)?;
     Ok(Some(Comparison { error, ..figures }))
 }
 

@@ -191,7 +191,7 @@ pub fn evaluate(
             done += loaded;
             cx.progress(done as u64, total as u64, batch.tool.clone().unwrap_or_default());
         }
-        tool.finish(&mut scores);
+        tool.finish(&mut scores, &mut skipped);
     });
     let groups = evaluation::groups_of(scores.iter().flat_map(|s| &s.grasps));
     if groups.is_empty() {

@@ -1,9 +1,11 @@
 //! A decoder's picture to meters: [`imprint`].
 
+use std::sync::Arc;
+
 use super::error::TaskError;
 use super::prediction::{Chains, Prediction};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
-use crate::domain::postprocess::{DepthChain, PostprocessError, RawPrediction, ShiftMode};
+use crate::domain::postprocess::{Correction, CorrectionParts, DepthChain, PostprocessError, RawPrediction, ShiftMode};
 use crate::domain::resample::{bilinear, bilinear_rgb};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{PadTouch, Sample};
@@ -11,18 +13,26 @@ use crate::domain::sample::{PadTouch, Sample};
 /// Longest side of a thumbnail, pixels.
 const THUMBNAIL_PX: usize = 44;
 
-/// A prediction in meters, as large as the bubble image `size` (`[width, height]`).
+/// A prediction in meters as the model draws it, of no pad, as large as the bubble image `size` (`[width, height]`).
 ///
 /// # Errors
 /// If the bundle has no such range mapping, or its steps do not fit its output.
 pub fn imprint(prediction: &Prediction, shift: ShiftMode, size: [usize; 2]) -> Result<DepthMap, TaskError> {
+    through(&chain(prediction, shift)?, prediction, shift, size)
+}
+
+fn through(
+    chain: &DepthChain,
+    prediction: &Prediction,
+    shift: ShiftMode,
+    size: [usize; 2],
+) -> Result<DepthMap, TaskError> {
     let what = format!("Range mapping \"{}\"", shift.label());
-    let chain = chain(prediction, shift)?;
-    in_meters(&chain, &prediction.raw, size).map_err(|err| TaskError::from_error(&what, &err))
+    in_meters(chain, &prediction.raw, size).map_err(|err| TaskError::from_error(&what, &err))
 }
 
 /// The prediction of one finger of a sample in meters, as large as its bubble image; without one, the bundle's own size
-/// is kept.
+/// is kept. What the bundle's fit knows of the finger is applied.
 ///
 /// # Errors
 /// As [`imprint`].
@@ -33,7 +43,26 @@ pub fn imprint_of(
     finger: PadId,
 ) -> Result<DepthMap, TaskError> {
     let bubble = sample.pad(finger).and_then(|t| t.depth());
-    imprint(prediction, shift, bubble.map_or([0, 0], |b| b.imprint.size()))
+    let chain = chain_of_pad(prediction, shift, sample, finger)?;
+    through(&chain, prediction, shift, bubble.map_or([0, 0], |b| b.imprint.size()))
+}
+
+/// The prediction of one finger as its sensor's picture shows it, meters: turned as that lies, and as large. It is
+/// resized once, where [`imprint_of`] and a resizing of that would do it twice.
+///
+/// # Errors
+/// As [`imprint`].
+pub fn picture_of(
+    prediction: &Prediction,
+    shift: ShiftMode,
+    sample: &Sample,
+    finger: PadId,
+    size: [usize; 2],
+) -> Result<DepthMap, TaskError> {
+    let chain = chain_of_pad(prediction, shift, sample, finger)?;
+    let lies = sample.rig.depth().map_or(0, |sensor| sensor.rotation_deg);
+    let chain = DepthChain { size, rotation_deg: (chain.rotation_deg + lies) % 360, ..chain };
+    through(&chain, prediction, shift, size)
 }
 
 /// The measured imprints of a pair.
@@ -63,7 +92,31 @@ pub fn in_meters(chain: &DepthChain, raw: &RawPrediction, size: [usize; 2]) -> R
     if depth.size() == size || size.contains(&0) { Ok(depth) } else { Ok(bilinear(&depth, size[0], size[1])) }
 }
 
-/// The steps from a prediction to meters.
+/// The steps from the prediction of a finger to meters, with what the bundle's fit knows of it: the exact reading is
+/// corrected, those that show what was released are not.
+///
+/// # Errors
+/// As [`chain`].
+pub fn chain_of_pad(
+    prediction: &Prediction,
+    shift: ShiftMode,
+    sample: &Sample,
+    finger: PadId,
+) -> Result<DepthChain, TaskError> {
+    let parts = match shift {
+        ShiftMode::ExactInverse => CorrectionParts::ALL,
+        ShiftMode::Parts(parts) => parts,
+        ShiftMode::Raw | ShiftMode::PaperShift | ShiftMode::Refit(_) => CorrectionParts::NONE,
+    };
+    let found = prediction.fit.as_ref().and_then(|fit| fit.correction(sample, finger));
+    let correction = found.filter(|_| parts != CorrectionParts::NONE);
+    let with = |fit: &Arc<Correction>| {
+        if parts == CorrectionParts::ALL { fit.clone() } else { Arc::new(Correction { parts, ..(**fit).clone() }) }
+    };
+    Ok(DepthChain { correction: correction.map(with), ..chain(prediction, shift)? })
+}
+
+/// The steps from a prediction to meters as the model draws them.
 ///
 /// # Errors
 /// If the bundle has no such range mapping, or the statistics of a refit are of another bundle.
@@ -90,6 +143,7 @@ pub fn chain_of(chains: &Chains, bundle: &str, shift: ShiftMode) -> Result<Depth
             refit.check(bundle).map_err(|why| fail(&why))?;
             of(ShiftMode::Raw)?.with_mode(shift, None).map_err(|err| fail(&err.to_string()))
         }
+        ShiftMode::Parts(_) => of(ShiftMode::ExactInverse),
         mode => of(mode),
     }
 }

@@ -2,10 +2,11 @@
 
 use super::compare::LAB_PEAK_M;
 use super::error::TaskError;
-use super::imprint::chain;
+use super::imprint::chain_of_pad;
 use super::prediction::Prediction;
-use crate::domain::grid::DepthMap;
 use crate::domain::postprocess::{ChainReading, DepthChain, Ledger, Mapping, Shift, ShiftMode, ledger, readings};
+use crate::domain::rig::PadId;
+use crate::domain::sample::Sample;
 
 /// The depth chain of a prediction.
 #[derive(Clone, Debug)]
@@ -18,7 +19,7 @@ pub struct LedgerResult {
 
 /// The ways to meters to be compared: all that a bundle has, and `shift` where it is a data set's own.
 fn reading_chains(shift: ShiftMode, chain: impl Fn(ShiftMode) -> Option<DepthChain>) -> Vec<(ShiftMode, DepthChain)> {
-    let own = matches!(shift, ShiftMode::Refit(_)).then_some(shift);
+    let own = matches!(shift, ShiftMode::Refit(_) | ShiftMode::Parts(_)).then_some(shift);
     ShiftMode::ALL.into_iter().chain(own).filter_map(|mode| Some((mode, chain(mode)?))).collect()
 }
 
@@ -31,15 +32,16 @@ pub fn of_prediction(
     prediction: &Prediction,
     shift: ShiftMode,
     correct: bool,
-    measured: Option<&DepthMap>,
+    (sample, pad): (&Sample, PadId),
 ) -> Result<LedgerResult, TaskError> {
     let raw = &prediction.raw;
-    let mut own = chain(prediction, shift)?;
+    let measured = sample.pad(pad).and_then(|touch| touch.depth()).map(|bubble| &bubble.imprint);
+    let mut own = chain_of_pad(prediction, shift, sample, pad)?;
     if correct {
         (own.mapping, own.shift) = (Mapping::Correct, Shift::None);
     }
     let found = ledger(&own, raw, measured).map_err(|err| TaskError::from_error("Depth chain", &err))?;
-    let modes = reading_chains(shift, |mode| chain(prediction, mode).ok());
+    let modes = reading_chains(shift, |mode| chain_of_pad(prediction, mode, sample, pad).ok());
     let readings = readings(&own, &modes, raw, measured, LAB_PEAK_M);
     Ok(LedgerResult { ledger: found, readings })
 }

@@ -15,6 +15,7 @@ use super::mask::{self, Contact, MaskChoice, MaskInputs, MaskRecipe};
 use super::prediction::{Chains, Prediction};
 use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GenerateConfig, Progress};
+use crate::domain::fit::Fitted;
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{ColorChain, RawPrediction, ShiftMode};
 use crate::domain::rig::{PadId, PerPad};
@@ -70,14 +71,16 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 #[derive(Clone, Debug, Default)]
 struct Ways {
     chains: Chains,
+    fit: Option<Arc<Fitted>>,
     color: Option<ColorChain>,
     input: [usize; 2],
 }
 
-fn ways_of(spec: &GeneratorSpec) -> Ways {
+fn ways_of(spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> Ways {
     let chain = |mode| (mode, spec.depth_chain(mode).map_err(|err| err.to_string()));
     Ways {
         chains: Arc::new(ShiftMode::iter().map(chain).collect()),
+        fit: fit.cloned(),
         color: spec.color_chain(),
         input: spec.input.sensor.size,
     }
@@ -133,12 +136,12 @@ impl Models {
             return Ok(known.clone());
         }
         let opened = bundle.open(&format!("Open {}", bundle.name))?;
-        Ok(opened.generator().map(|spec| self.ways_to(bundle, spec)).unwrap_or_default())
+        Ok(opened.generator().map(|spec| self.ways_to(bundle, spec, opened.fit())).unwrap_or_default())
     }
 
     /// The same of a bundle that is open already.
-    fn ways_to(&self, bundle: &BundleInfo, spec: &GeneratorSpec) -> Ways {
-        lock(&self.ways).entry(bundle.id.clone()).or_insert_with(|| ways_of(spec)).clone()
+    fn ways_to(&self, bundle: &BundleInfo, spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> Ways {
+        lock(&self.ways).entry(bundle.id.clone()).or_insert_with(|| ways_of(spec, fit)).clone()
     }
 
     /// Predictions, all of one call in one batch; one answer for each, in order. What was made before is not made
@@ -191,7 +194,7 @@ impl Models {
             }
         }
         let fresh: Vec<usize> = (0..wanted.len()).filter(|at| answers[*at].is_none()).collect();
-        let Ways { chains, color, .. } = if fresh.is_empty() {
+        let Ways { chains, fit, color, .. } = if fresh.is_empty() {
             // Nothing has to be loaded to show what is there.
             self.ways(bundle)?
         } else {
@@ -200,7 +203,7 @@ impl Models {
                 cx.progress(0, config.steps.into(), "loading the model");
                 open_generator(bundle, engine)
             })?;
-            let ways = self.ways_to(bundle, generator.spec());
+            let ways = self.ways_to(bundle, generator.spec(), generator.fit());
             let begin = std::time::Instant::now();
             let items: Vec<Item> = fresh.iter().map(|&at| Item { image: image[at], seed: wanted[at].seed }).collect();
             let mut follow = Follow { cx, wanted, fresh: &fresh, chains: &ways.chains };
@@ -219,6 +222,7 @@ impl Models {
         let prediction = |(raw, seconds, kept)| Prediction {
             raw,
             chains: chains.clone(),
+            fit: fit.clone(),
             color,
             bundle: bundle.id.clone(),
             engine: kind.label().to_owned(),
@@ -273,7 +277,7 @@ impl Models {
         // Oldest first: the last one is the one shown.
         for stored in found.into_iter().rev() {
             let Some(bundle) = bundles.iter().find(|bundle| *bundle.id == *stored.recipe.bundle) else { continue };
-            let Ok(Ways { chains, color, .. }) = self.ways(bundle) else { continue };
+            let Ok(Ways { chains, fit, color, .. }) = self.ways(bundle) else { continue };
             let engine = match stored.recipe.engine {
                 made if Some(made) == in_force => engine,
                 EngineKind::Rten => EngineChoice::Rten,
@@ -282,6 +286,7 @@ impl Models {
             let prediction = Prediction {
                 raw: stored.raw,
                 chains,
+                fit,
                 color,
                 bundle: bundle.id.clone(),
                 engine: stored.recipe.engine.label().to_owned(),

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::domain::fit::Fitted;
 use crate::domain::postprocess::{ColorChain, DepthChain, RawPrediction, ShiftMode};
 
 /// Per range mapping the steps to meters, or why it cannot be done.
@@ -15,6 +16,8 @@ pub struct Prediction {
     pub raw: RawPrediction,
     /// The ways to meters that its bundle offers.
     pub chains: Chains,
+    /// The fit of the bundle to a rig, if it was fitted to one.
+    pub fit: Option<Arc<Fitted>>,
     /// The steps to a color sensor's picture; `None` where it is depth that was predicted.
     pub color: Option<ColorChain>,
     /// The identity of the generator's bundle.

@@ -1,8 +1,10 @@
-//! A CAD model made ready for registration: [`named_tool`].
+//! A tool's CAD model, read from its data set and made ready for registration: [`load_tool`].
 
-use super::error::TaskError;
+use super::error::{TaskError, says};
+use crate::domain::dataset::Problem;
 use crate::domain::mesh::TriMesh;
 use crate::domain::pose::ToolModel;
+use crate::io::dataset::{Dataset, ToolFile};
 
 /// A tool's name and its CAD model with what the registration derives from it.
 #[derive(Clone, Debug)]
@@ -13,6 +15,20 @@ pub struct NamedTool {
     pub model: ToolModel,
 }
 
+/// The file of a tool's CAD model in a data set, with what is odd about it.
+///
+/// # Errors
+/// If there is none, or it cannot be used.
+pub fn tool_file(dataset: &Dataset, name: &str) -> Result<ToolFile, TaskError> {
+    let what = format!("CAD model of {name}");
+    match dataset.tool_with_notes(name) {
+        Ok(Some(file)) => Ok(file),
+        Ok(None) => Err(TaskError::new(what, format!("there is no {name}.stl, so its grasps have no pose"))
+            .with_hint("Put it into tools_stls, in meters and the object frame.")),
+        Err(err) => Err(TaskError::new(what, says(&err)).with_hint(err.hint())),
+    }
+}
+
 /// A tool with what the registration needs. Takes some tens of milliseconds.
 ///
 /// # Errors
@@ -20,4 +36,13 @@ pub struct NamedTool {
 pub fn named_tool(name: &str, mesh: TriMesh) -> Result<NamedTool, TaskError> {
     let model = ToolModel::new(mesh).map_err(|err| TaskError::from_error(format!("CAD model of {name}"), &err))?;
     Ok(NamedTool { name: name.to_owned(), model })
+}
+
+/// A tool of a data set, with what is odd about its file.
+///
+/// # Errors
+/// As [`tool_file`] and [`named_tool`].
+pub fn load_tool(dataset: &Dataset, name: &str) -> Result<(ToolModel, Vec<Problem>), TaskError> {
+    let ToolFile { mesh, notes } = tool_file(dataset, name)?;
+    Ok((named_tool(name, mesh)?.model, notes))
 }

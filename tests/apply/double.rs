@@ -250,6 +250,7 @@ impl Services for Double {
             kind,
             origin: Origin::Folder(id.into()),
             generator: (kind == BundleKind::Generator).then(|| GeneratorInfo {
+                fit: None,
                 defaults: GenerateConfig { steps: 20, ..GenerateConfig::default() },
                 training_steps: 1000,
                 guided: false,
@@ -334,6 +335,7 @@ impl Double {
             mapping: Mapping::Correct,
             reduction: Reduction::Mean,
             shift: Shift::None,
+            correction: None,
             size: IMPRINT_SIZE,
             resampling: Resampling::Bilinear,
             rotation_deg: 0,
@@ -341,7 +343,16 @@ impl Double {
         let chains = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse]
             .map(|mode| (mode, chain.clone().with_mode(mode, None).map_err(|err| err.to_string())));
         let (chains, bundle) = (Arc::new(chains.into()), bundle.id.clone());
-        Ok(Prediction { raw, chains, color: None, bundle, engine: "double".into(), seconds: 0.0, kept: false })
+        Ok(Prediction {
+            raw,
+            chains,
+            fit: None,
+            color: None,
+            bundle,
+            engine: "double".into(),
+            seconds: 0.0,
+            kept: false,
+        })
     }
 }
 

@@ -148,6 +148,7 @@ fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
         kind: BundleKind::Generator,
         origin: Origin::Folder("x".into()),
         generator: Some(GeneratorInfo {
+            fit: None,
             defaults,
             training_steps: 1000,
             guided,

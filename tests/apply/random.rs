@@ -9,8 +9,9 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::Union;
 use strum::IntoEnumIterator;
+use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    Answer, CameraPreset, Command, EvaluateCommand, FollowCommand, Hover, InspectCommand, LabelsCommand,
+    AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, FollowCommand, Hover, InspectCommand, LabelsCommand,
     LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
     WorkbenchCommand,
 };
@@ -37,6 +38,7 @@ use touch2touch::domain::hand::{HandAxis, HandPose};
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::statistics::ShiftStatistics;
+use touch2touch::work::adapt::{Adapted, Scored};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::job::{PreviewPicture, Progress};
@@ -302,6 +304,12 @@ draws! {
         1 Start,
         1 Export(Just(PathBuf::from("table"))),
     }
+    adapt: AdaptCommand {
+        1 Choose(any_of::<AdaptPairs>()),
+        1 Tune(any::<bool>()),
+        1 Start,
+        1 Use,
+    }
     settings: SettingsCommand {
         1 SetTheme(any_of::<Theme>()),
         1 SetUiZoom(number()),
@@ -361,6 +369,26 @@ draws! {
         1 SettingsSaved,
         1 JobFailed(error()),
         1 Evaluated(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(evaluation()))),
+        1 Adapted(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(adapted())), Just(None)),
+    }
+}
+
+fn adapted() -> Adapted {
+    Adapted {
+        pairs: 1,
+        touches: 1,
+        left_out: Vec::new(),
+        doubtful: Vec::new(),
+        before: Scored::default(),
+        closed_form: None,
+        after: None,
+        steps: 0,
+        seconds: 0.0,
+        fit_seconds: 0.0,
+        peak_mib: None,
+        pads: Vec::new(),
+        warnings: Vec::new(),
+        bundle: None,
     }
 }
 
@@ -375,6 +403,7 @@ fn command() -> impl Strategy<Value = Command> {
         (3, inspect().boxed()),
         (4, workbench().boxed()),
         (2, evaluate().boxed()),
+        (1, adapt().boxed()),
         (8, settings().boxed()),
         (2, tasks().boxed()),
         (3, answers().boxed()),
@@ -383,7 +412,11 @@ fn command() -> impl Strategy<Value = Command> {
         // A room that is not among the ways above does not compile.
         match command {
             Command::Library(_) | Command::Follow(_) | Command::View(_) | Command::Predict(_) | Command::Seeds(_) => {}
-            Command::Labels(_) | Command::Inspect(_) | Command::Workbench(_) | Command::Evaluate(_) => {}
+            Command::Labels(_)
+            | Command::Inspect(_)
+            | Command::Workbench(_)
+            | Command::Evaluate(_)
+            | Command::Adapt(_) => {}
             Command::Settings(_) | Command::Tasks(_) | Command::Answer(_) => {}
         }
         command

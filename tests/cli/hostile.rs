@@ -114,9 +114,10 @@ fn a_closed_or_full_standard_output_is_no_panic() {
         assert_eq!(full.status.code(), Some(2), "{args:?}: {}", error_text(&full));
         let said = error_text(&full);
         assert!(said.contains("standard output") && said.contains("No space left"), "{args:?}: {said}");
-        let mut closed = start(args, Stdio::piped());
-        drop(closed.stdout.take());
-        let closed = closed.wait_with_output().unwrap();
+        // Closed before the program begins: a short text could else be written before the reader is gone.
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let closed = start(args, writer.into()).wait_with_output().unwrap();
         assert_eq!(closed.status.code(), Some(141), "{args:?}: {}", error_text(&closed));
         assert_eq!(error_text(&closed), "", "{args:?}");
     }

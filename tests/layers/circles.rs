@@ -15,7 +15,7 @@ use std::path::Path;
 use super::{code, rust_files};
 
 /// The layers without a circle. A layer that has become free of them is added here and stays so.
-const LAYERS: &[&str] = &["domain", "io", "infer", "gpu", "work"];
+const LAYERS: &[&str] = &["domain", "io", "infer", "gpu", "work", "headless", "ui"];
 
 /// A path in the crate, such as `["domain", "align", "icp"]`.
 type Name = Vec<String>;

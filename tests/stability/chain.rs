@@ -18,6 +18,7 @@ fn chain() -> DepthChain {
         mapping: Mapping::Doubled,
         reduction: Reduction::Mean,
         shift: Shift::None,
+        correction: None,
         size: [32, 24],
         resampling: Resampling::Bilinear,
         rotation_deg: 0,

@@ -90,6 +90,7 @@ impl Services for QuickGenerator {
             kind: BundleKind::Generator,
             origin: Origin::Folder(PathBuf::new()),
             generator: Some(GeneratorInfo {
+                fit: None,
                 defaults: GenerateConfig { steps: 4, ..GenerateConfig::default() },
                 training_steps: 1000,
                 guided: false,
@@ -117,6 +118,7 @@ impl Services for QuickGenerator {
             mapping: Mapping::Doubled,
             reduction: Reduction::Mean,
             shift: Shift::None,
+            correction: None,
             size: [lab::BUBBLE.width, lab::BUBBLE.height],
             resampling: Resampling::Bilinear,
             rotation_deg: 180,
@@ -142,7 +144,16 @@ impl Services for QuickGenerator {
             let mean = picture(item.difference, item.seed);
             let raw = RawPrediction { channels: [-0.02, 0.0, 0.02].map(|off| mean.map(|v| v + off)).to_vec() };
             let (chains, bundle) = (chains.clone(), bundle.id.clone());
-            Prediction { raw, chains, color: None, bundle, engine: "double".into(), seconds: 0.0, kept: false }
+            Prediction {
+                raw,
+                chains,
+                fit: None,
+                color: None,
+                bundle,
+                engine: "double".into(),
+                seconds: 0.0,
+                kept: false,
+            }
         };
         Ok(wanted.iter().map(one).collect())
     }

@@ -18,6 +18,8 @@ impl Computes for ComparisonKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Comparison>> {
         let touch = self.0.touch;
         let predicted = state.results.imprints.get(&MetersKey(self.0.clone(), self.1))?.clone();
+        let prediction = state.results.predictions.get(&self.0)?.clone();
+        let shift = self.1;
         let sample = state.results.samples.get(&touch.pair)?.clone();
         let source = state.library.open.as_ref()?.source.clone();
         const WHAT: &str = "Compare prediction and measurement";
@@ -26,7 +28,7 @@ impl Computes for ComparisonKey {
                 Some(dataset) => tile_of(dataset, touch.pair.pair, &sample)?,
                 None => None,
             };
-            let found = of_pad(&predicted, &sample, touch.finger, tile.as_ref())?;
+            let found = of_pad(&predicted, Some((&prediction, shift)), &sample, touch.finger, tile.as_ref())?;
             found.ok_or_else(|| TaskError::new(WHAT, "the measured imprint is not there"))
         }))
     }

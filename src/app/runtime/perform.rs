@@ -133,6 +133,17 @@ impl Runtime {
                 });
                 self.task(Lane::Batch, ticket, "Evaluate".into(), body);
             }
+            Effect::Adapt { ticket, source, setup } => {
+                let services = self.services.clone();
+                let body = Box::new(move |cx: &JobCx| {
+                    let dataset = source.as_dataset().ok_or_else(|| {
+                        TaskError::new("Fit the model", "this kind of source cannot be read outside the studio")
+                    })?;
+                    let (adapted, bundle) = services.adapt(dataset, &setup, cx)?;
+                    Ok(Answer::Adapted(ticket, Arc::new(adapted), bundle.map(Box::new)))
+                });
+                self.task(Lane::Batch, ticket, "Fit the model".into(), body);
+            }
             Effect::ExportTable { ticket, evaluation, published, folder } => {
                 let body = Box::new(move |_: &JobCx| {
                     let folder = evaluate::export(&evaluation, published, &folder)?;

@@ -24,7 +24,8 @@ use crate::infer::engine::EngineChoice;
 use crate::infer::store::{self, Store};
 use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
-use crate::io::{atomic, files, folders};
+use crate::io::{atomic, files, folders, names};
+use crate::work::adapt::{self, AdaptSetup, Adapted};
 use crate::work::bundles::{self, BundleInfo};
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
@@ -33,6 +34,7 @@ use crate::work::job::JobCx;
 use crate::work::labels::Labels;
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
+use crate::work::tool::tool_file;
 
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";
@@ -43,6 +45,8 @@ const BAD_SETTINGS_FILE: &str = "settings.bad.json";
 #[derive(Debug, Default)]
 pub struct LiveServices {
     config_folder: Option<PathBuf>,
+    /// Where fitted models are kept.
+    models_folder: Option<PathBuf>,
     models: Models,
 }
 
@@ -50,14 +54,16 @@ impl LiveServices {
     /// With settings in the user's configuration folder.
     pub fn new() -> Self {
         let store = store::user_folder().map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
-        Self { config_folder: folders::config(), models: Models::new(store) }
+        let models_folder = folders::program_data().map(|folder| folder.join("models"));
+        Self { config_folder: folders::config(), models_folder, models: Models::new(store) }
     }
 
-    /// With settings and kept predictions in a given folder; `None` keeps none.
+    /// With settings, kept predictions and fitted models in a given folder; `None` keeps none.
     pub fn with_config_folder(folder: Option<PathBuf>) -> Self {
         let kept = folder.as_ref().map(|folder| folder.join("predictions"));
         let store = kept.map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
-        Self { config_folder: folder, models: Models::new(store) }
+        let models_folder = folder.as_ref().map(|folder| folder.join("models"));
+        Self { config_folder: folder, models_folder, models: Models::new(store) }
     }
 }
 
@@ -127,13 +133,7 @@ impl DataSource for LiveSource {
     }
 
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError> {
-        let what = format!("CAD model of {tool}");
-        match self.dataset.tool_mesh(tool) {
-            Ok(Some(mesh)) => Ok(mesh),
-            Ok(None) => Err(TaskError::new(what, format!("there is no {tool}.stl in the data set"))
-                .with_hint("Put it into data/tools_stls, in meters and the object frame.")),
-            Err(err) => Err(TaskError::from_error(what, &err).with_hint(err.hint())),
-        }
+        Ok(tool_file(&self.dataset, tool)?.mesh)
     }
 
     fn follow(&self) -> Option<Box<dyn Following>> {
@@ -205,6 +205,20 @@ impl Services for LiveServices {
 
     fn evaluate(&self, dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
         evaluate::evaluate(dataset, setup, &self.models, cx)
+    }
+
+    fn adapt(
+        &self,
+        dataset: &Dataset,
+        setup: &AdaptSetup,
+        cx: &JobCx,
+    ) -> Result<(Adapted, Option<BundleInfo>), TaskError> {
+        // Among the models that the program looks for at its start.
+        let name = format!("fitted-to-{}", names::label(&dataset.title));
+        let out = self.models_folder.as_ref().map(|folder| folder.join(name));
+        let adapted = adapt::adapt(dataset, &AdaptSetup { out, ..setup.clone() }, &self.models, cx)?;
+        let bundle = adapted.bundle.as_ref().map(|folder| bundles::open(folder)).transpose()?;
+        Ok((adapted, bundle))
     }
 
     fn mask_by_model(

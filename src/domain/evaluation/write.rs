@@ -36,7 +36,7 @@ const fn column(
 }
 
 /// The columns of a group, in the paper's order.
-const COLUMNS: [Column; 12] = [
+const COLUMNS: [Column; 15] = [
     column("PSNR dB", "psnr_db", 1, true, |f| f.psnr_db, "Against the measured imprint, decibels; peak 22.5 mm"),
     column(
         "clean dB",
@@ -47,6 +47,23 @@ const COLUMNS: [Column; 12] = [
         "PSNR against the simulator's imprint before camera noise, decibels",
     ),
     column("SSIM", "ssim", 2, true, |f| f.ssim, "Structural similarity; range of the tool's predictions (the lab's)"),
+    column(
+        "raw dB",
+        "psnr_raw_db",
+        1,
+        true,
+        |f| f.psnr_raw_db,
+        "PSNR of pictures as they are, in the assumed meters and not stretched to 0..1, decibels",
+    ),
+    column("raw SSIM", "ssim_raw", 2, true, |f| f.ssim_raw, "Structural similarity of pictures as they are"),
+    column(
+        "line dB",
+        "psnr_line_db",
+        1,
+        true,
+        |f| f.psnr_line_db,
+        "PSNR of pictures after the straight line that fits best: the worth of the shape alone, decibels",
+    ),
     column("SSIM 22.5", "ssim_peak", 2, true, |f| f.ssim_peak, "Structural similarity with the range 22.5 mm"),
     column(
         "clean SSIM",
@@ -80,10 +97,12 @@ const COLUMNS: [Column; 12] = [
 ];
 
 /// What the columns mean, a line each.
-pub const NOTES: [&str; 6] = [
+pub const NOTES: [&str; 7] = [
     "each figure per tool, then the mean over the tools; intervals: 95 %, bootstrap over the grasps",
     "clean: against the simulator's imprint before camera noise, which no generator can know; the row of the measured \
      imprints says how much that noise costs",
+    "raw, line: of pictures whose scale was assumed, as they are and after the straight line that fits best; PSNR itself \
+     stretches both pictures to 0..1, where no noise-free picture passes 20 dB",
     "FD: Fréchet distance in the features of the tool classifier, predicted against measured imprints of the group; it \
      cannot be compared with a published FID, nor between groups of different size",
     "FID: published, with the features of an Inception network",

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::RELATIVE_NO_SPREAD;
+use super::{CorrectionPart, RELATIVE_NO_SPREAD};
 use crate::domain::grid::Grid;
 use crate::domain::metrics::Joint;
 
@@ -19,6 +19,8 @@ pub enum Stage {
     Meters,
     /// After the shift.
     Shifted,
+    /// After a part of the fit to a rig.
+    Corrected(CorrectionPart),
     /// At the imprint's size.
     Resized,
     /// In the raw orientation of the lab's files: the result.
@@ -33,6 +35,7 @@ impl Stage {
             Stage::Reduced => "Channels to one".into(),
             Stage::Meters => "De-normalized".into(),
             Stage::Shifted => "Shift".into(),
+            Stage::Corrected(part) => format!("Fit: {}", part.label().to_lowercase()),
             Stage::Resized => "Resized".into(),
             Stage::Turned => "Rotated".into(),
         }

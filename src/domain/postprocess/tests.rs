@@ -9,6 +9,7 @@ fn chain() -> DepthChain {
         mapping: Mapping::Correct,
         reduction: Reduction::Mean,
         shift: Shift::None,
+        correction: None,
         size: [6, 4],
         resampling: Resampling::Bilinear,
         rotation_deg: 0,

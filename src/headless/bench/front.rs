@@ -5,7 +5,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
 
 use super::canvas::{Drawing, Drawn, Paper};
-use super::registration::EngineRow;
+use super::rows::EngineRow;
 
 /// An engine as a point of the picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -9,7 +9,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::figures::{Outcome, Summary};
-use super::registration::{EngineRow, Prepared, offset, position_error_mm};
+use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
 use crate::domain::units::angle_error;

@@ -13,11 +13,11 @@ use strum::IntoEnumIterator as _;
 use super::canvas;
 use super::figures::{Outcome, Summary, quantile};
 use super::front::{self, Axis, FrontPoint, Picture};
+use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use super::{Machine, contact_points, peers};
 use crate::domain::align::{AlignError, AlignReport, icp};
 use crate::domain::cloud::CloudError;
 use crate::domain::field::DistanceField;
-use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
 use crate::domain::pose::{Registration, ToolModel, register};
 use crate::domain::units::angle_error;
@@ -25,7 +25,7 @@ use crate::headless::args::{JsonArgs, LimitArgs, at_least_one};
 use crate::headless::output::says;
 use crate::headless::{Output, VerbResult, spread};
 use crate::io::atomic;
-use crate::io::cases::{Case, CaseSet, Stratum};
+use crate::io::cases::{Case, CaseSet};
 
 /// Repetitions of one case go on until this much time is spent, milliseconds, or there are [`MAX_REPETITIONS`].
 const REPEAT_MS: f64 = 8.0;
@@ -65,36 +65,6 @@ enum Masks {
     Spoilt,
     /// As they are.
     Clean,
-}
-
-/// A case ready to be registered.
-pub(super) struct Prepared {
-    pub(super) name: String,
-    pub(super) stratum: Stratum,
-    pub(super) tool: usize,
-    pub(super) straight: bool,
-    pub(super) truth: PlanarPose,
-    /// Contact points, grasp frame, meters.
-    pub(super) points: Vec<DVec3>,
-}
-
-/// One row of the table.
-#[derive(Debug, Serialize)]
-pub(super) struct EngineRow {
-    pub(super) name: String,
-    pub(super) label: String,
-    /// Whether it is another project's library.
-    pub(super) peer: bool,
-    #[serde(flatten)]
-    pub(super) summary: Summary,
-    /// Mean processor time of a pose, milliseconds, where the system tells: what is left of the times when other
-    /// programs are taken out.
-    pub(super) cpu_mean_ms: Option<f64>,
-    /// One value per case in the order of `cases`, `null` where there is no pose or the case was not run.
-    pub(super) error_deg: Vec<Option<f64>>,
-    pub(super) ms: Vec<Option<f64>>,
-    /// Estimated minus true place (y, z), millimeters, likewise.
-    pub(super) offset_mm: Vec<Option<[f64; 2]>>,
 }
 
 #[derive(Debug, Serialize)]
@@ -353,17 +323,6 @@ fn outcome(case: &Prepared, timed: Timed<Result<AlignReport, AlignError>>) -> Ou
         flagged: report.and_then(|r| Some(r.observability?.degenerate)),
         rung: report.filter(|r| !r.ladder.is_empty()).map(|r| r.rung.to_string()),
     }
-}
-
-/// From the true to the estimated place (y, z), millimeters.
-pub(super) fn offset(estimated: PlanarPose, truth: PlanarPose) -> [f64; 2] {
-    [(estimated.y_m - truth.y_m) * 1e3, (estimated.z_m - truth.z_m) * 1e3]
-}
-
-/// Distance between the two places, millimeters.
-pub(super) fn position_error_mm(estimated: PlanarPose, truth: PlanarPose) -> f64 {
-    let [y, z] = offset(estimated, truth);
-    y.hypot(z)
 }
 
 fn write(file: &Path, report: &Report) -> anyhow::Result<()> {

@@ -6,29 +6,28 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
-use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::super::output::says;
 use super::super::predict::Predictor;
+use super::done::{Done, PoseMetrics, figures};
 use super::summary::Latency;
 use super::{Source, WatchArgs, write};
 use crate::domain::align::Ask;
-use crate::domain::contact::ContactMask;
-use crate::domain::dataset::Problem;
-use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::grid::Mask;
 use crate::domain::pose::{Registration, ToolModel};
-use crate::domain::rig::{PadId, PerPad, Text};
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::infer::engine::resolve;
 use crate::io::dataset::{Dataset, read_in_meters};
 use crate::io::follow::Ready;
 use crate::work::compare;
 use crate::work::job::{Cancel, JobCx};
-use crate::work::labels::{ImprintSource, PairLabels};
+use crate::work::labels::PairLabels;
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose;
+use crate::work::prediction::Prediction;
+use crate::work::tool::{load_tool, named_tool};
 
 /// The models, loaded once, and the tools met so far.
 pub(super) struct Worker<'a> {
@@ -39,77 +38,6 @@ pub(super) struct Worker<'a> {
     stop: Cancel,
     /// Seconds that loading and the first run took.
     pub warm_s: f64,
-}
-
-/// Metrics of one finger.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct FingerFigures {
-    finger: Text,
-    min_m: f64,
-    max_m: f64,
-    mean_m: f64,
-    contact_px: Option<usize>,
-    /// What the mask is made of: the source's key, `depth` where the mask model found nothing, `flat` where there is no
-    /// contact.
-    mask: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    psnr_db: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    ssim: Option<f64>,
-}
-
-/// A pose, in the lab's sense of the angle.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct PoseMetrics {
-    tool: String,
-    angle_deg: f64,
-    y_m: f64,
-    z_m: f64,
-    grasp_from_object: PlanarPose,
-    rms_m: f64,
-    points: usize,
-    stop: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    truth_deg: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error_deg: Option<f64>,
-}
-
-/// A result, as it is written and said.
-#[derive(Debug, Clone, Serialize)]
-pub(super) struct Done {
-    pub name: String,
-    source: Source,
-    recipe: Value,
-    files: Vec<String>,
-    /// What is odd about the touch's files.
-    pub notes: Vec<Problem>,
-    scale: &'static str,
-    fingers: Vec<FingerFigures>,
-    /// Why masks are not made of the source that was asked.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub mask_notes: Vec<String>,
-    pose: Option<PoseMetrics>,
-    /// Why there is no pose.
-    no_pose: Option<String>,
-    /// Up to the writing of this very file; the event and the summary include it.
-    pub latency: Latency,
-    error: Option<String>,
-    #[serde(skip)]
-    pub fresh: bool,
-}
-
-impl Done {
-    pub(super) fn text(&self) -> String {
-        let pose = match (&self.pose, &self.no_pose) {
-            (Some(p), _) => format!("{:.1} deg, y {:.2} mm, z {:.2} mm", p.angle_deg, p.y_m * 1e3, p.z_m * 1e3),
-            (None, Some(why)) => format!("no pose: {why}"),
-            (None, None) => "no pose".to_owned(),
-        };
-        let l = &self.latency;
-        let when = if self.fresh { format!("{:.0} ms after it was closed", l.total) } else { "lay there".to_owned() };
-        format!("{}: {pose} ({when}; generator {:.0} ms)", self.name, l.generate)
-    }
 }
 
 impl<'a> Worker<'a> {
@@ -163,7 +91,7 @@ impl<'a> Worker<'a> {
     /// The CAD model of a tool, from memory; one that was not there is looked for again.
     fn tool(&mut self, dataset: &Dataset, name: &str) -> Result<&ToolModel, String> {
         if !self.tools.contains_key(name) {
-            let model = load_tool(dataset, name, self.args).map_err(|err| says(&err))?;
+            let model = tool_model(dataset, name, self.args).map_err(|err| says(&err))?;
             self.tools.insert(name.to_owned(), model);
         }
         self.tools.get(name).ok_or_else(|| format!("no CAD model of {name}"))
@@ -189,7 +117,8 @@ impl<'a> Worker<'a> {
         let mut latency = Latency { found: since(ready.stamp.closed, found), load: ms(start), ..Latency::default() };
 
         let step = Instant::now();
-        let Some(imprints) = self.imprints(sample)? else { return Ok(None) };
+        let Some(drawn) = self.predictions(sample)? else { return Ok(None) };
+        let imprints = self.predictor.in_meters(sample, &drawn)?;
         latency.generate = ms(step);
         let step = Instant::now();
         let inputs = MaskInputs { sample, tool: None, labels: self.args.mask.drawn(labels) };
@@ -207,15 +136,21 @@ impl<'a> Worker<'a> {
         latency.write = ms(step);
         latency.total = since(ready.stamp.closed, SystemTime::now());
         let tile = compare::tile_of(dataset, ready.id, sample)?;
+        let shift = self.predictor.shift();
+        let drawn = |pad: PadId| Some((drawn[pad].as_ref()?, shift));
         let mut done = Done {
             name: ready.name.clone(),
             source: source.clone(),
             recipe: recipe.clone(),
             files,
-            notes: sample.notes.clone(),
+            notes: sample.notes.iter().cloned().chain(self.predictor.misgiving(sample)?).collect(),
             scale: sample.scale.key(),
             mask_notes: contact.notes(&sample.rig),
-            fingers: sample.rig.pads().filter_map(|pad| figures(sample, pad, &contact, tile.as_ref())).collect(),
+            fingers: sample
+                .rig
+                .pads()
+                .filter_map(|pad| figures(sample, pad, &contact, drawn(pad), tile.as_ref()))
+                .collect(),
             pose,
             no_pose,
             latency,
@@ -228,13 +163,13 @@ impl<'a> Worker<'a> {
         Ok(Some(done))
     }
 
-    /// Predicted imprints of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
-    fn imprints(&mut self, sample: &Sample) -> anyhow::Result<Option<PerPad<DepthMap>>> {
+    /// Predictions of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
+    fn predictions(&mut self, sample: &Sample) -> anyhow::Result<Option<PerPad<Prediction>>> {
         if self.predictor.conditions(sample)?.is_empty() {
             return Err(self.predictor.no_condition());
         }
         let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
-        match self.predictor.imprints(sample, ImprintSource::Predicted, &cx) {
+        match self.predictor.predictions(sample, &cx) {
             Err(_) if self.stop.is_cancelled() => Ok(None),
             made => made.map(Some),
         }
@@ -281,39 +216,15 @@ fn digest(mask: &Mask) -> String {
 }
 
 /// The CAD model of a tool: a file, one of the dataset's, or one of the demo's.
-fn load_tool(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<ToolModel> {
-    let mesh = if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("stl")) {
-        Some(
-            read_in_meters(Path::new(name), args.unit.tool_scale)
-                .map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))?,
-        )
-    } else {
-        match dataset.tool_mesh(name).map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))? {
-            Some(mesh) => Some(mesh),
-            None => Dataset::demo().tool_mesh(name).ok().flatten(),
-        }
-    };
-    let mesh = mesh.ok_or_else(|| {
-        anyhow::anyhow!("no CAD model of {name}: put {name}.stl into tools_stls, or name a file with --tool")
-    })?;
-    Ok(ToolModel::new(mesh)?)
-}
-
-/// Numbers of one prediction, against the measurement where there is one.
-fn figures(sample: &Sample, pad: PadId, contact: &Contact, tile: Option<&DepthMap>) -> Option<FingerFigures> {
-    let imprint = contact.imprints[pad].as_ref()?;
-    let stats = crate::domain::postprocess::Stats::of(imprint);
-    let compared = compare::of_pad(imprint, sample, pad, tile).ok().flatten();
-    let mask = contact.masks[pad].as_ref();
-    let count = |found: &ContactMask| found.mask.as_slice().iter().filter(|&&m| m).count();
-    Some(FingerFigures {
-        finger: sample.rig.pad_key(pad),
-        min_m: stats.min,
-        max_m: stats.max,
-        mean_m: stats.mean,
-        contact_px: mask.map(count),
-        mask: mask.map_or(contact.source().key(), |found| found.basis.key(contact.source().key())),
-        psnr_db: compared.as_ref().and_then(|c| c.psnr_db),
-        ssim: compared.as_ref().and_then(|c| c.ssim),
-    })
+fn tool_model(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<ToolModel> {
+    if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("stl")) {
+        let mesh = read_in_meters(Path::new(name), args.unit.tool_scale);
+        let mesh = mesh.map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))?;
+        return Ok(named_tool(name, mesh)?.model);
+    }
+    let demo = Dataset::demo();
+    let has_it = dataset.tool_mesh_file(name).is_some() || demo.tool_mesh(name).ok().flatten().is_none();
+    let (model, _) = load_tool(if has_it { dataset } else { &demo }, name)
+        .map_err(|err| anyhow::anyhow!("{err} Or name a file with --tool."))?;
+    Ok(model)
 }

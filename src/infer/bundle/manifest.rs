@@ -6,8 +6,9 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::fit::FitSpec;
 use super::sensor::{SensorPair, SensorSpec};
-use super::{Problems, Role};
+use super::{FileEntry, Problems, Role};
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig, Prediction, Sampler, Schedule, ScheduleError, Spacing};
 use crate::domain::postprocess::{
     ColorChain, DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
@@ -22,16 +23,6 @@ const VERSION: u64 = 2;
 const MAX_SIDE: usize = 4096;
 /// Most values of one tensor: four pictures with the longest sides.
 const MAX_VALUES: usize = 4 * MAX_SIDE * MAX_SIDE;
-
-/// One graph's file.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FileEntry {
-    /// Relative to the bundle's folder.
-    pub path: String,
-    /// Of the whole file, hex.
-    pub sha256: String,
-}
 
 /// What a bundle is.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,6 +58,8 @@ pub struct GeneratorSpec {
     pub timestep: TimestepType,
     /// How classifier-free guidance is done; `None` if the model was not trained for it.
     pub guidance: Option<GuidanceSpec>,
+    /// The fit to a rig, if it was fitted to one.
+    pub fit: Option<FitSpec>,
 }
 
 /// `guidance`: only for a denoiser that was trained with the condition left out now and then.
@@ -106,6 +99,7 @@ impl GeneratorSpec {
             mapping: Mapping::Correct,
             reduction: self.output.reduction,
             shift: Shift::None,
+            correction: None,
             size: self.output.imprint_size,
             resampling: self.output.resampling,
             rotation_deg: self.output.rotation_deg,
@@ -488,6 +482,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
     let defaults: Option<Defaults> = section(keys, "defaults", problems);
     let guidance: Option<GuidanceSpec> =
         if keys.contains_key("guidance") { section(keys, "guidance", problems) } else { None };
+    let fit: Option<FitSpec> = if keys.contains_key("fit") { section(keys, "fit", problems) } else { None };
 
     let mut check = |fine: bool, what: &str, hint: &str| {
         if !fine {
@@ -533,6 +528,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
                 check(valid, "output.range: empty", "give [smallest, largest] difference on the 0..255 scale");
                 check(output.channels == 3, "output.channels: not a color picture's", "a color sensor has 3 channels");
                 check(shift.is_none(), "shift: not for a color picture", "remove it");
+                check(fit.is_none(), "fit: not for a color picture", "remove it");
             }
         }
         check(turn(output.rotation_deg), "output.rotation_deg: not supported", TURNS);
@@ -582,6 +578,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         defaults: defaults?,
         timestep: TimestepType::Int64,
         guidance,
+        fit,
     })))
 }
 

@@ -73,7 +73,7 @@ impl Origin {
     }
 
     /// The origin as a path, for messages.
-    pub(in crate::infer) fn path(&self) -> PathBuf {
+    pub fn path(&self) -> PathBuf {
         match self {
             Self::Folder(dir) => dir.clone(),
             Self::BuiltIn(name) => format!("{PREFIX}{name}").into(),
@@ -81,7 +81,7 @@ impl Origin {
     }
 
     /// The file `name` of the bundle; whether it is there shows when it is read.
-    pub(super) fn file(&self, name: &str) -> BundleFile {
+    pub fn file(&self, name: &str) -> BundleFile {
         let embedded = match self {
             Self::Folder(_) => None,
             Self::BuiltIn(bundle) => embedded(bundle).and_then(|files| files.iter().find(|(file, _)| *file == name)),

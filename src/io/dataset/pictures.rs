@@ -25,7 +25,7 @@ use crate::domain::resample;
 use crate::domain::rig::{Rig, Sensor, SensorId, SensorKind, lab};
 use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample, Scale};
 use crate::domain::turn::Turn;
-use crate::domain::upright;
+use crate::domain::upright::{self, TurnReading};
 use crate::io::files;
 use crate::io::images;
 
@@ -82,28 +82,28 @@ fn suffixes(rig: &Rig) -> [String; KINDS] {
     [color, depth, "_vqvae".into(), "_touch".into(), "_reference".into()]
 }
 
-/// The sensors that the folder declares, else the lab's.
-fn rig_of(folder: &Path, problems: &mut Vec<Problem>) -> Arc<Rig> {
+/// The sensors that a folder declares in its [`RIG_JSON`], else the lab's.
+///
+/// # Errors
+/// If the file cannot be read or declares no rig.
+pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, Problem> {
     let file = folder.join(RIG_JSON);
     let rig = match files::read(&file, files::SMALL) {
         Ok(text) => Rig::parse(&text).map_err(|why| format!("does not declare a rig: {why}")),
-        Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Rig::lab(),
+        Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(Rig::lab()),
         Err(err) => Err(format!("cannot be read: {err}")),
     };
-    rig.map_or_else(
-        |why| {
-            let hint = "correct it, or remove it to take the pictures for the lab's sensors";
-            problems.push(problem(file, why, hint));
-            Rig::lab()
-        },
-        Arc::new,
-    )
+    let hint = "correct it, or remove it to take the pictures for the lab's sensors";
+    rig.map(Arc::new).map_err(|why| problem(file, why, hint))
 }
 
 /// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
 pub(super) fn scan(folder: &Path) -> Option<Scan> {
     let mut problems = Vec::new();
-    let rig = rig_of(folder, &mut problems);
+    let rig = rig_of(folder).unwrap_or_else(|wrong| {
+        problems.push(wrong);
+        Rig::lab()
+    });
     let suffixes = suffixes(&rig);
     let mut found: BTreeMap<String, Files> = BTreeMap::new();
     let mut common = None;
@@ -191,14 +191,15 @@ impl Pictures {
         Ok(Some(if tile.width() == tile.height() || laid.quarters.is_multiple_of(2) { laid.undo(&tile) } else { tile }))
     }
 
-    /// The upright difference image, and how it lay.
-    fn difference(&self, id: PairId) -> Result<Option<(RgbGrid, Turn)>, LoadError> {
+    /// The upright difference image, and how it lay where the colors tell.
+    fn difference(&self, id: PairId) -> Result<Option<(RgbGrid, Option<TurnReading>)>, LoadError> {
         let Some(path) = self.file(id, GELSLIM)? else { return Ok(None) };
         let difference = difference_from_tile(&images::read_rgb(path)?);
         // The light of a GelSlim tells how its picture lay; nothing is known of other sensors' light.
         let tells = self.rig.color().is_some_and(|sensor| sensor.key == lab::GELSLIM.key);
-        let turn = tells.then(|| upright::seen(&difference)).flatten().unwrap_or_default();
-        Ok(Some((turn.undo(&difference), turn)))
+        let reading = tells.then(|| upright::best(&difference)).flatten();
+        let upright = reading.map_or_else(|| difference.clone(), |found| found.turn.undo(&difference));
+        Ok(Some((upright, reading)))
     }
 
     /// Whether a channel of the GelSlim picture was cut off at black or white: half of its range is lost.
@@ -213,7 +214,7 @@ impl Pictures {
         let mut notes = Vec::new();
         let mut touch = PadTouch::default();
         let mut scale = Scale::Assumed;
-        let mut laid = Turn::default();
+        let mut reading = None;
         // A picture of a kind that the rig does not have is kept behind its sensors.
         let place = |kind| self.rig.first(kind).unwrap_or(SensorId(self.rig.sensors.len() as u8));
         let (color_id, depth_id) = (place(SensorKind::Color), place(SensorKind::Depth));
@@ -224,14 +225,16 @@ impl Pictures {
             touch.set(color_id, color.ok_or_else(|| LoadError::Sizes { file: touched.to_owned(), sizes })?);
             // The model's meters are its own; only a bubble picture has none.
             scale = Scale::Measured;
-        } else if let Some((difference, turn)) = self.difference(id)? {
-            laid = turn;
+        } else if let Some((difference, read)) = self.difference(id)? {
+            reading = read;
             let path = self.file(id, GELSLIM)?.unwrap_or(Path::new(""));
+            notes.extend(read.filter(|read| read.is_guess()).map(|read| unsure(path, read)));
             if difference.as_slice().iter().all(|p| *p == [0.0; 3]) {
                 notes.push(problem(path, "the picture is a single color", "check that the right picture was saved"));
             }
             touch.set(color_id, ColorTouch { images: None, difference });
         }
+        let laid = reading.map_or_else(Turn::default, |read| read.turn);
         if let Some(tile) = self.tile(id, BUBBLE, laid)? {
             let [w, h] = tile.size();
             let path = self.file(id, BUBBLE)?.unwrap_or(Path::new(""));
@@ -250,9 +253,20 @@ impl Pictures {
             scale = Scale::Assumed;
         }
         let pads = self.rig.pads().map(|pad| (pad.index() == 0).then(|| touch.clone())).collect();
-        let sample = Sample { rig: self.rig.clone(), pads, grasp_from_object: None, scale, laid, notes };
+        let sample = Sample { rig: self.rig.clone(), pads, grasp_from_object: None, scale, laid, reading, notes };
         Ok(Loaded { sample, invalid: Default::default() })
     }
+}
+
+/// That the colors say how a picture lies, but not clearly.
+fn unsure(path: &Path, read: TurnReading) -> Problem {
+    let what = format!(
+        "its colors hardly tell how it lies: taken as {}, {:.0} % free of curl, {:.0} % more than the next way",
+        read.turn,
+        100.0 * read.consistency,
+        100.0 * read.margin
+    );
+    problem(path, what, "look at it: where it lies wrong, save both pictures of the pair upright")
 }
 
 /// A bubble picture (0..255) on its own pixels, in the assumed meters.

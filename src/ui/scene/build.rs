@@ -5,7 +5,7 @@ use std::sync::Arc;
 use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
-use super::{Memory, layers, steps};
+use super::{Memory, layers, rgb, steps};
 use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource};
 use crate::domain::mesh::TriMesh;
 use crate::domain::rig::PerPad;
@@ -37,10 +37,6 @@ pub(super) struct SceneMesh {
     pub revision: u64,
     /// The model.
     pub mesh: Arc<TriMesh>,
-}
-
-pub(super) fn rgb(c: Color32) -> [f32; 3] {
-    [f32::from(c.r()) / 255.0, f32::from(c.g()) / 255.0, f32::from(c.b()) / 255.0]
 }
 
 /// Points for the renderer, made again only for another cloud.

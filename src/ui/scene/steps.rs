@@ -6,7 +6,7 @@ use eframe::egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 use glam::{DAffine3, DVec3};
 
 use super::Memory;
-use super::build::rgb;
+use super::rgb;
 use crate::app::inspect::{Inspected, Inspection};
 use crate::app::keys::ImprintSource;
 use crate::app::workbench::Layer;

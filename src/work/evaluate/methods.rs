@@ -15,6 +15,7 @@ use crate::domain::turn::Turn;
 use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::engine::{EngineChoice, resolve};
+use crate::io::caught::caught;
 use crate::io::dataset::{Dataset, SourceKind};
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
@@ -54,6 +55,8 @@ pub(super) struct Made {
     pub(super) imprints: PerPad<DepthMap>,
     /// Differences of a color sensor, 0..255 scale, by finger.
     pub(super) colors: PerPad<RgbGrid>,
+    /// Predictions in meters as the picture of their sensor lies and as large as its file, where there are files.
+    pub(super) pictures: PerPad<DepthMap>,
     /// A picture in the orientation and size of its file, where that is all there is.
     pub(super) tile: Option<Grid<f32>>,
     /// Time per image, seconds.
@@ -215,12 +218,18 @@ impl Method {
 
 fn measured(case: &Case) -> Made {
     let imprints = imprint::measured(&case.sample);
-    Made { imprints, colors: PerPad::default(), tile: None, seconds: None }
+    Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: None, seconds: None }
 }
 
 fn stored(case: &Case) -> Result<Made, String> {
     let tile = case.lab.clone().ok_or("no stored prediction (NAME_vqvae.png) lies by this picture")?;
-    Ok(Made { imprints: PerPad::default(), colors: PerPad::default(), tile: Some(tile), seconds: None })
+    Ok(Made {
+        imprints: PerPad::default(),
+        colors: PerPad::default(),
+        pictures: PerPad::default(),
+        tile: Some(tile),
+        seconds: None,
+    })
 }
 
 impl GeneratorMethod {
@@ -237,23 +246,34 @@ impl GeneratorMethod {
         let predictions = self.predict(&images, cx)?;
         let mut made: Vec<Result<Made, String>> = cases
             .iter()
-            .map(|_| Ok(Made { imprints: PerPad::default(), colors: PerPad::default(), tile: None, seconds: None }))
+            .map(|_| {
+                Ok(Made {
+                    imprints: PerPad::default(),
+                    colors: PerPad::default(),
+                    pictures: PerPad::default(),
+                    tile: None,
+                    seconds: None,
+                })
+            })
             .collect();
         for ((at, finger, _), prediction) in touches.into_iter().zip(predictions) {
             let sample = &cases[at].sample;
             let picture = prediction.and_then(|prediction| {
                 let seconds = prediction.seconds;
                 let measured = sample.pad(finger).and_then(|t| t.color()).map_or([0, 0], |c| c.difference.size());
-                Ok(match imprint::color(&prediction, measured)? {
-                    Some(color) => (seconds, None, Some(color)),
-                    None => (seconds, Some(imprint::imprint_of(&prediction, shift, sample, finger)?), None),
-                })
+                if let Some(color) = imprint::color(&prediction, measured)? {
+                    return Ok((seconds, None, Some(color), None));
+                }
+                let tile = cases[at].tile.as_ref().map(Grid::size);
+                let picture = tile.map(|size| imprint::picture_of(&prediction, shift, sample, finger, size));
+                let depth = imprint::imprint_of(&prediction, shift, sample, finger)?;
+                Ok((seconds, Some(depth), None, picture.transpose()?))
             });
             match (picture, &mut made[at]) {
-                (Ok((seconds, depth, color)), Ok(made)) => {
+                (Ok((seconds, depth, color, picture)), Ok(made)) => {
                     // The images of one call took as long each; kept ones took what they took when they were made.
                     made.seconds = Some(made.seconds.map_or(seconds, |first| 0.5 * (first + seconds)));
-                    (made.imprints[finger], made.colors[finger]) = (depth, color);
+                    (made.imprints[finger], made.colors[finger], made.pictures[finger]) = (depth, color, picture);
                 }
                 (Err(err), slot) => *slot = Err(err.why),
                 (Ok(_), Err(_)) => {}
@@ -268,7 +288,10 @@ impl GeneratorMethod {
         let wanted: Vec<Wanted<'_>> =
             images.iter().map(|difference| Wanted { difference, seed, size: [0, 0] }).collect();
         let cx = cx.quiet();
-        let run = |wanted: &[Wanted<'_>]| self.models.predict(&self.bundle, self.engine, &self.config, wanted, &cx);
+        let run = |wanted: &[Wanted<'_>]| {
+            let predict = || self.models.predict(&self.bundle, self.engine, &self.config, wanted, &cx);
+            caught(predict).unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message)))
+        };
         let one = |image: &Wanted<'_>| {
             let made = run(std::slice::from_ref(image))?.pop();
             made.ok_or_else(|| TaskError::new(WHAT, "the generator gave no prediction"))

@@ -13,18 +13,21 @@ use crate::domain::catalog::pattern_of;
 use crate::domain::contact::{ContactMask, MaskBasis};
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
 use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
-use crate::domain::metrics::{LEVELS, SsimRange, planes, ssim_ranges, unit_range};
+use crate::domain::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ssim_ranges, unit_range};
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{Sample, Scale};
 use crate::infer::classifier::Verdict;
-use crate::io::dataset::Dataset;
+use crate::io::caught::caught;
+use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
 use crate::work::cloud::contact_points;
 use crate::work::compare::as_tile;
+use crate::work::error::TaskError;
 use crate::work::job::JobCx;
 use crate::work::mask::MaskInputs;
 use crate::work::models::Masking;
 use crate::work::pose;
+use crate::work::tool::load_tool;
 
 /// A prediction that waits for its image figures.
 struct Image {
@@ -33,6 +36,7 @@ struct Image {
     /// `None` for the measured imprint itself, which is not compared with itself.
     truth: Option<Grid<f32>>,
     noise_free: Option<Grid<f32>>,
+    unstretched: Option<Unstretched>,
     verdict: Option<Verdict>,
 }
 
@@ -55,12 +59,11 @@ impl Tool {
     /// Reads the CAD model.
     pub(super) fn new(dataset: &Dataset, tool: Option<String>, skipped: &mut Vec<Skipped>) -> Self {
         let model = tool.as_deref().and_then(|name| {
-            let model = match dataset.tool_mesh(name) {
-                Ok(Some(mesh)) => ToolModel::new(mesh).map_err(|err| err.to_string()),
-                Ok(None) => Err(format!("no CAD model (expected tools_stls/{name}.stl), so its grasps have no pose")),
-                Err(err) => Err(format!("{err} ({})", err.hint())),
+            let skip = |err: TaskError| {
+                let why = err.hint.map_or(err.why.clone(), |hint| format!("{} ({hint})", err.why));
+                skipped.push(Skipped { what: name.into(), method: String::new(), why });
             };
-            model.map_err(|why| skipped.push(Skipped { what: name.into(), method: String::new(), why })).ok()
+            load_tool(dataset, name).map(|(model, _)| model).map_err(skip).ok()
         });
         let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
         Self { pattern, model, class: None, pending: BTreeMap::new() }
@@ -103,7 +106,7 @@ impl Tool {
                     let imprint = made.imprints[f].as_ref().filter(|_| with_masks)?;
                     let tool = self.model.as_ref();
                     let inputs = MaskInputs { sample: &case.sample, tool, labels: case.labels.as_ref() };
-                    let found = by_models.contact_mask(by, imprint, f, inputs).map_err(|err| err.why);
+                    let found = guarded(|| by_models.contact_mask(by, imprint, f, inputs).map_err(|err| err.why));
                     let finger = || case.sample.rig.pad_key(f);
                     let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
                     let ContactMask { mask, basis } = found.ok()?;
@@ -122,23 +125,30 @@ impl Tool {
                 kept.push((case, made, masks));
             }
             // Poses on all cores; the models run one by one.
-            let angles: Vec<Option<f64>> = kept
+            let angles: Vec<Result<Option<f64>, String>> = kept
                 .par_iter()
                 .map(|(case, made, masks)| {
                     // A color picture has no depth, so there is nothing that could fail.
                     let posed = with_masks && made.colors.is_empty();
-                    posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()
+                    guarded(|| Ok(posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()))
                 })
                 .collect();
-            for ((case, made, _), angle_error_rad) in kept.into_iter().zip(angles) {
-                let mut images = images(case, &made, setup, upper);
+            for ((case, made, _), angle) in kept.into_iter().zip(angles) {
+                let scored = angle.and_then(|angle| Ok((angle, guarded(|| Ok(images(case, &made, setup, upper)))?)));
+                let (angle_error_rad, mut images) = match scored {
+                    Ok(scored) => scored,
+                    Err(why) => {
+                        skip(case, why);
+                        continue;
+                    }
+                };
                 if let Some(classifier) =
                     classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured && made.colors.is_empty())
                 {
                     let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
-                    match classifier.classify(&pictures) {
+                    match guarded(|| classifier.classify(&pictures).map_err(|err| err.to_string())) {
                         Ok(verdicts) => images.iter_mut().zip(verdicts).for_each(|(i, v)| i.verdict = Some(v)),
-                        Err(err) => skip(case, format!("tool classifier: {err}")),
+                        Err(why) => skip(case, format!("tool classifier: {why}")),
                     }
                 }
                 let score = GraspScore {
@@ -168,12 +178,12 @@ impl Tool {
     }
 
     /// The image figures, now that all predictions of the tool are there.
-    pub(super) fn finish(self, scores: &mut [Scores]) {
+    pub(super) fn finish(self, scores: &mut [Scores], skipped: &mut Vec<Skipped>) {
         let class = self.class;
         let mut measured_features = Vec::new();
         for (at, pending) in self.pending {
             let range = spread(pending.iter().flat_map(|p| &p.images).map(|i| &i.prediction));
-            let done: Vec<GraspScore> = pending
+            let done: Vec<Result<GraspScore, Skipped>> = pending
                 .into_par_iter()
                 .map(|Pending { mut score, images }| {
                     let assumed = score.scale == Scale::Assumed;
@@ -182,13 +192,27 @@ impl Tool {
                     } else {
                         [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)]
                     };
-                    score.images = images.into_iter().map(|image| finished(image, class, ranges, assumed)).collect();
-                    score
+                    let scored =
+                        || Ok(images.into_iter().map(|image| finished(image, class, ranges, assumed)).collect());
+                    match guarded(scored) {
+                        Ok(images) => {
+                            score.images = images;
+                            Ok(score)
+                        }
+                        Err(why) => Err(Skipped { what: score.pair, method: scores[at].method.clone(), why }),
+                    }
                 })
                 .collect();
+            let mut kept = Vec::new();
+            for one in done {
+                match one {
+                    Ok(score) => kept.push(score),
+                    Err(bad) => skipped.push(bad),
+                }
+            }
             // The measured imprints come first: what the others' features are compared with.
             if at == 0 {
-                measured_features = done
+                measured_features = kept
                     .iter()
                     .flat_map(|g| g.images.iter().map(move |i| (g.group, i.features.clone())))
                     .filter(|(_, f)| !f.is_empty())
@@ -196,7 +220,7 @@ impl Tool {
             } else {
                 scores[at].measured_features.extend(measured_features.iter().cloned());
             }
-            scores[at].grasps.extend(done);
+            scores[at].grasps.extend(kept);
         }
     }
 }
@@ -209,7 +233,8 @@ fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
             let levels = |picture: &RgbGrid| planes(picture, PEAK_M / LEVELS);
             let truth = Some(levels(&case.sample.pad(finger)?.color()?.difference));
             let prediction = levels(color);
-            return Some(Image { finger: finger.index(), prediction, truth, noise_free: None, verdict: None });
+            let finger = finger.index();
+            return Some(Image { finger, prediction, truth, noise_free: None, unstretched: None, verdict: None });
         }
         let bubble = case.sample.pad(finger)?.depth()?;
         if case.sample.scale == Scale::Assumed {
@@ -217,25 +242,43 @@ fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
             let tile = case.tile.as_ref()?;
             let prediction = match (&made.tile, &made.imprints[finger]) {
                 (Some(stored), _) => stored.clone(),
-                (None, Some(imprint)) => as_tile(imprint, &case.sample.rig, tile.size()),
+                (None, Some(imprint)) => {
+                    made.pictures[finger].clone().unwrap_or_else(|| as_tile(imprint, &case.sample.rig, tile.size()))
+                }
                 (None, None) => return None,
             };
+            let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
+            let raw = (in_assumed_meters(&prediction, made), assumed_meters(tile));
+            let unstretched = metrics::unstretched(&raw.0, &raw.1, hi - lo).ok();
             let (prediction, truth) = (unit_range(&prediction), unit_range(tile));
             return Some(Image {
                 finger: finger.index(),
                 prediction,
                 truth: Some(truth),
                 noise_free: None,
+                unstretched,
                 verdict: None,
             });
         }
         let prediction = made.imprints[finger].clone()?;
         let truth = (!upper).then(|| bubble.imprint.clone());
         let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
-        Some(Image { finger: finger.index(), prediction, truth, noise_free, verdict: None })
+        Some(Image { finger: finger.index(), prediction, truth, noise_free, unstretched: None, verdict: None })
     };
     let present = |f: &PadId| case.sample.pad(*f).is_some();
     fingers(&case.sample.rig, setup.both_fingers).filter(present).filter_map(image).collect()
+}
+
+/// The work on one pair: a panic in it is that pair's failure and not the end of the run.
+fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    caught(work).unwrap_or_else(|message| {
+        Err(format!("an internal error, which is a bug: {message}; please report it with this pair"))
+    })
+}
+
+/// What a method made of a picture, in the assumed meters: stored predictions are gray levels.
+fn in_assumed_meters(prediction: &Grid<f32>, made: &Made) -> Grid<f32> {
+    if made.tile.is_some() { assumed_meters(prediction) } else { prediction.clone() }
 }
 
 /// Largest minus smallest value of some images.
@@ -248,7 +291,7 @@ fn spread<'a>(images: impl Iterator<Item = &'a Grid<f32>>) -> f64 {
 }
 
 fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed: bool) -> ImageScore {
-    let Image { finger, prediction, truth, noise_free, verdict } = image;
+    let Image { finger, prediction, truth, noise_free, unstretched, verdict } = image;
     let ssim = truth.as_ref().and_then(|truth| ssim_ranges(&prediction, truth, &ranges).ok());
     let of = |at: usize| ssim.as_ref().map(|found| found[at].mean);
     let clean = noise_free.as_ref().and_then(|clean| ssim_ranges(&prediction, clean, &ranges[..1]).ok());
@@ -259,6 +302,7 @@ fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed:
         ssim: of(0),
         ssim_noise_free: clean.map(|found| found[0].mean),
         ssim_peak: of(1).filter(|_| !assumed),
+        unstretched,
         tool_right: verdict.as_ref().zip(class).map(|(v, class)| v.class == class),
         features: verdict.map_or_else(Vec::new, |v| v.features),
     }

@@ -1,0 +1,102 @@
+//! What the fit is asked for, and its last answer.
+
+use std::sync::Arc;
+
+use super::super::labels::state::Review;
+use super::super::state::State;
+use super::super::tasks::state::{Task, Ticket};
+use crate::domain::dataset::PairId;
+use crate::work::adapt::{AdaptSetup, Adapted};
+use crate::work::bundles::{BundleInfo, BundleKind};
+
+/// Parts in which pairs are left out in turn.
+const FOLDS: usize = 3;
+
+/// Steps of tuning: about a minute on two free cores for each part and for all.
+pub const TUNING_STEPS: u32 = 50;
+
+/// Which pairs are fitted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
+pub enum AdaptPairs {
+    /// All of the data set.
+    #[default]
+    All,
+    /// Those marked done.
+    Done,
+    /// Those in the list as it is filtered.
+    Listed,
+}
+
+impl AdaptPairs {
+    /// The name on screen.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::All => "all pairs",
+            Self::Done => "pairs marked done",
+            Self::Listed => "pairs in the list",
+        }
+    }
+}
+
+/// The fit and how it is asked for.
+#[derive(Clone, Debug, Default)]
+pub struct AdaptState {
+    /// Which pairs.
+    pub pairs: AdaptPairs,
+    /// Whether the networks themselves are tuned after the closed form.
+    pub tune: bool,
+    /// The fit under way.
+    pub running: Option<Ticket>,
+    /// The last fit to the open data set.
+    pub result: Option<Arc<Adapted>>,
+    /// Its bundle.
+    pub bundle: Option<Arc<str>>,
+}
+
+impl State {
+    /// The pairs that a fit started now would take.
+    pub fn adapt_pairs(&self) -> Vec<PairId> {
+        let Some(open) = &self.library.open else { return Vec::new() };
+        let all = open.source.index().pairs.iter().enumerate().map(|(at, entry)| (PairId(at as u32), entry));
+        match self.adapt.pairs {
+            AdaptPairs::All => all.map(|(id, _)| id).collect(),
+            AdaptPairs::Done => {
+                all.filter(|(_, entry)| self.document.review(&entry.name) == Review::Done).map(|(id, _)| id).collect()
+            }
+            AdaptPairs::Listed => self.library.order.clone(),
+        }
+    }
+
+    /// What a fit started now would do; `None` without data, pairs or a depth generator.
+    pub fn adapt_setup(&self) -> Option<AdaptSetup> {
+        let bundle = self.bundle(BundleKind::Generator).ok()?.clone();
+        let pairs = self.adapt_pairs();
+        (!pairs.is_empty()).then(|| AdaptSetup {
+            config: self.settings.generate.config(&bundle),
+            bundle,
+            engine: self.settings.runtime,
+            pairs,
+            folds: FOLDS,
+            mask: (self.settings.mask.choice, self.bundle(BundleKind::Mask).ok().cloned()),
+            steps: if self.adapt.tune { TUNING_STEPS } else { 0 },
+            out: None,
+        })
+    }
+
+    /// The fit under way.
+    pub fn adapting(&self) -> Option<(Ticket, &Task)> {
+        let ticket = self.adapt.running?;
+        Some((ticket, self.tasks.running.get(&ticket)?))
+    }
+
+    /// Whether that is what predicts now.
+    pub fn uses_fit(&self) -> bool {
+        let now = self.bundle(BundleKind::Generator).ok().map(|bundle| &bundle.id);
+        self.fitted().is_some_and(|fitted| Some(&fitted.id) == now)
+    }
+
+    /// The bundle that was fitted to the open data set.
+    pub fn fitted(&self) -> Option<&BundleInfo> {
+        self.library.bundle(self.adapt.bundle.as_deref()?)
+    }
+}

@@ -1,0 +1,139 @@
+//! `touch2touch adapt`: a generator fitted to pairs of one's own sensors.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::args::{DatasetArgs, LimitArgs};
+use super::contact_mask::MaskArgs;
+use super::predict::{ModelArgs, Predictor};
+use super::{Common, Output, VerbResult};
+use crate::domain::dataset::PairId;
+use crate::work::adapt::{AdaptSetup, Adapted, Scored, adapt};
+
+/// Arguments of `adapt`.
+#[derive(Debug, Args)]
+pub(super) struct AdaptArgs {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// The folder of the new bundle. Without it the fit is only tried.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Only these pairs: their names, separated by commas.
+    #[arg(long, value_name = "NAME,NAME", value_delimiter = ',')]
+    pairs: Vec<String>,
+    /// In how many parts the pairs are left out in turn, for the score on pairs that were not fitted; whole tools are
+    /// left out where at least three are known.
+    #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    validate: u32,
+    /// After the closed form tune the networks themselves with so many steps, such as 50: once for each part that is left
+    /// out, and once on all pairs.
+    #[arg(long, value_name = "STEPS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=100_000))]
+    tune: u32,
+    #[command(flatten)]
+    limit: LimitArgs,
+    #[command(flatten)]
+    mask: MaskArgs,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    #[serde(flatten)]
+    adapted: Adapted,
+    /// The bundle that was fitted.
+    from: String,
+    engine: &'static str,
+}
+
+pub(super) fn run(args: &AdaptArgs) -> VerbResult {
+    let dataset = args.dataset.open()?;
+    let pairs: Vec<PairId> = if args.pairs.is_empty() {
+        args.limit.spread(dataset.index.pairs.len()).into_iter().map(|at| PairId(at as u32)).collect()
+    } else {
+        args.pairs.iter().map(|name| super::find_pair(&dataset, name)).collect::<anyhow::Result<_>>()?
+    };
+    let output = Output::new(args.common, "fitting", pairs.len());
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let choice = args.mask.choice();
+    let setup = AdaptSetup {
+        bundle: predictor.bundle()?.clone(),
+        engine: predictor.engine(),
+        config: predictor.config()?,
+        pairs,
+        folds: args.validate as usize,
+        mask: (choice, predictor.mask_model(&choice)?),
+        steps: args.tune,
+        out: args.out.clone(),
+    };
+    let adapted = adapt(&dataset, &setup, predictor.models(), &output.job())?;
+    for remark in &adapted.left_out {
+        output.note(&format!("left out: {}: {}", remark.name, remark.why));
+    }
+    for remark in &adapted.doubtful {
+        output.note(&format!("look at {}: {}", remark.name, remark.why));
+    }
+    for warning in &adapted.warnings {
+        output.note(&format!("note: {warning}"));
+    }
+    let complete = adapted.left_out.is_empty();
+    let report = Report { adapted, from: setup.bundle.name.clone(), engine: predictor.engine_label()? };
+    output.finish(&report, || text(&report))?;
+    Ok(complete)
+}
+
+fn text(report: &Report) -> String {
+    let a = &report.adapted;
+    let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
+    let mut text = format!(
+        "{:<28} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
+        "on pairs that were left out", "PSNR dB", "SSIM", "raw dB", "line dB", "seen dB", "inv. dB", "angle °"
+    );
+    let mut row = |name: &str, s: &Scored| {
+        text += &format!(
+            "{name:<28} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
+            number(s.psnr_db, 2),
+            number(s.ssim, 3),
+            number(s.psnr_raw_db, 2),
+            number(s.psnr_line_db, 2),
+            number(s.seen.and_then(|p| p.psnr_db), 2),
+            number(s.invented.and_then(|p| p.psnr_db), 2),
+            number(s.angle.as_ref().and_then(|a| a.mean_deg), 2)
+        );
+    };
+    row("unfitted", &a.before);
+    for (name, scored) in [("closed form", &a.closed_form), ("tuned", &a.after)] {
+        if let Some(scored) = scored {
+            row(name, scored);
+        }
+    }
+    for pad in &a.pads {
+        text += &format!(
+            "\n{} ({} touches): moved {:+.2} px right and {:+.2} px down, {:.3} · d {:+.2} mm",
+            pad.pad,
+            pad.touches,
+            pad.offset_px[0],
+            pad.offset_px[1],
+            pad.gain,
+            pad.offset_m * 1e3
+        );
+    }
+    text += &format!(
+        "\n\n{} pairs, {} touches, {} left out, {} doubtful; {:.1} s ({:.2} s for the fit) on {}\n",
+        a.pairs,
+        a.touches,
+        a.left_out.len(),
+        a.doubtful.len(),
+        a.seconds,
+        a.fit_seconds,
+        report.engine
+    );
+    match &a.bundle {
+        Some(bundle) => text + &format!("{} was fitted: the new bundle is {}\n", report.from, bundle.display()),
+        None => text + "tried only: name a folder with --out to keep the fit\n",
+    }
+}

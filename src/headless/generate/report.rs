@@ -1,0 +1,238 @@
+//! What `generate` answers: the metrics of each prediction, their means, and the table.
+
+use serde::Serialize;
+
+use super::super::seeds::SeedFigures;
+use crate::domain::ambiguity::{Ambiguity, Touch};
+use crate::domain::findings::Finding;
+use crate::domain::metrics::{self, Unstretched};
+use crate::domain::rig::Text;
+use crate::domain::sample::Scale;
+use crate::work::compare::Comparison;
+
+/// What a prediction is measured in.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unit {
+    Meters,
+    /// Of 0..255: a color picture.
+    Levels,
+}
+
+/// What PSNR and SSIM of a color picture mean.
+pub(super) const COLOR_CONVENTION: &str = "difference image of the color sensor on the 0..255 scale, peak and range 255; the split \
+    by footprint, contact and pose need depth and are left out";
+
+/// Metrics of one prediction. PSNR and SSIM are those of `convention`.
+#[derive(Debug, Default, Clone, Serialize)]
+pub(super) struct Pair {
+    pub(super) name: String,
+    pub(super) finger: Text,
+    pub(super) psnr_db: Option<f64>,
+    pub(super) ssim: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) vqvae_psnr_db: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) vqvae_ssim: Option<f64>,
+    /// Where the scale was assumed: of the pictures as they are, and after the best straight line.
+    #[serde(flatten)]
+    pub(super) unstretched: Option<Unstretched>,
+    #[serde(flatten)]
+    pub(super) vqvae: Option<StoredUnstretched>,
+    #[serde(skip)]
+    pub(super) stored: Option<Unstretched>,
+    /// The figures apart for what the GelSlim saw and for what lies outside its footprint; errors in meters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) seen: Option<metrics::PixelMetrics>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) invented: Option<metrics::PixelMetrics>,
+    /// Whether the GelSlim image tells where on the tool it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) ambiguity: Option<Ambiguity>,
+    /// Of the prediction; where both fingers were predicted in one go, half of it.
+    pub(super) seconds: f64,
+    /// Whether it was made before and only read now.
+    pub(super) kept: bool,
+    /// With `--seeds`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) ensemble: Option<SeedFigures>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Mean {
+    pub(super) psnr_db: Option<f64>,
+    pub(super) ssim: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) vqvae_psnr_db: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) vqvae_ssim: Option<f64>,
+    #[serde(flatten)]
+    pub(super) unstretched: Option<Unstretched>,
+    #[serde(flatten)]
+    pub(super) vqvae: Option<StoredUnstretched>,
+    /// Means over the pairs: inside the GelSlim's footprint, and outside.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) seen: Option<PartMean>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) invented: Option<PartMean>,
+    /// Pairs whose GelSlim image leaves the place along a bare shaft open.
+    pub(super) ambiguous: usize,
+    pub(super) seconds: Option<f64>,
+}
+
+/// [`Unstretched`] metrics of the prediction that lay by.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct StoredUnstretched {
+    vqvae_psnr_raw_db: Option<f64>,
+    vqvae_ssim_raw: Option<f64>,
+    vqvae_psnr_line_db: Option<f64>,
+}
+
+impl From<Unstretched> for StoredUnstretched {
+    fn from(of: Unstretched) -> Self {
+        Self { vqvae_psnr_raw_db: of.psnr_raw_db, vqvae_ssim_raw: of.ssim_raw, vqvae_psnr_line_db: of.psnr_line_db }
+    }
+}
+
+/// Means over the pictures that have them.
+fn unstretched_mean(all: impl Iterator<Item = Unstretched>) -> Option<Unstretched> {
+    let all: Vec<Unstretched> = all.collect();
+    (!all.is_empty()).then(|| Unstretched {
+        psnr_raw_db: average(all.iter().filter_map(|u| u.psnr_raw_db)),
+        ssim_raw: average(all.iter().filter_map(|u| u.ssim_raw)),
+        psnr_line_db: average(all.iter().filter_map(|u| u.psnr_line_db)),
+    })
+}
+
+/// Means of the figures of one part.
+#[derive(Debug, Serialize)]
+pub(super) struct PartMean {
+    pub(super) psnr_db: Option<f64>,
+    pub(super) ssim: Option<f64>,
+    pub(super) mae_m: Option<f64>,
+    pub(super) bias_m: Option<f64>,
+}
+
+impl PartMean {
+    fn of(pairs: &[Pair], part: fn(&Pair) -> Option<metrics::PixelMetrics>) -> Option<Self> {
+        let all: Vec<metrics::PixelMetrics> = pairs.iter().filter_map(part).collect();
+        let of = |get: fn(&metrics::PixelMetrics) -> Option<f64>| average(all.iter().filter_map(get));
+        (!all.is_empty()).then(|| Self {
+            psnr_db: of(|f| f.psnr_db),
+            ssim: of(|f| f.ssim),
+            mae_m: of(|f| f.mae),
+            bias_m: of(|f| f.bias),
+        })
+    }
+}
+
+pub(super) fn average(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.collect();
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    pub(super) pairs: Vec<Pair>,
+    pub(super) mean: Mean,
+    pub(super) convention: &'static str,
+    pub(super) bundle: String,
+    pub(super) runtime: &'static str,
+    pub(super) sampler: &'static str,
+    pub(super) steps: u32,
+    pub(super) seed: u64,
+    pub(super) guidance: f64,
+    /// What is odd about the files, by kind.
+    pub(super) notes: Vec<Finding>,
+}
+
+/// What PSNR and SSIM mean here.
+pub(super) fn convention(scale: Scale) -> &'static str {
+    match scale {
+        Scale::Measured => "depth in meters, PSNR peak and SSIM range 0.0225 m (the lab's peak)",
+        Scale::Assumed => {
+            "both images stretched to 0..1 one by one, peak and range 1 (the source lost its scale; no noise-free picture passes \
+             20 dB so); raw: as they are, in the assumed meters; line: after the best straight line"
+        }
+    }
+}
+
+pub(super) fn take(pair: &mut Pair, found: &Comparison) {
+    (pair.psnr_db, pair.ssim, pair.unstretched) = (found.psnr_db, found.ssim, found.unstretched);
+    pair.seen = found.split.map(|s| s.seen);
+    pair.invented = found.split.map(|s| s.invented);
+}
+
+pub(super) fn mean(pairs: &[Pair]) -> Mean {
+    let of = |get: fn(&Pair) -> Option<f64>| average(pairs.iter().filter_map(get));
+    Mean {
+        psnr_db: of(|p| p.psnr_db),
+        ssim: of(|p| p.ssim),
+        vqvae_psnr_db: of(|p| p.vqvae_psnr_db),
+        vqvae_ssim: of(|p| p.vqvae_ssim),
+        unstretched: unstretched_mean(pairs.iter().filter_map(|p| p.unstretched)),
+        vqvae: unstretched_mean(pairs.iter().filter_map(|p| p.stored)).map(Into::into),
+        seen: PartMean::of(pairs, |p| p.seen),
+        invented: PartMean::of(pairs, |p| p.invented),
+        ambiguous: pairs.iter().filter(|p| p.ambiguity.is_some_and(|a| a.kind == Touch::BareShaft)).count(),
+        seconds: of(|p| Some(p.seconds)),
+    }
+}
+
+pub(super) fn text(report: &Report) -> String {
+    let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
+    let mut text = format!(
+        "{:<44} {:>8} {:>6} {:>8} {:>8} {:>12} {:>10} {:>8}\n",
+        "pair", "PSNR dB", "SSIM", "seen dB", "inv. dB", "VQ-VAE dB", "VQ-VAE SSIM", "seconds"
+    );
+    let mut line = |name: &str, p: &Mean, note: &str| {
+        let part = |part: &Option<PartMean>| number(part.as_ref().and_then(|p| p.psnr_db), 1);
+        text += &format!(
+            "{name:<44} {:>8} {:>6} {:>8} {:>8} {:>12} {:>10} {:>8}{note}\n",
+            number(p.psnr_db, 1),
+            number(p.ssim, 3),
+            part(&p.seen),
+            part(&p.invented),
+            number(p.vqvae_psnr_db, 1),
+            number(p.vqvae_ssim, 3),
+            number(p.seconds, 2)
+        );
+    };
+    for p in &report.pairs {
+        let name = format!("{} {}", p.name, p.finger);
+        let note = p.ambiguity.and_then(|a| a.caption()).map_or(String::new(), |c| format!("  {c}"));
+        line(&name, &mean(std::slice::from_ref(p)), &note);
+    }
+    line("mean", &report.mean, "");
+    text + &format!(
+        "{}\n{}; seen = inside the GelSlim's footprint, inv. = invented outside it\n{} of {} GelSlim images are ambiguous \
+         (bare shaft); {} steps, seed {}, {} on {}\n",
+        unstretched_text(&report.mean),
+        report.convention,
+        report.mean.ambiguous,
+        report.pairs.len(),
+        report.steps,
+        report.seed,
+        report.bundle,
+        report.runtime
+    )
+}
+
+/// The means that do not stretch, as a line of their own.
+fn unstretched_text(mean: &Mean) -> String {
+    let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
+    let Some(own) = mean.unstretched else { return String::new() };
+    let stored = mean.vqvae.map_or(String::new(), |v| {
+        format!(
+            "; VQ-VAE raw {} dB, SSIM {}, line {} dB",
+            number(v.vqvae_psnr_raw_db, 1),
+            number(v.vqvae_ssim_raw, 3),
+            number(v.vqvae_psnr_line_db, 1)
+        )
+    });
+    format!(
+        "unstretched: raw {} dB, SSIM {}, line {} dB{stored}\n",
+        number(own.psnr_raw_db, 1),
+        number(own.ssim_raw, 3),
+        number(own.psnr_line_db, 1)
+    )
+}

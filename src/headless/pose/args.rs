@@ -1,0 +1,114 @@
+//! The arguments of `pose`.
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
+use strum::IntoEnumIterator as _;
+
+use super::super::args::{DatasetArgs, LimitArgs};
+use super::super::contact_mask::MaskArgs;
+use super::super::predict::ModelArgs;
+use super::super::seeds::{FanArgs, SeedArgs};
+use super::super::{Common, ToolArgs};
+use crate::domain::align::{LabIcpConfig, PaperTrap, Register, lab_starts};
+use crate::domain::frames::PlanarPose;
+use crate::domain::pose::Registration;
+
+/// Arguments of `pose`.
+#[derive(Debug, Args)]
+pub(in crate::headless) struct PoseArgs {
+    #[command(flatten)]
+    pub(super) dataset: DatasetArgs,
+    /// Which imprints to align.
+    #[arg(long, value_enum, default_value_t = Imprints::Measured)]
+    pub(super) imprint: Imprints,
+    #[command(flatten)]
+    pub(super) mask: MaskArgs,
+    #[command(flatten)]
+    pub(super) tool: ToolArgs,
+    /// The registration: the key of one, `default`, `lab` (the paper's), or `all`, one after the other.
+    #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = parse_engines())]
+    pub(super) engine: Engines,
+    /// Start here instead of where the registration would: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as
+    /// `10,0,-2`. Repeat for several.
+    #[arg(long = "start", value_name = "DEG,MM,MM", value_parser = parse_start, allow_hyphen_values = true)]
+    pub(super) starts: Vec<PlanarPose>,
+    /// Give the paper's registration its ten random starts, drawn from this seed.
+    #[arg(long, value_name = "SEED", conflicts_with = "starts")]
+    pub(super) paper_starts: Option<u64>,
+    /// Switch on a trap of the paper's registration: `wrong-frame` (starts are applied in the wrong frame),
+    /// `rmse-choice` (chosen by model-to-contact distance within 15 mm), `fixed-iterations` (no stop test).
+    /// Repeat for several.
+    #[arg(long = "paper-trap", value_name = "TRAP", value_parser = parse_trap)]
+    pub(super) paper_traps: Vec<PaperTrap>,
+    #[command(flatten)]
+    pub(super) limit: LimitArgs,
+    /// Add the whole registration report to each case of the JSON: every start and iteration, and each point's
+    /// residual, weight and fate.
+    #[arg(long)]
+    pub(super) trace: bool,
+    #[command(flatten)]
+    pub(super) ensemble: SeedArgs,
+    #[command(flatten)]
+    pub(super) fans: FanArgs,
+    #[command(flatten)]
+    pub(super) model: ModelArgs,
+    #[command(flatten)]
+    pub(super) common: Common,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Imprints {
+    Measured,
+    Predicted,
+    Both,
+}
+
+/// The registrations to run, in this order.
+#[derive(Debug, Clone)]
+pub(in crate::headless) struct Engines(pub(in crate::headless) Vec<Registration>);
+
+/// Reads the key of a registration, or one of the short names; lists them all in the help.
+pub(in crate::headless) fn parse_engines() -> impl TypedValueParser<Value = Engines> {
+    let mut names = vec![
+        PossibleValue::new("default").help("The same as distance_field"),
+        PossibleValue::new("lab").help("The same as lab_icp"),
+        PossibleValue::new("all").help("All of the following, one after the other"),
+    ];
+    names.extend(Registration::iter().map(|e| PossibleValue::new(e.key()).help(e.description())));
+    PossibleValuesParser::new(names).map(|name| {
+        Engines(match name.as_str() {
+            "default" => vec![Registration::default()],
+            "lab" => vec![Registration::LabIcp],
+            "all" => Registration::iter().collect(),
+            key => key.parse().into_iter().collect(),
+        })
+    })
+}
+
+pub(in crate::headless) fn parse_start(text: &str) -> Result<PlanarPose, String> {
+    let numbers: Vec<f64> =
+        text.split(',').filter_map(|n| n.trim().parse().ok()).filter(|n: &f64| n.is_finite()).collect();
+    let (&[degrees, y_mm, z_mm], 3) = (numbers.as_slice(), text.split(',').count()) else {
+        return Err("three numbers are needed: degrees, millimeters along y, millimeters along z".to_owned());
+    };
+    Ok(PlanarPose { theta_rad: degrees.to_radians(), y_m: y_mm * 1e-3, z_m: z_mm * 1e-3 })
+}
+
+pub(super) fn parse_trap(text: &str) -> Result<PaperTrap, String> {
+    text.parse().map_err(|_| {
+        let names: Vec<&'static str> = PaperTrap::iter().map(Into::into).collect();
+        format!("the traps are {}", names.join(", "))
+    })
+}
+
+/// The registration as the arguments want it.
+pub(super) fn registration(args: &PoseArgs, engine: Registration) -> Box<dyn Register> {
+    if engine != Registration::LabIcp {
+        return engine.method();
+    }
+    let mut config = LabIcpConfig { traps: args.paper_traps.clone(), ..LabIcpConfig::default() };
+    if let Some(seed) = args.paper_starts {
+        config.starts = lab_starts(seed);
+    }
+    Box::new(config)
+}

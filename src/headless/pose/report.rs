@@ -1,0 +1,159 @@
+//! What `pose` answers: the cases, their metrics, and the table.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::super::seeds::PoseFan;
+use crate::domain::align::AlignReport;
+use crate::domain::ambiguity::Ambiguity;
+use crate::domain::findings::Finding;
+use crate::domain::hand::{AcceptedPose, HandPose};
+use crate::domain::metrics::AngleSummary;
+use crate::domain::pose::Registration;
+use crate::domain::rig::PerPad;
+use crate::domain::units::angle_error;
+
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Case {
+    pub(super) name: String,
+    pub(super) engine: &'static str,
+    pub(super) imprint: &'static str,
+    /// What the masks are made of: the source's key, `hand` where one was drawn, `depth` where the mask model found nothing,
+    /// `flat` where the imprint is flat; of both fingers (right, left) where they differ.
+    pub(super) mask: String,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) mask_notes: Vec<String>,
+    pub(super) angle_deg: Option<f64>,
+    pub(super) truth_deg: Option<f64>,
+    pub(super) error_deg: Option<f64>,
+    pub(super) y_m: Option<f64>,
+    pub(super) z_m: Option<f64>,
+    /// Time of the registration, milliseconds; 0 without a pose.
+    pub(super) ms: f64,
+    pub(super) stop: String,
+    /// What a person accepted for this imprint in the studio, where there are labels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) accepted: Option<Accepted>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) report: Option<AlignReport>,
+    /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) ambiguity: Option<PerPad<Ambiguity>>,
+    /// With `--seeds`, for predicted imprints.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) fan: Option<PoseFan>,
+}
+
+/// An accepted pose in the sense of the other numbers of a [`Case`].
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Accepted {
+    /// Whether a person set it, rather than took over what a registration answered.
+    pub(super) by_hand: bool,
+    pub(super) angle_deg: f64,
+    pub(super) error_deg: Option<f64>,
+    pub(super) y_m: f64,
+    pub(super) z_m: f64,
+    /// All six numbers as they are stored.
+    pub(super) grasp_from_object: HandPose,
+}
+
+impl Accepted {
+    pub(super) fn new(accepted: AcceptedPose, truth_rad: Option<f64>) -> Self {
+        let found = accepted.pose.planar.inverse();
+        Self {
+            by_hand: accepted.by_hand,
+            angle_deg: found.theta_rad.to_degrees(),
+            error_deg: truth_rad.map(|t| angle_error(found.theta_rad, t).to_degrees()),
+            y_m: found.y_m,
+            z_m: found.z_m,
+            grasp_from_object: accepted.pose,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct AngleMetrics {
+    #[serde(flatten)]
+    pub(super) angles: AngleSummary,
+    pub(super) median_ms: Option<f64>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Summary {
+    /// The figures of the first engine on the first kind of imprint.
+    #[serde(flatten)]
+    pub(super) first: AngleMetrics,
+    /// `engine` (first kind of imprint) and `engine/imprint` (all): the figures of each.
+    pub(super) engines: BTreeMap<String, AngleMetrics>,
+}
+
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    pub(super) cases: Vec<Case>,
+    pub(super) summary: Summary,
+    /// What is odd about the files and the numbers in them, by kind.
+    pub(super) notes: Vec<Finding>,
+}
+
+pub(super) fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> AngleMetrics {
+    let cases: Vec<&Case> = cases.collect();
+    // A case without truth has no error; one without a pose is a failure.
+    let errors: Vec<f64> =
+        cases.iter().filter(|c| c.truth_deg.is_some()).map(|c| c.error_deg.map_or(f64::NAN, f64::to_radians)).collect();
+    let mut ms: Vec<f64> = cases.iter().map(|c| c.ms).collect();
+    ms.sort_by(f64::total_cmp);
+    let median_ms = (!ms.is_empty()).then(|| 0.5 * (ms[(ms.len() - 1) / 2] + ms[ms.len() / 2]));
+    AngleMetrics { angles: AngleSummary::from_errors(&errors), median_ms }
+}
+
+pub(super) fn summary(cases: &[Case], first_imprint: &str, first_engine: Registration) -> Summary {
+    let of = |engine: &str, imprint: &str| figures(cases.iter().filter(|c| c.engine == engine && c.imprint == imprint));
+    let mut engines = BTreeMap::new();
+    for case in cases {
+        let key = format!("{}/{}", case.engine, case.imprint);
+        if !engines.contains_key(&key) {
+            let figures = of(case.engine, case.imprint);
+            if case.imprint == first_imprint {
+                engines.insert(case.engine.to_owned(), figures.clone());
+            }
+            engines.insert(key, figures);
+        }
+    }
+    Summary { first: of(first_engine.key(), first_imprint), engines }
+}
+
+pub(super) fn text(report: &Report) -> String {
+    let number = |v: Option<f64>| v.map_or("      -".to_owned(), |v| format!("{v:7.2}"));
+    let mut text = format!("{:<44} {:>9} {:>9} {:>9}  mask, stop\n", "pair", "angle °", "truth °", "error °");
+    for c in &report.cases {
+        text += &format!(
+            "{:<44} {:>9} {:>9} {:>9}  {}/{}/{}: {}\n",
+            c.name,
+            number(c.angle_deg),
+            number(c.truth_deg),
+            number(c.error_deg),
+            c.engine,
+            c.imprint,
+            c.mask,
+            c.stop
+        );
+    }
+    text += &format!(
+        "\n{:<28} {:>5} {:>9} {:>9} {:>7} {:>7} {:>10}\n",
+        "engine/imprint", "n", "mean °", "median °", "<=5° %", "<=10° %", "median ms"
+    );
+    for (key, f) in report.summary.engines.iter().filter(|(k, _)| k.contains('/')) {
+        let a = f.angles;
+        text += &format!(
+            "{key:<28} {:>5} {:>9} {:>9} {:>7.1} {:>7.1} {:>10}\n",
+            a.count,
+            number(a.mean_deg),
+            number(a.median_deg),
+            a.success_5,
+            a.success_10,
+            f.median_ms.map_or("-".to_owned(), |v| format!("{v:.3}"))
+        );
+    }
+    text
+}

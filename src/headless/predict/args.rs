@@ -1,0 +1,145 @@
+//! Which models are used, and how they are run, as the command line says it.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use strum::IntoEnumIterator as _;
+
+use super::super::args::keyed;
+use crate::domain::diffusion::{GUIDANCE, Preset, Sampler};
+use crate::domain::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
+use crate::infer::engine::EngineChoice;
+
+/// Which models, and how they are run.
+#[derive(Debug, Clone, Args)]
+pub(in crate::headless) struct ModelArgs {
+    /// The generator's bundle (default: the shipped one).
+    #[arg(long)]
+    pub(super) bundle: Option<PathBuf>,
+    /// The mask model's bundle (default: the shipped one).
+    #[arg(long)]
+    pub(super) mask_bundle: Option<PathBuf>,
+    /// How good: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below
+    /// change single numbers of it.
+    #[arg(long, value_parser = keyed::<Preset>(), default_value = Preset::default().key())]
+    pub(super) preset: Preset,
+    /// Sampling steps (default: the preset's).
+    #[arg(long)]
+    pub(super) steps: Option<u32>,
+    /// Seed of the noise (default: the bundle's).
+    #[arg(long)]
+    pub(super) seed: Option<u64>,
+    /// Share of fresh noise per step, 0 to 1, for DDIM (default: the preset's).
+    #[arg(long)]
+    pub(super) eta: Option<f64>,
+    /// Scale of classifier-free guidance, 1 for none; only for a bundle that was trained for it (default: the bundle's).
+    #[arg(long, value_parser = guidance)]
+    pub(super) guidance: Option<f64>,
+    /// The training steps visited: `trailing` starts at the noisiest, `lab` is the public release's (default: the
+    /// preset's).
+    #[arg(long, value_enum)]
+    pub(super) spacing: Option<SpacingArg>,
+    /// The way from noise to an image (default: the preset's).
+    #[arg(long, value_parser = keyed::<Sampler>())]
+    pub(super) sampler: Option<Sampler>,
+    /// How the decoder's output becomes meters.
+    #[arg(long, value_enum, default_value_t = AnyShiftArg::Exact)]
+    pub(super) shift: AnyShiftArg,
+    /// What of the fit of a bundle to a rig is applied with `--shift exact`: `all`, `none`, or some of offset, field, gain,
+    /// response, separated by commas.
+    #[arg(long, value_name = "PARTS", default_value = "all", value_parser = fit_parts)]
+    pub(super) fit_parts: CorrectionParts,
+    /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
+    #[arg(long, value_name = "FILE")]
+    pub(super) stats: Option<PathBuf>,
+    /// The engine that runs the models.
+    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    pub(super) runtime: RuntimeArg,
+    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
+    #[arg(long)]
+    pub(super) no_cache: bool,
+}
+
+fn fit_parts(text: &str) -> Result<CorrectionParts, String> {
+    match text {
+        "all" => Ok(CorrectionParts::ALL),
+        "none" => Ok(CorrectionParts::NONE),
+        list => {
+            let part = |name: &str| {
+                name.trim().parse::<CorrectionPart>().map_err(|_| {
+                    let names: Vec<&str> = CorrectionPart::iter().map(Into::into).collect();
+                    format!("\"{name}\" is no part of a fit; there are {}", names.join(", "))
+                })
+            };
+            Ok(list.split(',').map(part).collect::<Result<Vec<_>, _>>()?.into())
+        }
+    }
+}
+
+pub(super) fn guidance(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|scale| GUIDANCE.contains(scale));
+    value.ok_or_else(|| format!("choose {} to {}; 1 is none", GUIDANCE.start(), GUIDANCE.end()))
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum SpacingArg {
+    /// From the noisiest training step on.
+    Trailing,
+    /// The public latent-diffusion release's.
+    Lab,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(in crate::headless) enum ShiftArg {
+    /// What the lab's released script saves: its range is mapped twice.
+    Raw,
+    /// The paper's mean-and-deviation shift of that.
+    Paper,
+    /// The doubled mapping undone exactly.
+    Exact,
+}
+
+/// [`ShiftArg`] where statistics of a dataset can be named.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(in crate::headless) enum AnyShiftArg {
+    /// What the lab's released script saves: its range is mapped twice.
+    Raw,
+    /// The paper's mean-and-deviation shift of that.
+    Paper,
+    /// The doubled mapping undone exactly.
+    Exact,
+    /// The paper's shift by the statistics of a dataset (see --stats).
+    Refit,
+}
+
+impl ShiftArg {
+    /// The reading of the decoder's output.
+    pub(in crate::headless) fn mode(self) -> ShiftMode {
+        match self {
+            ShiftArg::Raw => ShiftMode::Raw,
+            ShiftArg::Paper => ShiftMode::PaperShift,
+            ShiftArg::Exact => ShiftMode::ExactInverse,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(in crate::headless) enum RuntimeArg {
+    /// ONNX Runtime where its library is found, else the built-in engine.
+    Auto,
+    /// The built-in engine.
+    Rten,
+    /// ONNX Runtime.
+    Ort,
+}
+
+impl RuntimeArg {
+    /// The choice for the engines.
+    pub(in crate::headless) fn choice(self) -> EngineChoice {
+        match self {
+            RuntimeArg::Auto => EngineChoice::Auto,
+            RuntimeArg::Rten => EngineChoice::Rten,
+            RuntimeArg::Ort => EngineChoice::Ort,
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! Fitting a generator to pairs of a real rig, with the score that it earns on pairs it was not fitted to: [`adapt`].
+
+mod gather;
+mod pose;
+mod score;
+#[cfg(feature = "tune")]
+mod tune;
+mod write;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::bundles::BundleInfo;
+use super::error::TaskError;
+use super::job::JobCx;
+use super::mask::MaskChoice;
+use super::models::Models;
+use crate::domain::dataset::PairId;
+use crate::domain::diffusion::GenerateConfig;
+use crate::domain::fit::{FitError, FitSource, Fitted, PadFit, closed_form, doubts, folds, left_out};
+use crate::domain::grid::{DepthMap, Grid};
+use crate::domain::lattice::template;
+use crate::domain::postprocess::Correction;
+use crate::domain::rig::{PerPad, Rig};
+use crate::domain::sample::Scale;
+use crate::infer::bundle::Role;
+use crate::infer::engine::EngineChoice;
+use crate::io::dataset::Dataset;
+use crate::io::memory::peak_mib;
+
+use gather::{Touch, gather};
+pub use score::Scored;
+
+const WHAT: &str = "Fit the model to pairs";
+/// Fewer pairs leave ghosts of the training shapes in the predictions.
+pub const ENOUGH_PAIRS: usize = 10;
+/// A smaller gain is none.
+const LEAST_GAIN_DB: f64 = 0.2;
+/// Most touches that a closed form takes; more change nothing and fill the memory.
+const MOST_TOUCHES: usize = 1500;
+
+/// What is fitted, to what, and how it is tried.
+#[derive(Clone, Debug)]
+pub struct AdaptSetup {
+    /// The generator; it stays as it is.
+    pub bundle: BundleInfo,
+    /// The engine that runs it.
+    pub engine: EngineChoice,
+    /// How it generates.
+    pub config: GenerateConfig,
+    /// The pairs.
+    pub pairs: Vec<PairId>,
+    /// In how many parts the pairs are left out in turn; whole tools where three are known.
+    pub folds: usize,
+    /// How contact is found where the data have poses, and with which model.
+    pub mask: (MaskChoice, Option<BundleInfo>),
+    /// Steps of tuning the networks themselves after the closed form, for each part that is left out and for all; 0 is
+    /// none.
+    pub steps: u32,
+    /// The folder of the new bundle; `None` only tries.
+    pub out: Option<PathBuf>,
+}
+
+/// A pair that is not in the fit, or that speaks against the others.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Remark {
+    /// The pair.
+    pub name: String,
+    /// What is the matter.
+    pub why: String,
+}
+
+/// A fit with what it is worth.
+#[derive(Clone, Debug, Serialize)]
+pub struct Adapted {
+    /// Pairs it was made from.
+    pub pairs: usize,
+    /// Touches (fingers) of these.
+    pub touches: usize,
+    /// Pairs that could not be used.
+    pub left_out: Vec<Remark>,
+    /// Pairs that contradict the rest: they are in the fit, and worth a look.
+    pub doubtful: Vec<Remark>,
+    /// The unfitted model on all touches.
+    pub before: Scored,
+    /// The closed form on touches that it was not fitted to.
+    pub closed_form: Option<Scored>,
+    /// The tuned networks, likewise; `None` where nothing was tuned.
+    pub after: Option<Scored>,
+    /// Steps of tuning.
+    pub steps: u32,
+    /// Time of everything, seconds.
+    pub seconds: f64,
+    /// Time of the fit alone, seconds.
+    pub fit_seconds: f64,
+    /// The most memory that the program had so far, MiB, where the system tells.
+    pub peak_mib: Option<u64>,
+    /// What was found for each pad.
+    pub pads: Vec<PadSummary>,
+    /// What to be careful about.
+    pub warnings: Vec<String>,
+    /// The new bundle.
+    pub bundle: Option<PathBuf>,
+}
+
+/// What was found for a pad.
+#[derive(Clone, Debug, Serialize)]
+pub struct PadSummary {
+    /// The pad's name.
+    pub pad: String,
+    /// Touches.
+    pub touches: usize,
+    /// `[right, down]` in pixels of the decoder's picture.
+    pub offset_px: [f64; 2],
+    /// Gain of the straight line.
+    pub gain: f64,
+    /// Its offset, meters.
+    pub offset_m: f64,
+}
+
+/// Predicts the pairs, fits the closed form, tries it on what was left out, and writes the new bundle.
+///
+/// # Errors
+/// If the job was told to stop, the bundle is no depth generator or does not fit the data, no pair can be used, or the
+/// new bundle cannot be written.
+pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx) -> Result<Adapted, TaskError> {
+    let begin = Instant::now();
+    let fail = |err: FitError| TaskError::from_error(WHAT, &err);
+    if let Some(out) = &setup.out {
+        write::check_folder(out, &setup.bundle)?;
+    }
+    let gather::Gathered { touches, mut left_out, grouped } = gather(dataset, setup, models, cx)?;
+    cx.progress(0, 0, "fitting");
+    let fitting = Instant::now();
+    let cases: Vec<_> = touches.iter().map(Touch::case).collect();
+    let pads = dataset.rig.pads().len();
+    let corrections = closed_form(&cases, pads).map_err(fail)?;
+    let fit_seconds = fitting.elapsed().as_secs_f64();
+    cx.check(WHAT)?;
+    cx.progress(0, 0, "trying the fit on pairs that were left out");
+    let tools: Vec<Option<&str>> = touches.iter().map(|t| t.tool.as_deref()).collect();
+    let grasps: Vec<u32> = touches.iter().map(|t| t.id.0).collect();
+    let folds = folds(&tools, &grasps, setup.folds.max(2));
+    let made = self::left_out(&cases, pads, &folds).map_err(fail)?;
+    cx.check(WHAT)?;
+    let plain: Vec<Option<&Grid<f32>>> = touches.iter().map(|t| Some(&t.prediction)).collect();
+    let unseen: Vec<Option<&Grid<f32>>> = made.iter().map(Option::as_ref).collect();
+    let mut before = score::scored(&touches, &plain, &dataset.rig)?;
+    let mut closed = score::scored(&touches, &unseen, &dataset.rig)?;
+    if let (Some(before), Some(closed)) = (&mut before, &mut closed) {
+        before.angle = pose::angles(dataset, setup, models, &touches, &plain, cx)?;
+        closed.angle = pose::angles(dataset, setup, models, &touches, &unseen, cx)?;
+    }
+    let before = before.ok_or_else(|| TaskError::new(WHAT, "no picture could be compared with its measurement"))?;
+    let names: std::collections::BTreeSet<&str> = touches.iter().map(|t| t.name.as_str()).collect();
+    let doubtful = doubts(&cases, &made).into_iter().map(|doubt| remark(&touches, &doubt)).collect();
+    let mut warnings = Vec::new();
+    if names.len() < ENOUGH_PAIRS {
+        warnings.push(format!(
+            "{} pairs are few: with fewer than {ENOUGH_PAIRS} the shapes that the model was trained on show through; \
+             expect about 1.5 dB less than with thirty",
+            names.len()
+        ));
+    }
+    let gain = closed.as_ref().and_then(|closed| Some(closed.psnr_db? - before.psnr_db?));
+    if gain.is_some_and(|gain| gain < LEAST_GAIN_DB) {
+        warnings.push(
+            "on pairs that were left out the closed form is no better than the model as it is: these sensors need no fit, or \
+             more pairs"
+                .into(),
+        );
+    }
+    if grouped {
+        warnings.push(
+            "the pictures do not say which finger they are of: two lattices of markers were found, and named by where \
+             their windows lie"
+                .into(),
+        );
+    }
+    let mut graphs = BTreeMap::new();
+    let mut corrections = corrections;
+    let mut after = None;
+    if setup.steps > 0 {
+        let tuned = tuned(setup, &touches, &corrections, &folds, &dataset.rig, cx)?;
+        let unseen: Vec<Option<&Grid<f32>>> = tuned.2.iter().map(Option::as_ref).collect();
+        after = score::scored(&touches, &unseen, &dataset.rig)?;
+        if let Some(after) = &mut after {
+            after.angle = pose::angles(dataset, setup, models, &touches, &unseen, cx)?;
+        }
+        (graphs, corrections) = (tuned.0, tuned.1);
+    }
+    let fitted = Fitted { source: source(dataset, setup, &touches), pads: with_lattices(&touches, corrections) };
+    let summary = fitted.pads.entries().map(|(pad, fit)| PadSummary {
+        pad: dataset.rig.pad_key(pad).into_owned(),
+        touches: touches.iter().filter(|t| t.pad == pad).count(),
+        offset_px: fit.correction.offset_px,
+        gain: fit.correction.line[0],
+        offset_m: fit.correction.line[1],
+    });
+    let pads = summary.collect();
+    let bundle = setup
+        .out
+        .as_deref()
+        .map(|out| write::bundle(out, &setup.bundle, &dataset.rig, &fitted, &graphs))
+        .transpose()?;
+    left_out.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(Adapted {
+        pairs: names.len(),
+        touches: touches.len(),
+        left_out,
+        doubtful,
+        before,
+        closed_form: closed,
+        after,
+        steps: setup.steps,
+        seconds: begin.elapsed().as_secs_f64(),
+        fit_seconds,
+        peak_mib: peak_mib(),
+        pads,
+        warnings,
+        bundle: bundle.map(Path::to_owned),
+    })
+}
+
+/// Graphs, corrections, and what networks that were tuned without them make of the touches.
+type TunedParts = (BTreeMap<Role, Vec<u8>>, Vec<Option<Correction>>, Vec<Option<DepthMap>>);
+
+#[cfg(feature = "tune")]
+fn tuned(
+    setup: &AdaptSetup,
+    touches: &[Touch],
+    corrections: &[Option<Correction>],
+    folds: &[usize],
+    rig: &Rig,
+    cx: &JobCx,
+) -> Result<TunedParts, TaskError> {
+    let tune::TunedModel { graphs, corrections, left_out } = tune::tune(setup, touches, corrections, folds, rig, cx)?;
+    Ok((graphs, corrections, left_out))
+}
+
+#[cfg(not(feature = "tune"))]
+fn tuned(
+    _: &AdaptSetup,
+    _: &[Touch],
+    _: &[Option<Correction>],
+    _: &[usize],
+    _: &Rig,
+    _: &JobCx,
+) -> Result<TunedParts, TaskError> {
+    Err(TaskError::new(WHAT, "this program was built without tuning").with_hint("Fit in closed form."))
+}
+
+fn source(dataset: &Dataset, setup: &AdaptSetup, touches: &[Touch]) -> FitSource {
+    let mut pairs: Vec<String> = touches.iter().map(|t| t.name.clone()).collect();
+    pairs.dedup();
+    FitSource {
+        data: dataset.title.clone(),
+        rig: dataset.rig.name.clone().into_owned(),
+        scale: touches.first().map_or(Scale::Measured, |t| t.scale),
+        pairs,
+        from: setup.bundle.name.clone(),
+        from_sha256: setup.bundle.id.to_string(),
+    }
+}
+
+/// The corrections with what the lattice of each pad looks like, where pictures were fitted.
+fn with_lattices(touches: &[Touch], corrections: Vec<Option<Correction>>) -> PerPad<PadFit> {
+    let with = |(pad, correction): (usize, Option<Correction>)| {
+        let own = touches.iter().filter(|t| t.pad.index() == pad && t.scale == Scale::Assumed);
+        let signatures: Vec<&Grid<f32>> = own.filter_map(|t| t.signature.as_ref()).collect();
+        Some(PadFit { correction: correction?.into(), lattice: template(&signatures) })
+    };
+    corrections.into_iter().enumerate().map(with).collect()
+}
+
+fn remark(touches: &[Touch], doubt: &crate::domain::fit::Doubt) -> Remark {
+    let mut why = format!(
+        "the others expect something else: off by {:.2} mm where half of the pairs are off by less than {:.2} mm",
+        doubt.residual_m * 1e3,
+        doubt.median_m * 1e3
+    );
+    if let Some(partner) = doubt.partner {
+        why += &format!("; its measurement is much nearer to the GelSlim image of {}", touches[partner].name);
+    }
+    if let Some(turn) = &doubt.turn {
+        why += &format!("; {turn}, its measurement would be much nearer");
+    }
+    Remark { name: touches[doubt.case].name.clone(), why }
+}

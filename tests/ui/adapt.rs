@@ -1,0 +1,47 @@
+//! The fit to one's own pairs in the studio, with the shipped models on a few simulated grasps.
+
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::command::{Pane, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::library::Place;
+use touch2touch::app::settings::Workspace;
+use touch2touch::work::bundles::BundleKind;
+
+use super::rig::{Rig, write_dataset};
+
+#[test]
+fn the_model_is_fitted_by_a_click_scored_and_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("grasps");
+    write_dataset(&data, 3);
+    let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data)) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
+    rig.shoot("fit-before");
+    let shipped = rig.harness.state().state().bundle(BundleKind::Generator).unwrap().clone();
+    assert!(!shipped.is_fitted() && rig.harness.state().state().fitted().is_none());
+
+    rig.harness.get_all_by_label("Fit to my pairs").next().unwrap().click();
+    rig.harness.step();
+    rig.settle();
+    let found = rig.harness.state().state().adapt.result.clone().expect("the fit is there");
+    assert_eq!((found.pairs, found.touches, found.pads.len()), (6, 12, 2), "{found:?}");
+    let closed = found.closed_form.as_ref().unwrap();
+    assert!(closed.angle.is_some() && closed.psnr_db.unwrap() > 20.0, "{found:?}");
+    rig.harness.get_by_label("Fitted (closed form)");
+    rig.harness.get_by_label_contains("6 pairs are few");
+    // What was simulated lies where the model expects it.
+    rig.harness.get_by_label_contains("need no fit");
+    rig.shoot("fit-after");
+    // Fitted, but not taken yet.
+    assert_eq!(rig.harness.state().state().bundle(BundleKind::Generator).unwrap().id, shipped.id);
+    rig.harness.get_by_label("Use the fitted model").click();
+    rig.harness.step();
+    rig.settle();
+    let state = rig.harness.state().state();
+    let now = state.bundle(BundleKind::Generator).unwrap();
+    assert!(
+        now.is_fitted() && now.name.contains("fitted to") && Some(now.id.as_ref()) == state.fitted().map(|f| &*f.id)
+    );
+    rig.shoot("fit-used");
+}

@@ -1,0 +1,87 @@
+//! [`Error`]: why something cannot be tuned.
+
+/// Why something cannot be tuned.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A graph's file cannot be read.
+    #[error("{network}: not an ONNX file that can be tuned: {why}")]
+    Onnx {
+        /// Which network.
+        network: &'static str,
+        /// What is wrong.
+        why: String,
+    },
+    /// The network lacks a weight of the architecture.
+    #[error("{network}: the weight \"{weight}\" is missing: this is not the architecture that can be tuned")]
+    Missing {
+        /// Which network.
+        network: &'static str,
+        /// The weight's name.
+        weight: String,
+    },
+    /// The network has a weight that the architecture lacks.
+    #[error("{network}: the weight \"{weight}\" has no place in the architecture that can be tuned")]
+    Unknown {
+        /// Which network.
+        network: &'static str,
+        /// The weight's name.
+        weight: String,
+    },
+    /// A weight has another shape than its neighbors ask for.
+    #[error("{network}: the weight \"{weight}\" has the shape {found:?} where {expected:?} is needed")]
+    Shape {
+        /// Which network.
+        network: &'static str,
+        /// The weight's name.
+        weight: String,
+        /// As in the file.
+        found: Vec<usize>,
+        /// As the architecture asks for.
+        expected: Vec<usize>,
+    },
+    /// What is given beside the networks does not fit them.
+    #[error("{what}: {why}")]
+    Start {
+        /// Which value.
+        what: &'static str,
+        /// What is wrong.
+        why: String,
+    },
+    /// A setting is out of its range.
+    #[error("the setting \"{setting}\" is {found}; it must be {must}")]
+    Config {
+        /// Its name.
+        setting: &'static str,
+        /// Its value.
+        found: String,
+        /// What is allowed.
+        must: &'static str,
+    },
+    /// There is nothing to learn from.
+    #[error("there are no pairs to tune on")]
+    NoPairs,
+    /// A pair cannot be learned from.
+    #[error("pair {index}: {why}")]
+    Pair {
+        /// Its place among the pairs, from 0.
+        index: usize,
+        /// What is wrong.
+        why: String,
+    },
+    /// The loss left the numbers; the weights are those of the step before.
+    #[error("step {step}: the loss is no longer a number; lower the rates, or look for a broken pair")]
+    Diverged {
+        /// Counted from 1.
+        step: usize,
+    },
+    /// All steps of the plan are done.
+    #[error("all {0} steps are done")]
+    Done(usize),
+    /// A saved state does not fit, or is damaged.
+    #[error("the saved state cannot be used: {0}")]
+    State(&'static str),
+}
+
+/// What may go wrong, as the crate's functions return it.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,40 @@
+//! Fine-tuning on a CPU, inside the program: the shipped generator learns a sensor from a few measured pairs.
+//!
+//! [`Tuner`] is the whole of it: it takes a bundle's three graphs ([`Start`]) and [`Pair`]s, makes one step at a time,
+//! and gives the graphs back with other weights in them, together with what lies behind the decoder ([`Placement`]).
+//!
+//! Below it, nothing knows of the generator: [`trainer::Trainer`] descends any [`trainer::Objective`] over named weights
+//! ([`params::Params`]) that [`onnx::Onnx`] reads and writes; [`tape`] differentiates, [`ops`] and [`optim`] do the
+//! arithmetic, [`state`] keeps a run across a stop. A further network is one more file in [`nets`] and an objective of its own.
+//!
+//! Results are the same to the last bit from run to run and whatever the number of threads; kinds of processors differ
+//! in the last digits.
+
+mod augment;
+mod closed_form;
+mod config;
+mod error;
+mod image;
+pub mod nets;
+pub mod onnx;
+pub mod ops;
+pub mod optim;
+mod pair;
+pub mod params;
+pub mod random;
+mod recipe;
+pub mod state;
+pub mod tape;
+pub mod trainer;
+mod tuner;
+
+pub use augment::Augment;
+pub use closed_form::Placement;
+pub use config::{Config, Trained};
+pub use error::{Error, Result};
+pub use pair::Pair;
+pub use trainer::StepReport;
+pub use tuner::{NoiseSchedule, Query, Sampler, Start, Tuned, Tuner};
+
+#[cfg(test)]
+mod fixture;

@@ -1,0 +1,121 @@
+//! [`placed`]: a drawn picture as a pad's sensor sees it: through a line, moved, with a field on top.
+
+use crate::image::{Tap, taps};
+use crate::tape::Tensor;
+
+/// Pictures `[n, side, side]` through the line `[2]` (factor and offset), moved by their pad's shift (of `[pads, 2]`, rows
+/// and columns, pixels; interpolated linearly, the border repeated), plus their pad's field (of `[pads, side · side]`).
+/// A picture without a pad stays as it is.
+pub fn placed(drawn: &Tensor, line: &Tensor, shifts: &Tensor, fields: &Tensor, pads: &[Option<usize>]) -> Tensor {
+    let [_, side, _] = drawn.dims();
+    let pixels = side * side;
+    let mut values = drawn.values().to_vec();
+    for (seen, pad) in values.chunks_exact_mut(pixels).zip(pads) {
+        let Some(pad) = *pad else { continue };
+        let at = Place::new(side, shifts.values(), pad);
+        let lined: Vec<f32> = seen.iter().map(|v| v * line.values()[0] + line.values()[1]).collect();
+        let moved = at.down(&at.across(&lined));
+        let field = &fields.values()[pad * pixels..][..pixels];
+        seen.iter_mut().zip(moved).zip(field).for_each(|((seen, moved), field)| *seen = moved + field);
+    }
+    let (of_drawn, of_line, of_shifts) = (drawn.shared(), line.shared(), shifts.shared());
+    let pads = pads.to_vec();
+    let sizes = [shifts.values().len(), fields.values().len()];
+    let inputs = [drawn, line, shifts, fields];
+    Tensor::made(inputs, drawn.shape(), values, move |slope, [to_drawn, to_line, to_shifts, to_fields], slopes| {
+        let mut found =
+            Found { drawn: slope, line: [0.0; 2], shifts: vec![0.0; sizes[0]], fields: vec![0.0; sizes[1]] };
+        for (item, pad) in pads.iter().enumerate() {
+            if let Some(pad) = *pad {
+                let range = item * pixels..(item + 1) * pixels;
+                found.follow(range.clone(), &of_drawn[range], &of_line, &Place::new(side, &of_shifts, pad), pad);
+            }
+        }
+        slopes.add(to_drawn, || found.drawn);
+        slopes.add(to_line, || found.line.iter().map(|&v| v as f32).collect());
+        slopes.add(to_shifts, || found.shifts);
+        slopes.add(to_fields, || found.fields);
+    })
+}
+
+/// Where each row and column reads.
+struct Place {
+    side: usize,
+    rows: Vec<Tap>,
+    columns: Vec<Tap>,
+}
+
+impl Place {
+    fn new(side: usize, shifts: &[f32], pad: usize) -> Self {
+        let taps = |axis: usize| taps(side, f64::from(shifts[2 * pad + axis]));
+        Self { side, rows: taps(0), columns: taps(1) }
+    }
+
+    fn across(&self, image: &[f32]) -> Vec<f32> {
+        let rows = image.chunks_exact(self.side);
+        rows.flat_map(|row| self.columns.iter().map(|tap| tap.between(row[tap.low], row[tap.low + 1]))).collect()
+    }
+
+    fn down(&self, image: &[f32]) -> Vec<f32> {
+        let mut moved = Vec::with_capacity(image.len());
+        for tap in &self.rows {
+            let (upper, lower) = self.two_rows(image, tap);
+            moved.extend(upper.iter().zip(lower).map(|(&upper, &lower)| tap.between(upper, lower)));
+        }
+        moved
+    }
+
+    fn two_rows<'a>(&self, image: &'a [f32], tap: &Tap) -> (&'a [f32], &'a [f32]) {
+        image[tap.low * self.side..][..2 * self.side].split_at(self.side)
+    }
+}
+
+/// Slopes along the inputs; that along the drawn pictures begins as the one along the result.
+struct Found {
+    drawn: Vec<f32>,
+    line: [f64; 2],
+    shifts: Vec<f32>,
+    fields: Vec<f32>,
+}
+
+impl Found {
+    /// Takes one picture's slope back.
+    fn follow(&mut self, range: std::ops::Range<usize>, drawn: &[f32], line: &[f32], at: &Place, pad: usize) {
+        let side = at.side;
+        let slope = &mut self.drawn[range];
+        let field = &mut self.fields[pad * side * side..][..side * side];
+        field.iter_mut().zip(slope.iter()).for_each(|(field, slope)| *field += slope);
+
+        let lined: Vec<f32> = drawn.iter().map(|v| v * line[0] + line[1]).collect();
+        let across = at.across(&lined);
+        // Moving on by a shift reads further back: hence the minus.
+        let mut along_across = vec![0.0; slope.len()];
+        let mut down = 0.0f64;
+        for (tap, slope) in at.rows.iter().zip(slope.chunks_exact(side)) {
+            let (upper, lower) = at.two_rows(&across, tap);
+            let (to_upper, to_lower) = along_across[tap.low * side..][..2 * side].split_at_mut(side);
+            for (x, &slope) in slope.iter().enumerate() {
+                to_upper[x] += slope * (1.0 - tap.part);
+                to_lower[x] += slope * tap.part;
+                down -= f64::from(slope * (lower[x] - upper[x]) * tap.inside);
+            }
+        }
+        let mut right = 0.0f64;
+        slope.fill(0.0);
+        let rows = slope.chunks_exact_mut(side).zip(lined.chunks_exact(side)).zip(along_across.chunks_exact(side));
+        for ((to, lined), along) in rows {
+            for (tap, &along) in at.columns.iter().zip(along) {
+                to[tap.low] += along * (1.0 - tap.part);
+                to[tap.low + 1] += along * tap.part;
+                right -= f64::from(along * (lined[tap.low + 1] - lined[tap.low]) * tap.inside);
+            }
+        }
+        self.shifts[2 * pad] += down as f32;
+        self.shifts[2 * pad + 1] += right as f32;
+        for (slope, drawn) in slope.iter_mut().zip(drawn) {
+            self.line[0] += f64::from(*slope * drawn);
+            self.line[1] += f64::from(*slope);
+            *slope *= line[0];
+        }
+    }
+}

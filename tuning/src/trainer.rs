@@ -1,0 +1,192 @@
+//! [`Trainer`]: descends any [`Objective`], whatever network it is about.
+//!
+//! A batch comes in parts of fixed size. Each has a graph of its own, several run side by side, and what they return is
+//! added in their order: the result does not depend on how many cores there are.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+use crate::error::{Error, Result};
+use crate::optim::{AdamW, Average, Ramp, Rate, norm};
+use crate::params::{Leaves, Params};
+use crate::tape::{Tensor, backward};
+
+/// What is to be made small.
+pub trait Objective: Sync {
+    /// A part of a batch, ready to be run.
+    type Part: Send;
+
+    /// How fast an array learns; `None` for one that stays as it is.
+    fn rate(&self, name: &str) -> Option<Rate>;
+
+    /// How many parts the batch of a step has.
+    fn parts(&self, step: usize) -> usize;
+
+    /// A part of the batch of a step, counted from 0. Depends on nothing but its arguments.
+    fn part(&self, step: usize, part: usize) -> Self::Part;
+
+    /// The part's share of the loss: the sum over the parts is the loss of the batch.
+    fn loss(&self, leaves: &Leaves<'_>, part: Self::Part) -> Tensor;
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepReport {
+    /// Steps done, this one included.
+    pub step: usize,
+    /// The loss before the step.
+    pub loss: f32,
+    /// The length of its gradient.
+    pub gradient: f32,
+    /// How long it took.
+    pub seconds: f64,
+}
+
+/// How the descent is run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Rates over time, and the number of steps.
+    pub ramp: Ramp,
+    /// Longest gradient.
+    pub clip: f32,
+    /// Threads; the result does not depend on them.
+    pub threads: usize,
+}
+
+/// Weights on their way down.
+#[derive(Debug)]
+pub struct Trainer<O> {
+    objective: O,
+    plan: Plan,
+    rates: Vec<Option<Rate>>,
+    start: Params,
+    pub(crate) params: Params,
+    pub(crate) average: Average,
+    pub(crate) optimizer: AdamW,
+    pub(crate) step: usize,
+    workers: Workers,
+}
+
+type Gradient = Vec<Option<Vec<f32>>>;
+
+impl<O: Objective> Trainer<O> {
+    /// Before the first step.
+    pub fn new(objective: O, start: Params, plan: Plan) -> Self {
+        let rates: Vec<Option<Rate>> = start.entries().iter().map(|entry| objective.rate(&entry.name)).collect();
+        let (optimizer, average) = (AdamW::new(&start, &rates), Average::new(&start));
+        let workers = Workers::new(plan.threads);
+        Self { objective, plan, rates, params: start.clone(), start, average, optimizer, step: 0, workers }
+    }
+
+    /// What is made small.
+    pub fn objective(&self) -> &O {
+        &self.objective
+    }
+
+    /// The running mean of the weights: what the descent is for.
+    pub fn average(&self) -> &Params {
+        self.average.params()
+    }
+
+    /// Steps done.
+    pub fn steps_done(&self) -> usize {
+        self.step
+    }
+
+    /// One step down.
+    ///
+    /// # Errors
+    /// [`Error::Done`] after the last one, and [`Error::Diverged`] where the loss is not a number. The weights are then
+    /// those of the step before.
+    pub fn step(&mut self) -> Result<StepReport> {
+        if self.step >= self.plan.ramp.steps {
+            return Err(Error::Done(self.plan.ramp.steps));
+        }
+        let began = Instant::now();
+        let (loss, gradient) = self.slope();
+        let length = norm(&gradient);
+        if !(loss.is_finite() && length.is_finite()) {
+            return Err(Error::Diverged { step: self.step + 1 });
+        }
+        let factor = self.plan.ramp.factor(self.step);
+        self.optimizer.step(&mut self.params, &self.start, &gradient, &self.rates, factor, self.plan.clip);
+        self.average.add(&self.params, self.step);
+        self.step += 1;
+        let seconds = began.elapsed().as_secs_f64();
+        Ok(StepReport { step: self.step, loss, gradient: length as f32, seconds })
+    }
+
+    /// Loss of the next step's batch, and its gradient.
+    pub(crate) fn slope(&self) -> (f32, Gradient) {
+        let run = |part: usize| {
+            let leaves = self.params.leaves(|name| self.objective.rate(name).is_some());
+            let loss = self.objective.loss(&leaves, self.objective.part(self.step, part));
+            (loss.values()[0], leaves.gradient(backward(&loss)))
+        };
+        let mut results = self.workers.run(self.objective.parts(self.step), run).into_iter();
+        let Some((mut loss, mut sum)) = results.next() else { return (0.0, vec![None; self.params.len()]) };
+        for (value, gradient) in results {
+            loss += value;
+            for (sum, part) in sum.iter_mut().zip(gradient) {
+                add(sum, part);
+            }
+        }
+        (loss, sum)
+    }
+
+    /// Runs the numbers below `count` on the threads of the steps; results come in the order of the numbers.
+    pub fn side_by_side<T: Send>(&self, count: usize, act: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        self.workers.run(count, act)
+    }
+}
+
+fn add(sum: &mut Option<Vec<f32>>, part: Option<Vec<f32>>) {
+    match (sum, part) {
+        (Some(sum), Some(part)) => sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part),
+        (sum @ None, part) => *sum = part,
+        (Some(_), None) => {}
+    }
+}
+
+/// Pools of one thread each, so that a matrix product within a part stays on its thread.
+#[derive(Debug)]
+struct Workers {
+    pools: Vec<rayon::ThreadPool>,
+}
+
+impl Workers {
+    fn new(threads: usize) -> Self {
+        let pool = |_| {
+            let builder = rayon::ThreadPoolBuilder::new().num_threads(1).thread_name(|_| "tuning".to_owned());
+            builder.build().expect("the system gives another thread")
+        };
+        Self { pools: (0..threads.max(1)).map(pool).collect() }
+    }
+
+    /// Runs the numbers below `count`, as many at a time as there are workers; results come in the order of the numbers.
+    fn run<T: Send>(&self, count: usize, act: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let next = AtomicUsize::new(0);
+        let take = || {
+            let mut done = Vec::new();
+            loop {
+                let number = next.fetch_add(1, Ordering::Relaxed);
+                if number >= count {
+                    return done;
+                }
+                done.push((number, act(number)));
+            }
+        };
+        let mut all: Vec<(usize, T)> = std::thread::scope(|scope| {
+            let running: Vec<_> = self.pools.iter().map(|pool| scope.spawn(|| pool.install(take))).collect();
+            running
+                .into_iter()
+                .flat_map(|worker| worker.join().unwrap_or_else(|why| std::panic::resume_unwind(why)))
+                .collect()
+        });
+        all.sort_by_key(|(number, _)| *number);
+        all.into_iter().map(|(_, result)| result).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;
