@@ -211,7 +211,7 @@ fn every_command_of_the_texts_does_what_they_say() {
                 .iter()
                 .filter(|word| word.contains(&format!("{number} ")) || word.ends_with(&format!(" {number}")))
             {
-                let path = Path::new(out);
+                let path = Path::new(out.strip_prefix("--json=").unwrap_or(out));
                 let there = path.is_file() || std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
                 assert!(there, "{place}: nothing was written to {out}");
             }
