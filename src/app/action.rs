@@ -408,7 +408,7 @@ impl Action {
             Self::Generate => when(state.can_generate().is_ok(), PredictCommand::Generate),
             Self::GenerateNewSeed => when(state.can_generate().is_ok(), PredictCommand::GenerateNewSeed),
             Self::FitPairs => {
-                let ready = state.adapt_setup().is_some() && state.adapting().is_none();
+                let ready = state.can_adapt() && state.adapting().is_none();
                 when(ready, AdaptCommand::Start)
             }
             Self::UseFit => when(state.fitted().is_some() && !state.uses_fit(), AdaptCommand::Use),

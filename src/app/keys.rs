@@ -56,13 +56,15 @@ pub struct TouchKey {
 pub fn shift_tooltip(mode: ShiftMode) -> &'static str {
     match mode {
         ShiftMode::Raw => {
-            "The prediction as the released script saves it: its range is mapped twice, so depths come out as (depth + max) / 2, far too deep"
+            "The prediction as the released script saves it: its range is mapped twice, so depths come out as \
+             (depth + max) / 2, far too deep"
         }
         ShiftMode::PaperShift => {
             "The raw values with mean and deviation matched to the training statistics, as in the paper"
         }
         ShiftMode::ExactInverse => {
-            "The raw values with the doubled mapping undone: 2 * value - max, the depth itself; of a fitted model, with its fit"
+            "The raw values with the doubled mapping undone: 2 * value - max, the depth itself; of a fitted \
+             model, with its fit"
         }
         ShiftMode::Parts(_) => "The exact inverse with only some parts of the model's fit to a rig",
         ShiftMode::Refit(_) => {

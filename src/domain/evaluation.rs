@@ -316,7 +316,8 @@ fn images<'a>(grasps: &'a [&GraspScore]) -> impl Iterator<Item = &'a ImageScore>
     grasps.iter().flat_map(|g| &g.images)
 }
 
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+/// The mean of some figures; `None` without any.
+pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, n) = values.fold((0.0, 0usize), |(sum, n), v| (sum + v, n + 1));
     (n > 0).then(|| sum / n as f64)
 }

@@ -16,10 +16,10 @@ use std::sync::Arc;
 use super::blur::gaussian;
 use super::grid::{DepthMap, Grid};
 use super::postprocess::{Correction, CorrectionParts, Response};
-use offset::offsets;
 
 pub use doubts::{Doubt, doubts};
 pub use fitted::{FitSource, Fitted, PadFit};
+pub use offset::offsets;
 pub use validate::{folds, left_out};
 
 /// Deviation of the targets' blur before places are compared, pixels: the sensor's grain has no place.

@@ -29,7 +29,7 @@ use crate::work::imprint::{self, imprint_of};
 use crate::work::job::JobCx;
 use crate::work::prediction::Prediction;
 
-use report::{COLOR_CONVENTION, Pair, Report, Unit, convention, mean, take, text};
+use report::{COLOR_CONVENTION, Pair, Report, Stored, Unit, convention, mean, take, text};
 use write::{write, write_color};
 
 /// Arguments of `generate`.
@@ -166,8 +166,8 @@ fn score(
         && let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_meters)
     {
         let theirs = compare::tiles(&vqvae, &tile, sample, finger)?;
-        (pair.vqvae_psnr_db, pair.vqvae_ssim, pair.stored) = (theirs.psnr_db, theirs.ssim, theirs.unstretched);
-        pair.vqvae = theirs.unstretched.map(Into::into);
+        (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
+        pair.vqvae = theirs.unstretched.map(Stored);
     }
     Ok(())
 }

@@ -60,7 +60,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         });
         response.response.accessible_name("Pairs to fit to").on_hover_text("Which pairs the model is fitted to");
-        let count = cx.state.adapt_pairs().len();
+        let count = cx.state.adapt_pairs().count();
         let text = RichText::new(format!("{count} pairs")).size(SMALL);
         let text = if count < ENOUGH_PAIRS { text.color(cx.p.caution) } else { text.color(cx.p.weak) };
         ui.label(text).on_hover_text(format!(

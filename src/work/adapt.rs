@@ -7,7 +7,7 @@ mod score;
 mod tune;
 mod write;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -24,7 +24,9 @@ use crate::domain::fit::{FitError, FitSource, Fitted, PadFit, closed_form, doubt
 use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::lattice::template;
 use crate::domain::postprocess::Correction;
-use crate::domain::rig::{PerPad, Rig};
+use crate::domain::rig::PerPad;
+#[cfg(not(feature = "tune"))]
+use crate::domain::rig::Rig;
 use crate::domain::sample::Scale;
 use crate::infer::bundle::Role;
 use crate::infer::engine::EngineChoice;
@@ -33,6 +35,8 @@ use crate::io::memory::peak_mib;
 
 use gather::{Touch, gather};
 pub use score::Scored;
+#[cfg(feature = "tune")]
+use tune::tune;
 
 const WHAT: &str = "Fit the model to pairs";
 /// Fewer pairs leave ghosts of the training shapes in the predictions.
@@ -137,7 +141,7 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
     let fitting = Instant::now();
     let cases: Vec<_> = touches.iter().map(Touch::case).collect();
     let pads = dataset.rig.pads().len();
-    let corrections = closed_form(&cases, pads).map_err(fail)?;
+    let mut corrections = closed_form(&cases, pads).map_err(fail)?;
     let fit_seconds = fitting.elapsed().as_secs_f64();
     cx.check(WHAT)?;
     cx.progress(0, 0, "trying the fit on pairs that were left out");
@@ -148,14 +152,17 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
     cx.check(WHAT)?;
     let plain: Vec<Option<&Grid<f32>>> = touches.iter().map(|t| Some(&t.prediction)).collect();
     let unseen: Vec<Option<&Grid<f32>>> = made.iter().map(Option::as_ref).collect();
+    let mut tools = BTreeMap::new();
+    let mut angles =
+        |pictures: &[Option<&Grid<f32>>]| pose::angles(dataset, setup, models, &mut tools, &touches, pictures, cx);
     let mut before = score::scored(&touches, &plain, &dataset.rig)?;
     let mut closed = score::scored(&touches, &unseen, &dataset.rig)?;
     if let (Some(before), Some(closed)) = (&mut before, &mut closed) {
-        before.angle = pose::angles(dataset, setup, models, &touches, &plain, cx)?;
-        closed.angle = pose::angles(dataset, setup, models, &touches, &unseen, cx)?;
+        before.angle = angles(&plain)?;
+        closed.angle = angles(&unseen)?;
     }
     let before = before.ok_or_else(|| TaskError::new(WHAT, "no picture could be compared with its measurement"))?;
-    let names: std::collections::BTreeSet<&str> = touches.iter().map(|t| t.name.as_str()).collect();
+    let names: BTreeSet<&str> = touches.iter().map(|t| t.name.as_str()).collect();
     let doubtful = doubts(&cases, &made).into_iter().map(|doubt| remark(&touches, &doubt)).collect();
     let mut warnings = Vec::new();
     if names.len() < ENOUGH_PAIRS {
@@ -181,16 +188,15 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         );
     }
     let mut graphs = BTreeMap::new();
-    let mut corrections = corrections;
     let mut after = None;
     if setup.steps > 0 {
-        let tuned = tuned(setup, &touches, &corrections, &folds, &dataset.rig, cx)?;
-        let unseen: Vec<Option<&Grid<f32>>> = tuned.2.iter().map(Option::as_ref).collect();
+        let tuned = tune(setup, &touches, &corrections, &folds, &dataset.rig, cx)?;
+        let unseen: Vec<Option<&Grid<f32>>> = tuned.left_out.iter().map(Option::as_ref).collect();
         after = score::scored(&touches, &unseen, &dataset.rig)?;
         if let Some(after) = &mut after {
-            after.angle = pose::angles(dataset, setup, models, &touches, &unseen, cx)?;
+            after.angle = angles(&unseen)?;
         }
-        (graphs, corrections) = (tuned.0, tuned.1);
+        (graphs, corrections) = (tuned.graphs, tuned.corrections);
     }
     let fitted = Fitted { source: source(dataset, setup, &touches), pads: with_lattices(&touches, corrections) };
     let summary = fitted.pads.entries().map(|(pad, fit)| PadSummary {
@@ -225,31 +231,23 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
     })
 }
 
-/// Graphs, corrections, and what networks that were tuned without them make of the touches.
-type TunedParts = (BTreeMap<Role, Vec<u8>>, Vec<Option<Correction>>, Vec<Option<DepthMap>>);
-
-#[cfg(feature = "tune")]
-fn tuned(
-    setup: &AdaptSetup,
-    touches: &[Touch],
-    corrections: &[Option<Correction>],
-    folds: &[usize],
-    rig: &Rig,
-    cx: &JobCx,
-) -> Result<TunedParts, TaskError> {
-    let tune::TunedModel { graphs, corrections, left_out } = tune::tune(setup, touches, corrections, folds, rig, cx)?;
-    Ok((graphs, corrections, left_out))
+/// Tuned networks with what lies behind them.
+struct Tuned {
+    graphs: BTreeMap<Role, Vec<u8>>,
+    corrections: Vec<Option<Correction>>,
+    /// What networks that were tuned without it make of each touch, meters, on the decoder's grid.
+    left_out: Vec<Option<DepthMap>>,
 }
 
 #[cfg(not(feature = "tune"))]
-fn tuned(
+fn tune(
     _: &AdaptSetup,
     _: &[Touch],
     _: &[Option<Correction>],
     _: &[usize],
     _: &Rig,
     _: &JobCx,
-) -> Result<TunedParts, TaskError> {
+) -> Result<Tuned, TaskError> {
     Err(TaskError::new(WHAT, "this program was built without tuning").with_hint("Fit in closed form."))
 }
 

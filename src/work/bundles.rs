@@ -94,6 +94,18 @@ impl BundleInfo {
         Some(self.generator.as_ref()?.sensors.ends(&self.name, rig))
     }
 
+    /// The bundle itself, if it is of a kind.
+    ///
+    /// # Errors
+    /// If it is of another.
+    pub fn of_kind(self, kind: BundleKind, what: &str) -> Result<Self, TaskError> {
+        if self.kind == kind {
+            return Ok(self);
+        }
+        let why = format!("the bundle is a {}, not a {} ({})", self.kind.name(), kind.name(), self.origin);
+        Err(TaskError::new(what, why))
+    }
+
     /// Whether it was fitted to a rig.
     pub fn is_fitted(&self) -> bool {
         self.generator.as_ref().is_some_and(|generator| generator.fit.is_some())
@@ -149,12 +161,12 @@ pub fn find(folders: &[PathBuf]) -> FoundBundles {
     FoundBundles { bundles: found.bundles.iter().map(BundleInfo::of).collect(), problems: found.problems }
 }
 
-/// The bundle in a folder.
+/// The bundle in a folder or in the program.
 ///
 /// # Errors
 /// If it cannot be used.
-pub fn open(folder: &Path) -> Result<BundleInfo, TaskError> {
-    let opened = Bundle::open(folder).map_err(|err| TaskError::from_error("Open the bundle", &err))?;
+pub fn open(what: &str, at: impl Into<Origin>) -> Result<BundleInfo, TaskError> {
+    let opened = Bundle::open(at).map_err(|err| TaskError::from_error(what, &err))?;
     Ok(BundleInfo::of(&opened))
 }
 
@@ -166,13 +178,7 @@ impl FoundBundles {
     pub fn take(&self, kind: BundleKind, named: Option<&Path>, rig: &Rig) -> Result<BundleInfo, TaskError> {
         let what = format!("Look for a {}", kind.name());
         if let Some(folder) = named {
-            let bundle = Bundle::open(folder).map_err(|err| TaskError::from_error(&what, &err))?;
-            let info = BundleInfo::of(&bundle);
-            if info.kind != kind {
-                let why = format!("the bundle is a {}, not a {} ({})", info.kind.name(), kind.name(), folder.display());
-                return Err(TaskError::new(what, why));
-            }
-            return Ok(info);
+            return open(&what, folder)?.of_kind(kind, &what);
         }
         let fitting = || self.bundles.iter().filter(|bundle| bundle.kind == kind && bundle.fits(rig));
         // What was fitted to a rig is used where it is named.

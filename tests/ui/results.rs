@@ -1,7 +1,7 @@
 //! The results table of the Evaluate workspace, with the shipped models on a few simulated grasps.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
@@ -57,6 +57,9 @@ fn pictures_of_the_results() {
         rig.send(SettingsCommand::DismissHint);
         rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
         rig.shoot(&format!("{name}-results-empty"));
+        rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
+        rig.shoot(&format!("{name}-fit-empty"));
+        rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Results)));
         rig.send(Command::Evaluate(EvaluateCommand::Grasps(Some(1))));
         rig.send(Command::Evaluate(EvaluateCommand::Published(true)));
         rig.send(Command::Evaluate(EvaluateCommand::Start));

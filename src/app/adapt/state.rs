@@ -55,27 +55,32 @@ pub struct AdaptState {
 
 impl State {
     /// The pairs that a fit started now would take.
-    pub fn adapt_pairs(&self) -> Vec<PairId> {
-        let Some(open) = &self.library.open else { return Vec::new() };
-        let all = open.source.index().pairs.iter().enumerate().map(|(at, entry)| (PairId(at as u32), entry));
+    pub fn adapt_pairs(&self) -> Box<dyn Iterator<Item = PairId> + '_> {
+        let Some(open) = &self.library.open else { return Box::new(std::iter::empty()) };
+        let pairs = &open.source.index().pairs;
+        let all = (0..pairs.len() as u32).map(PairId);
         match self.adapt.pairs {
-            AdaptPairs::All => all.map(|(id, _)| id).collect(),
+            AdaptPairs::All => Box::new(all),
             AdaptPairs::Done => {
-                all.filter(|(_, entry)| self.document.review(&entry.name) == Review::Done).map(|(id, _)| id).collect()
+                Box::new(all.filter(|id| self.document.review(&pairs[id.0 as usize].name) == Review::Done))
             }
-            AdaptPairs::Listed => self.library.order.clone(),
+            AdaptPairs::Listed => Box::new(self.library.order.iter().copied()),
         }
+    }
+
+    /// Whether there is something to fit, and pairs to fit it to.
+    pub fn can_adapt(&self) -> bool {
+        self.bundle(BundleKind::Generator).is_ok() && self.adapt_pairs().next().is_some()
     }
 
     /// What a fit started now would do; `None` without data, pairs or a depth generator.
     pub fn adapt_setup(&self) -> Option<AdaptSetup> {
         let bundle = self.bundle(BundleKind::Generator).ok()?.clone();
-        let pairs = self.adapt_pairs();
-        (!pairs.is_empty()).then(|| AdaptSetup {
+        self.can_adapt().then(|| AdaptSetup {
             config: self.settings.generate.config(&bundle),
             bundle,
             engine: self.settings.runtime,
-            pairs,
+            pairs: self.adapt_pairs().collect(),
             folds: FOLDS,
             mask: (self.settings.mask.choice, self.bundle(BundleKind::Mask).ok().cloned()),
             steps: if self.adapt.tune { TUNING_STEPS } else { 0 },

@@ -217,7 +217,11 @@ impl Services for LiveServices {
         let name = format!("fitted-to-{}", names::label(&dataset.title));
         let out = self.models_folder.as_ref().map(|folder| folder.join(name));
         let adapted = adapt::adapt(dataset, &AdaptSetup { out, ..setup.clone() }, &self.models, cx)?;
-        let bundle = adapted.bundle.as_ref().map(|folder| bundles::open(folder)).transpose()?;
+        let bundle = adapted
+            .bundle
+            .as_ref()
+            .map(|folder| bundles::open("Open the fitted bundle", folder.as_path()))
+            .transpose()?;
         Ok((adapted, bundle))
     }
 

@@ -17,7 +17,7 @@ const LEAST_CORRELATION: f64 = 0.2;
 
 /// The offset `[right, down]` of each pad, pixels: what makes its predictions and measurements most alike, near what does
 /// so for all pads together.
-pub(super) fn offsets(cases: &[Case<'_>], pads: usize) -> Vec<[f64; 2]> {
+pub fn offsets(cases: &[Case<'_>], pads: usize) -> Vec<[f64; 2]> {
     let all: Vec<&Case<'_>> = cases.iter().collect();
     let together = offset(&all, [0.0; 2], REACH);
     let of_pad = |pad: usize| cases.iter().filter(|case| case.pad == pad).collect::<Vec<_>>();

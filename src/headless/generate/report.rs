@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::super::seeds::SeedFigures;
 use crate::domain::ambiguity::{Ambiguity, Touch};
+use crate::domain::evaluation;
 use crate::domain::findings::Finding;
 use crate::domain::metrics::{self, Unstretched};
 use crate::domain::rig::Text;
@@ -37,9 +38,7 @@ pub(super) struct Pair {
     #[serde(flatten)]
     pub(super) unstretched: Option<Unstretched>,
     #[serde(flatten)]
-    pub(super) vqvae: Option<StoredUnstretched>,
-    #[serde(skip)]
-    pub(super) stored: Option<Unstretched>,
+    pub(super) vqvae: Option<Stored>,
     /// The figures apart for what the GelSlim saw and for what lies outside its footprint; errors in meters.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) seen: Option<metrics::PixelMetrics>,
@@ -68,7 +67,7 @@ pub(super) struct Mean {
     #[serde(flatten)]
     pub(super) unstretched: Option<Unstretched>,
     #[serde(flatten)]
-    pub(super) vqvae: Option<StoredUnstretched>,
+    pub(super) vqvae: Option<Stored>,
     /// Means over the pairs: inside the GelSlim's footprint, and outside.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) seen: Option<PartMean>,
@@ -81,14 +80,19 @@ pub(super) struct Mean {
 
 /// [`Unstretched`] metrics of the prediction that lay by.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(super) struct StoredUnstretched {
+#[serde(into = "StoredKeys")]
+pub(super) struct Stored(pub(super) Unstretched);
+
+/// [`Stored`] under its keys.
+#[derive(Serialize)]
+struct StoredKeys {
     vqvae_psnr_raw_db: Option<f64>,
     vqvae_ssim_raw: Option<f64>,
     vqvae_psnr_line_db: Option<f64>,
 }
 
-impl From<Unstretched> for StoredUnstretched {
-    fn from(of: Unstretched) -> Self {
+impl From<Stored> for StoredKeys {
+    fn from(Stored(of): Stored) -> Self {
         Self { vqvae_psnr_raw_db: of.psnr_raw_db, vqvae_ssim_raw: of.ssim_raw, vqvae_psnr_line_db: of.psnr_line_db }
     }
 }
@@ -97,9 +101,9 @@ impl From<Unstretched> for StoredUnstretched {
 fn unstretched_mean(all: impl Iterator<Item = Unstretched>) -> Option<Unstretched> {
     let all: Vec<Unstretched> = all.collect();
     (!all.is_empty()).then(|| Unstretched {
-        psnr_raw_db: average(all.iter().filter_map(|u| u.psnr_raw_db)),
-        ssim_raw: average(all.iter().filter_map(|u| u.ssim_raw)),
-        psnr_line_db: average(all.iter().filter_map(|u| u.psnr_line_db)),
+        psnr_raw_db: evaluation::mean(all.iter().filter_map(|u| u.psnr_raw_db)),
+        ssim_raw: evaluation::mean(all.iter().filter_map(|u| u.ssim_raw)),
+        psnr_line_db: evaluation::mean(all.iter().filter_map(|u| u.psnr_line_db)),
     })
 }
 
@@ -115,7 +119,7 @@ pub(super) struct PartMean {
 impl PartMean {
     fn of(pairs: &[Pair], part: fn(&Pair) -> Option<metrics::PixelMetrics>) -> Option<Self> {
         let all: Vec<metrics::PixelMetrics> = pairs.iter().filter_map(part).collect();
-        let of = |get: fn(&metrics::PixelMetrics) -> Option<f64>| average(all.iter().filter_map(get));
+        let of = |get: fn(&metrics::PixelMetrics) -> Option<f64>| evaluation::mean(all.iter().filter_map(get));
         (!all.is_empty()).then(|| Self {
             psnr_db: of(|f| f.psnr_db),
             ssim: of(|f| f.ssim),
@@ -123,11 +127,6 @@ impl PartMean {
             bias_m: of(|f| f.bias),
         })
     }
-}
-
-pub(super) fn average(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let values: Vec<f64> = values.collect();
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 #[derive(Debug, Serialize)]
@@ -163,14 +162,14 @@ pub(super) fn take(pair: &mut Pair, found: &Comparison) {
 }
 
 pub(super) fn mean(pairs: &[Pair]) -> Mean {
-    let of = |get: fn(&Pair) -> Option<f64>| average(pairs.iter().filter_map(get));
+    let of = |get: fn(&Pair) -> Option<f64>| evaluation::mean(pairs.iter().filter_map(get));
     Mean {
         psnr_db: of(|p| p.psnr_db),
         ssim: of(|p| p.ssim),
         vqvae_psnr_db: of(|p| p.vqvae_psnr_db),
         vqvae_ssim: of(|p| p.vqvae_ssim),
         unstretched: unstretched_mean(pairs.iter().filter_map(|p| p.unstretched)),
-        vqvae: unstretched_mean(pairs.iter().filter_map(|p| p.stored)).map(Into::into),
+        vqvae: unstretched_mean(pairs.iter().filter_map(|p| Some(p.vqvae?.0))).map(Stored),
         seen: PartMean::of(pairs, |p| p.seen),
         invented: PartMean::of(pairs, |p| p.invented),
         ambiguous: pairs.iter().filter(|p| p.ambiguity.is_some_and(|a| a.kind == Touch::BareShaft)).count(),
@@ -221,18 +220,10 @@ pub(super) fn text(report: &Report) -> String {
 fn unstretched_text(mean: &Mean) -> String {
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
     let Some(own) = mean.unstretched else { return String::new() };
-    let stored = mean.vqvae.map_or(String::new(), |v| {
-        format!(
-            "; VQ-VAE raw {} dB, SSIM {}, line {} dB",
-            number(v.vqvae_psnr_raw_db, 1),
-            number(v.vqvae_ssim_raw, 3),
-            number(v.vqvae_psnr_line_db, 1)
-        )
-    });
-    format!(
-        "unstretched: raw {} dB, SSIM {}, line {} dB{stored}\n",
-        number(own.psnr_raw_db, 1),
-        number(own.ssim_raw, 3),
-        number(own.psnr_line_db, 1)
-    )
+    let line = |of: Unstretched| {
+        let (raw, ssim, line) = (number(of.psnr_raw_db, 1), number(of.ssim_raw, 3), number(of.psnr_line_db, 1));
+        format!("raw {raw} dB, SSIM {ssim}, line {line} dB")
+    };
+    let stored = mean.vqvae.map_or(String::new(), |Stored(of)| format!("; VQ-VAE {}", line(of)));
+    format!("unstretched: {}{stored}\n", line(own))
 }

@@ -46,6 +46,8 @@ pub struct GeneratorSpec {
     pub latent: LatentSpec,
     /// How noise was added in training.
     pub schedule: Schedule,
+    /// The same as the manifest has it.
+    pub schedule_spec: ScheduleSpec,
     /// What the denoiser's output means.
     pub prediction: Prediction,
     /// How the decoder's picture is read.
@@ -545,6 +547,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         let hint = format!("choose {least} to {most}; 1 is none");
         check(GUIDANCE.contains(&guidance.scale), "guidance.scale: out of range", &hint);
     }
+    let schedule_spec = schedule.clone();
     let schedule = schedule.and_then(|spec| {
         let built = spec.build();
         built.map_err(|err| problems.add(format!("schedule: {err}"), "give the schedule used in training")).ok()
@@ -572,6 +575,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         condition: condition?,
         latent: latent?,
         schedule: schedule?,
+        schedule_spec: schedule_spec?,
         prediction: prediction?,
         output: output?,
         shift,

@@ -2,7 +2,7 @@
 
 use super::{AdaptSetup, MOST_TOUCHES, Remark, WHAT};
 use crate::domain::dataset::PairId;
-use crate::domain::fit::{Case, closed_form};
+use crate::domain::fit::{Case, offsets};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::lattice::{signature, two_groups};
 use crate::domain::postprocess::{DepthChain, ShiftMode};
@@ -213,10 +213,10 @@ fn name_pads(dataset: &Dataset, touches: &mut [Touch]) -> Result<bool, TaskError
     }
     // The pads' windows lie side by side in the raw picture, and so do the offsets that each needs.
     let cases: Vec<Case<'_>> = touches.iter().map(Touch::case).collect();
-    let found = closed_form(&cases, 2).map_err(|err| TaskError::from_error(WHAT, &err))?;
+    let offsets = offsets(&cases, 2);
     let column = |pad: usize| {
         let sign = if touches[0].turned { -1.0 } else { 1.0 };
-        found[pad].as_ref().map_or(0.0, |c| sign * c.offset_px[0])
+        sign * offsets[pad][0]
     };
     let window = |pad: usize| dataset.rig.color_window(PadId::new(pad)).map_or(0.0, |w| w.rectangle()[0]);
     if (column(0) > column(1)) != (window(0) > window(1)) {

@@ -1,11 +1,13 @@
 //! The in-hand angle that pictures lead to, where the data have poses.
 
+use std::collections::BTreeMap;
+
 use super::gather::Touch;
 use super::{AdaptSetup, WHAT};
 use crate::domain::align::Ask;
 use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::Registration;
+use crate::domain::pose::{Registration, ToolModel};
 use crate::domain::rig::PerPad;
 use crate::domain::sample::Scale;
 use crate::io::dataset::Dataset;
@@ -20,11 +22,12 @@ use crate::work::tool::load_tool;
 const MOST_GRASPS: usize = 100;
 
 /// The errors of the angle over grasps whose every touch has a picture; `None` where no truth, camera or CAD model is
-/// known. A grasp without a pose counts as a failure.
+/// known. A grasp without a pose counts as a failure. `tools` are the models that were read already.
 pub(super) fn angles(
     dataset: &Dataset,
     setup: &AdaptSetup,
     models: &Models,
+    tools: &mut BTreeMap<String, Option<ToolModel>>,
     touches: &[Touch],
     pictures: &[Option<&Grid<f32>>],
     cx: &JobCx,
@@ -45,16 +48,17 @@ pub(super) fn angles(
         if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             continue;
         }
-        let Ok((tool, _)) = load_tool(dataset, tool) else { continue };
+        let tool = tools.entry(tool.clone()).or_insert_with(|| load_tool(dataset, tool).ok().map(|(model, _)| model));
+        let Some(tool) = tool else { continue };
         let mut imprints = PerPad::<DepthMap>::default();
         for (touch, picture) in grasp.iter().zip(own) {
             imprints[touch.pad] = picture.map(|picture| touch.imprint(picture));
         }
-        let inputs = MaskInputs { sample: &sample, tool: Some(&tool), labels: None };
+        let inputs = MaskInputs { sample: &sample, tool: Some(tool), labels: None };
         let found = models
             .contact(by, imprints, inputs)
             .and_then(|contact| contact.points(&sample))
-            .and_then(|points| pose(&points, &tool, &*Registration::default().method(), Ask::default(), Some(truth)));
+            .and_then(|points| pose(&points, tool, &*Registration::default().method(), Ask::default(), Some(truth)));
         errors.push(found.ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN));
     }
     Ok((!errors.is_empty()).then(|| AngleSummary::from_errors(&errors)))

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::gather::Touch;
+use crate::domain::evaluation::mean;
 use crate::domain::grid::Grid;
 use crate::domain::metrics::{AngleSummary, PixelMetrics, unstretched};
 use crate::domain::resample::bilinear;
@@ -101,9 +102,4 @@ fn compared(touch: &Touch, picture: &Grid<f32>, rig: &Arc<Rig>) -> Result<Compar
         found.unstretched = unstretched(&own, &touch.measured, LAB_PEAK_M).ok();
     }
     Ok(found)
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, n) = values.fold((0.0, 0usize), |(sum, n), v| (sum + v, n + 1));
-    (n > 0).then(|| sum / n as f64)
 }

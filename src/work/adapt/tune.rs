@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use touch2touch_tuning::{Config, NoiseSchedule, Pair, Placement, Query, Sampler, Start, Tuner};
 
 use super::gather::{Touch, on_grid};
-use super::{AdaptSetup, WHAT};
+use super::{AdaptSetup, Tuned, WHAT};
 use crate::domain::catalog;
 use crate::domain::diffusion;
 use crate::domain::fit::{Case, closed_form};
@@ -14,7 +14,7 @@ use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{Correction, CorrectionParts};
 use crate::domain::rig::{Rig, SensorId, lab};
 use crate::domain::sim::{self, SimConfig};
-use crate::infer::bundle::{Bundle, GeneratorInput, MANIFEST, Role, ScheduleKind, ScheduleSpec};
+use crate::infer::bundle::{Bundle, BundleFile, GeneratorInput, Role, ScheduleKind};
 use crate::infer::generator::prepare;
 use crate::io::dataset::ASSUMED_IMPRINT_RANGE_M;
 use crate::io::files;
@@ -26,14 +26,6 @@ const SIMULATED: u64 = 6;
 /// Pictures predicted at a time.
 const BATCH: usize = 16;
 
-/// Tuned networks with what lies behind them.
-pub(super) struct TunedModel {
-    pub(super) graphs: BTreeMap<Role, Vec<u8>>,
-    pub(super) corrections: Vec<Option<Correction>>,
-    /// What networks that were tuned without it make of each touch, meters, on the decoder's grid.
-    pub(super) left_out: Vec<Option<DepthMap>>,
-}
-
 /// Tunes once for each fold without it, and once on everything.
 pub(super) fn tune(
     setup: &AdaptSetup,
@@ -42,7 +34,7 @@ pub(super) fn tune(
     folds: &[usize],
     rig: &Rig,
     cx: &JobCx,
-) -> Result<TunedModel, TaskError> {
+) -> Result<Tuned, TaskError> {
     let source = Source::open(setup)?;
     let pads = rig.pads().len();
     let real: Vec<Pair> =
@@ -92,7 +84,7 @@ pub(super) fn tune(
     let corrections = source.corrections(&tuned.placement, corrections);
     let graphs =
         [(Role::ConditionEncoder, tuned.encoder), (Role::Denoiser, tuned.denoiser), (Role::Decoder, tuned.decoder)];
-    Ok(TunedModel { graphs: graphs.into(), corrections, left_out })
+    Ok(Tuned { graphs: graphs.into(), corrections, left_out })
 }
 
 fn fail(err: touch2touch_tuning::Error) -> TaskError {
@@ -118,13 +110,10 @@ impl Source {
     fn open(setup: &AdaptSetup) -> Result<Self, TaskError> {
         let bundle: Bundle = setup.bundle.open(WHAT)?;
         let spec = bundle.generator().ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
-        let read = |file: &crate::infer::bundle::BundleFile| {
+        let read = |file: &BundleFile| {
             file.read(files::MODEL).map(std::borrow::Cow::into_owned).map_err(|err| TaskError::new(WHAT, err))
         };
-        let manifest = read(&bundle.origin().file(MANIFEST))?;
-        let manifest: serde_json::Value = serde_json::from_slice(&manifest).map_err(|err| TaskError::new(WHAT, err))?;
-        let schedule: ScheduleSpec =
-            serde_json::from_value(manifest["schedule"].clone()).map_err(|err| TaskError::new(WHAT, err))?;
+        let schedule = &spec.schedule_spec;
         let (Some(beta_start), Some(beta_end), ScheduleKind::ScaledLinear) =
             (schedule.beta_start, schedule.beta_end, schedule.kind)
         else {

@@ -17,7 +17,7 @@ use crate::infer::classifier::ToolClassifier;
 use crate::infer::engine::{EngineChoice, resolve};
 use crate::io::caught::caught;
 use crate::io::dataset::{Dataset, SourceKind};
-use crate::work::bundles::{BundleInfo, BundleKind};
+use crate::work::bundles::{self, BundleInfo, BundleKind};
 use crate::work::error::TaskError;
 use crate::work::imprint;
 use crate::work::job::JobCx;
@@ -79,13 +79,9 @@ fn open(origin: &Origin) -> Result<Bundle, TaskError> {
     Bundle::open(origin).map_err(|err| TaskError::from_error(format!("{WHAT}: {origin}"), &err))
 }
 
-/// A bundle that must be of a kind.
-fn find(origin: &Origin, kind: BundleKind) -> Result<BundleInfo, TaskError> {
-    let bundle = BundleInfo::of(&open(origin)?);
-    if bundle.kind == kind {
-        return Ok(bundle);
-    }
-    Err(TaskError::new(WHAT, format!("{origin} is a {}, not a {}", bundle.kind.name(), kind.name())))
+/// A bundle of a kind.
+fn found(origin: &Origin, kind: BundleKind) -> Result<BundleInfo, TaskError> {
+    bundles::open(&format!("{WHAT}: {origin}"), origin)?.of_kind(kind, WHAT)
 }
 
 impl Models {
@@ -100,7 +96,7 @@ impl Models {
         let engine = resolve(setup.runtime).map_err(|err| fail(&err))?.label().to_owned();
         let mut names: Vec<String> = Vec::new();
         for origin in &setup.bundles {
-            let bundle = find(origin, BundleKind::Generator)?;
+            let bundle = found(origin, BundleKind::Generator)?;
             let info = bundle.generator.as_ref();
             let info = info.ok_or_else(|| TaskError::new(WHAT, format!("{origin} declares no generator")))?;
             let input = info.sensors.ends(&bundle.name, &dataset.rig).map_err(|err| fail(&err))?.input;
@@ -123,7 +119,7 @@ impl Models {
             methods.push(Method::Stored);
         }
         let mask_bundle = match &setup.mask_bundle {
-            Some(origin) if !pictures => Some(find(origin, BundleKind::Mask)?),
+            Some(origin) if !pictures => Some(found(origin, BundleKind::Mask)?),
             _ => None,
         };
         let masks = models.beside();
