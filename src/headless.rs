@@ -25,6 +25,7 @@ mod report;
 mod seeds;
 mod simulate;
 mod stats;
+mod training_data;
 mod version;
 mod watch;
 
@@ -82,6 +83,9 @@ enum Verb {
     Evaluate(Box<evaluate::EvaluateArgs>),
     /// Fits a generator to pairs of your own sensors, and says what it is worth on pairs that were left out.
     Adapt(Box<adapt::AdaptArgs>),
+    /// Write training data for the networks: a dataset or, with `simulator` as PATH, simulated touches, as shards that
+    /// `python -m training.train` reads.
+    TrainingData(Box<training_data::TrainingDataArgs>),
     /// Where starts of the registration lead, for one pair: the numbers behind the basin map.
     Basin(Box<basin::BasinArgs>),
     /// List what people said about the pairs, or say it: corrected masks, review states, accepted poses.
@@ -225,6 +229,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
         Some(Verb::Adapt(args)) => adapt::run(&args),
+        Some(Verb::TrainingData(args)) => training_data::run(&args),
         Some(Verb::Basin(args)) => basin::run(&args),
         Some(Verb::Label(args)) => label::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),

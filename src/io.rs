@@ -18,6 +18,7 @@ pub mod memory;
 pub mod names;
 pub mod npz;
 pub mod pt;
+pub mod shards;
 pub mod simulated;
 pub mod statistics;
 pub mod stl;

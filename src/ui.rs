@@ -5,6 +5,7 @@
 
 pub mod app;
 pub mod theme;
+mod thumbnail;
 mod timemachine;
 pub mod widget;
 

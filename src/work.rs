@@ -7,7 +7,7 @@
 //! * [`models`]: bundles found and loaded once; predictions, from the disk where they were made before.
 //! * [`imprint`], [`mask`], [`cloud`], [`pose`]: one step each. [`compare`], [`ledger`], [`layers`], [`ensemble`]: what
 //!   there is to know about their results.
-//! * [`evaluate`], [`statistics`]: passes over a whole data set.
+//! * [`evaluate`], [`statistics`], [`adapt`], [`export`], [`training_data`]: passes over a whole data set.
 //! * [`job`], [`error`]: how work is watched, stopped, and how it fails.
 
 pub mod adapt;
@@ -29,3 +29,4 @@ pub mod pose;
 pub mod prediction;
 pub mod statistics;
 pub mod tool;
+pub mod training_data;

@@ -1,11 +1,22 @@
 //! `adapt` as a user runs it: on simulated grasps, on pictures of a rig with known faults, and on the lab's real pairs.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Output;
+use std::sync::{Arc, Mutex};
 
 use serde_json::Value;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::Grid;
+use touch2touch::infer::engine::EngineChoice;
+use touch2touch::io::dataset::Dataset;
 use touch2touch::io::images;
+use touch2touch::work::adapt::{AdaptSetup, Tuning, adapt};
+use touch2touch::work::bundles::{BundleKind, find};
+use touch2touch::work::error::TaskErrorKind;
+use touch2touch::work::job::{Cancel, JobCx, Progress};
+use touch2touch::work::mask::MaskChoice;
+use touch2touch::work::models::Models;
 
 use crate::cli_generate::full_size_bundle;
 use crate::support::{run, shared};
@@ -165,6 +176,56 @@ fn measured_meters_are_fitted_too_and_other_data_are_warned_of() {
         dir.path(),
     );
     assert!(said(&other).contains("was fitted to 6 pairs"), "{}", said(&other));
+}
+
+#[test]
+fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    pictures(&set, 4);
+    let dataset = Dataset::open(&set).unwrap();
+    let bundle = find(&[]).take(BundleKind::Generator, None, &dataset.rig).unwrap();
+    let info = bundle.generator.as_ref().unwrap();
+    let setup = |unfinished: Option<PathBuf>| AdaptSetup {
+        config: GenerateConfig { steps: 2, ..info.defaults },
+        engine: EngineChoice::Rten,
+        pairs: (0..4).map(PairId).collect(),
+        folds: 2,
+        mask: (MaskChoice::default(), None),
+        tuning: Some(Tuning::Steps(2)),
+        unfinished,
+        out: None,
+        bundle: bundle.clone(),
+    };
+    let models = Models::new(None);
+    let straight = adapt(&dataset, &setup(None), &models, &JobCx::unwatched()).unwrap();
+    assert_eq!((straight.steps, straight.curves.len()), (2, 5), "{:?}", straight.curves);
+    assert!(straight.warnings.iter().any(|w| w.contains("2 steps of tuning are few")), "{:?}", straight.warnings);
+    // Stopped in the first part, in the second, and in the run on all.
+    let kept = dir.path().join("unfinished");
+    for stop_at in [1, 3, 5] {
+        let cancel = Cancel::default();
+        let told = cancel.clone();
+        let watch = move |progress: Progress| {
+            if progress.total == 6 && progress.done >= stop_at {
+                told.cancel();
+            }
+        };
+        let stopped = adapt(&dataset, &setup(Some(kept.clone())), &models, &JobCx::new(cancel, Arc::new(watch)));
+        assert_eq!(stopped.unwrap_err().kind, TaskErrorKind::Cancelled);
+    }
+    let seen = Arc::new(Mutex::new(Vec::new()));
+    let sink = seen.clone();
+    let watch = move |progress: Progress| {
+        if progress.total == 6 {
+            sink.lock().unwrap().push(progress.done);
+        }
+    };
+    let again = JobCx::new(Cancel::default(), Arc::new(watch));
+    let resumed = adapt(&dataset, &setup(Some(kept.clone())), &models, &again).unwrap();
+    assert_eq!(*seen.lock().unwrap(), [6], "only the last step was made");
+    assert_eq!((&resumed.curves, &resumed.held_back), (&straight.curves, &straight.held_back));
+    assert_eq!(std::fs::read_dir(&kept).unwrap().count(), 0, "nothing is left of a finished run");
 }
 
 /// The recipe's own figures for the closed form, cross-validated on the lab's 36 real pairs: 24.2 dB.

@@ -21,6 +21,7 @@ mod documented;
 mod hostile;
 #[cfg(feature = "onnx")]
 mod outputs;
+mod training_data;
 #[cfg(feature = "onnx")]
 mod watch;
 

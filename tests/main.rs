@@ -5,7 +5,7 @@
 #[allow(dead_code, reason = "not every feature set uses every helper")]
 mod support;
 
-#[cfg(feature = "onnx")]
+#[cfg(all(feature = "onnx", feature = "tune"))]
 mod adapt;
 #[cfg(feature = "onnx")]
 mod agreement;

@@ -3,8 +3,8 @@
 One short run for each dataset condition of the paper's Table I and each switch of its ablation (Table III), all with
 the same number of steps, and a table of what came out (`ablation.json`, and printed as Markdown).
 
-`--data` and `--test` hold one folder of shards per condition: `plain`, `ambiguous`, `misaligned` (`training_data`
-writes them; README.md). Conditions and turns go on from an exported generator; the geometry runs begin from scratch
+`--data` and `--test` hold one folder of shards per condition: `plain`, `ambiguous`, `misaligned` (`touch2touch
+training-data` writes them; README.md). Conditions and turns go on from an exported generator; the geometry runs begin from scratch
 with the L1 UNet, because a condition encoder knows where the GelSlim lies and would have to unlearn it first.
 """
 

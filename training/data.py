@@ -1,10 +1,11 @@
-"""The training data: folders ("shards") of .npy files written by `examples/training_data.rs`, memory-mapped.
+"""The training data: folders ("shards") of .npy files written by `touch2touch training-data`, memory-mapped.
 
 gelslim.npy  (M,3,128,128) i16  difference image in 1/64 grey levels, resized bilinearly without antialias
 imprint.npy  (M,140,175)   i16  measured imprint in micrometres, raw orientation; -32768 = no measurement
-clean.npy    (M,140,175)   i16  the same without camera noise
-contact.npy  (M,140,175)   u8   1 where the membrane lies on the tool
-meta.npy     (M,8)         f32  grasp, finger, theta, x, y, tool (-1 = random), nominal sensor, unseen tool
+clean.npy    (M,140,175)   i16  the same without camera noise; of real touches the measured one with its holes filled
+contact.npy  (M,140,175)   u8   1 where the membrane lies on the tool; 255 everywhere where that is not known
+meta.npy     (M,8)         f32  grasp, finger, angle, y, z (NaN = not known), tool (-1 = not in the catalog), sensors (0 drawn,
+                                1 the simulator's nominal ones, 3 real), unseen tool
 """
 
 import hashlib
@@ -31,7 +32,7 @@ class Shards:
         self.folder, self.names, self.parts = Path(folder), [], []
         self.refresh()
         if not self.parts:
-            raise SystemExit(f"no shards in {folder}: write some with the training_data example (see README.md)")
+            raise SystemExit(f"no shards in {folder}: write some with `touch2touch training-data` (see README.md)")
 
     def refresh(self):
         for path in sorted(self.folder.glob("*/done.json")):
@@ -45,12 +46,13 @@ class Shards:
     def __len__(self):
         return int(self.starts[-1])
 
+    def place(self, index):
+        """Part, and place in it, of a sample."""
+        part = int(np.searchsorted(self.starts, index, side="right")) - 1
+        return part, index - self.starts[part]
+
     def take(self, key, indices):
-        out = []
-        for i in indices:
-            part = int(np.searchsorted(self.starts, i, side="right")) - 1
-            out.append(self.parts[part][key][i - self.starts[part]])
-        return torch.from_numpy(np.stack(out))
+        return torch.from_numpy(np.stack([self.parts[part][key][at] for part, at in map(self.place, indices)]))
 
     def gelslim(self, indices):
         """Standardised differences (N,3,128,128)."""
@@ -68,6 +70,10 @@ class Shards:
 
     def contact(self, indices):
         return self.take("contact", indices).long()
+
+    def contact_known(self, indices):
+        """Which of the samples say where contact is (N,)."""
+        return np.array([self.parts[part]["contact"][at, 0, 0] != 255 for part, at in map(self.place, indices)], bool)
 
     def record(self):
         """What provenance says about the data: every shard's own description."""

@@ -124,7 +124,7 @@ def shards_figures(name, bundle, masker, shards, count, out):
     rows = [[tile(0.5 + g / 8) for g in gelslim[:12]]]
     for metres in (measured, clean, predicted):
         rows.append([tile((torch.flip(m, (1, 2)) - lo) / (hi - lo)) for m in metres[:12]])
-    if masker:
+    if masker and shards.contact_known(chosen).all():
         contact = shards.contact(chosen) == 1
         on_measured, on_predicted = masker.mask(measured), masker.mask(predicted)
         figures["mask_iou"] = {

@@ -128,12 +128,21 @@ def write(net, path, inputs, outputs, examples, f16=False):
     return {"path": path.name, "sha256": data.sha256(path)}, worst
 
 
+def sources(record):
+    """What the shards hold, in words."""
+    real = sorted({r["source"] for r in record} - {"simulator"})
+    mixes = {r["mix"] for r in record if r["source"] == "simulator"}
+    parts = [f"real touches of {', '.join(real)}"] if real else []
+    if mixes:
+        parts.append("simulated touches; the unseen tools are " + ("among them" if "unseen" in mixes else "not among them"))
+    return "; ".join(parts)
+
+
 def provenance(note, shards, states, differences):
     record = shards.record()
-    unseen = "the unseen tools are among them" if any(r["mix"] == "unseen" for r in record) else "the unseen tools are not among them"
     return {
         "note": note,
-        "data": f"simulated touches (examples/training_data.rs); {unseen}",
+        "data": sources(record),
         "shards": record,
         "runs": {name: {k: s[k] for k in ("step", "samples", "minutes", "losses", "seed", "options") if k in s} for name, s in states.items()},
         "onnx_minus_torch_max": differences,
@@ -155,9 +164,10 @@ def generator_bundle(args, out, name, nets, shapes, steps, states):
     }
     for role, (net, inputs, output, examples) in graphs.items():
         files[role], differences[role] = write(net, out / f"{role}.onnx", inputs, output, examples, args.fp16)
-    # Statistics for the paper's shift, on training touches of the nominal sensors.
-    nominal = np.flatnonzero(shards.meta[:, 6] == 1)
-    chosen = np.sort(np.random.default_rng(args.seed).choice(nominal, min(256, len(nominal)), replace=False))
+    # Statistics for the paper's shift, on training touches of the sensors that it will run on: the real ones where there are
+    # any, else the simulator's nominal ones.
+    usual = next(found for kind in (3, 1, 0) if len(found := np.flatnonzero(shards.meta[:, 6] == kind)))
+    chosen = np.sort(np.random.default_rng(args.seed).choice(usual, min(256, len(usual)), replace=False))
     predicted = torch.cat([predict(nets, shards.gelslim(chosen[i:i + 32]), steps, shape=shapes[1])
                            for i in range(0, len(chosen), 32)]).double()
     measured = shards.metres("imprint", chosen).double()

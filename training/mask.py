@@ -30,7 +30,8 @@ class Predicted:
         if not self.path.exists():
             self.path.parent.mkdir(parents=True, exist_ok=True)
             bundle, rng = evaluate.Bundle(args.predicted_by), np.random.default_rng(args.seed)
-            chosen = np.sort(rng.choice(len(shards), min(args.predicted, len(shards)), replace=False))
+            known = np.flatnonzero(shards.contact_known(range(len(shards))))
+            chosen = np.sort(rng.choice(known, min(args.predicted, len(known)), replace=False))
             parts = [bundle.predict(shards.gelslim(chosen[i:i + 16]), seed=i) for i in range(0, len(chosen), 16)]
             metres = data.from_model(torch.cat(parts)).numpy()
             np.savez(self.path, chosen=chosen, imprint=np.round(metres[:, 0] * 1e6).astype(np.int16))
@@ -58,6 +59,9 @@ def mask(args):
     for batch in indices(shards, rng, 8):
         if run.over():
             break
+        batch = batch[shards.contact_known(batch)]
+        if not len(batch):
+            continue
         generated = rng.random(len(batch)) < (PREDICTED if predicted else 0)
         drawn = torch.zeros(0, 1, 140, 175)
         if generated.any():

@@ -20,6 +20,8 @@ pub enum AdaptCommand {
     Choose(AdaptPairs),
     /// Whether the networks themselves are tuned as well.
     Tune(bool),
+    /// With how many steps.
+    Steps(u32),
     /// Fits the chosen generator to them, and scores it on pairs that were left out.
     Start,
     /// Predicts with the fitted model from now on.
@@ -30,6 +32,9 @@ pub(super) fn step(state: &mut State, command: AdaptCommand, effects: &mut Vec<E
     match command {
         AdaptCommand::Choose(pairs) => state.adapt.pairs = pairs,
         AdaptCommand::Tune(tune) => state.adapt.tune = tune,
+        AdaptCommand::Steps(steps) => {
+            state.adapt.steps = steps.clamp(*TUNING_STEPS.start(), *TUNING_STEPS.end());
+        }
         AdaptCommand::Start => {
             if state.adapting().is_some() {
                 return;

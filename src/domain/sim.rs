@@ -23,6 +23,7 @@ mod membrane;
 mod relax;
 mod rig;
 mod spoil;
+mod training;
 
 use glam::{DAffine3, DQuat, DVec3};
 
@@ -34,6 +35,7 @@ pub use grasp::{GRID_GRASPS, Grasp, POSITION_RANGE_M, THETA_RANGE_RAD, grid_gras
 pub use membrane::{Dome, Membrane};
 pub use rig::{INTRINSICS, RANGE_M, gelslim_pixel, gelslim_yz, grasp_from_camera, outward};
 pub use spoil::{Spoil, spoil_mask};
+pub use training::{Drawn, Mix, training_touch};
 
 use super::catalog::ToolSpec;
 use super::noise::{Noise, Stream};

@@ -1,6 +1,7 @@
 //! `touch2touch adapt`: a generator fitted to pairs of one's own sensors.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 use serde::Serialize;
@@ -10,7 +11,7 @@ use super::contact_mask::MaskArgs;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::domain::dataset::PairId;
-use crate::work::adapt::{AdaptSetup, Adapted, Scored, adapt};
+use crate::work::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
 
 /// Arguments of `adapt`.
 #[derive(Debug, Args)]
@@ -25,12 +26,16 @@ pub(super) struct AdaptArgs {
     pairs: Vec<String>,
     /// In how many parts the pairs are left out in turn, for the score on pairs that were not fitted; whole tools are
     /// left out where at least three are known.
-    #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u32).range(2..=1000))]
-    validate: u32,
+    /// 0 leaves nothing out: the fit is made at once, and what it is worth is not known.
+    #[arg(long, value_name = "K", default_value_t = 3, value_parser = parse_parts)]
+    validate: usize,
     /// After the closed form tune the networks themselves with so many steps, such as 50: once for each part that is left
-    /// out, and once on all pairs.
+    /// out, and once on all pairs. A run that was stopped goes on when the same is asked for again.
     #[arg(long, value_name = "STEPS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=100_000))]
     tune: u32,
+    /// Tune for so long, all these runs together; a few steps are timed first.
+    #[arg(long, value_name = "M", conflicts_with = "tune", value_parser = parse_minutes)]
+    minutes: Option<Duration>,
     #[command(flatten)]
     limit: LimitArgs,
     #[command(flatten)]
@@ -39,6 +44,17 @@ pub(super) struct AdaptArgs {
     model: ModelArgs,
     #[command(flatten)]
     common: Common,
+}
+
+fn parse_parts(text: &str) -> Result<usize, String> {
+    let parts: usize = text.parse().map_err(|_| "it must be a whole number".to_owned())?;
+    if parts == 1 || parts > 1000 { Err("it must be 0 or between 2 and 1000".into()) } else { Ok(parts) }
+}
+
+fn parse_minutes(text: &str) -> Result<Duration, String> {
+    let minutes = text.parse().ok().filter(|minutes: &f64| (0.01..=100_000.0).contains(minutes));
+    let seconds = minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes));
+    seconds.ok_or_else(|| "it must be a number of minutes between 0.01 and 100,000".into())
 }
 
 #[derive(Debug, Serialize)]
@@ -65,9 +81,10 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
         engine: predictor.engine(),
         config: predictor.config()?,
         pairs,
-        folds: args.validate as usize,
+        folds: args.validate,
         mask: (choice, predictor.mask_model(&choice)?),
-        steps: args.tune,
+        tuning: args.minutes.map(Tuning::Within).or((args.tune > 0).then_some(Tuning::Steps(args.tune))),
+        unfinished: predictor.unfinished(),
         out: args.out.clone(),
     };
     let adapted = adapt(&dataset, &setup, predictor.models(), &output.job())?;

@@ -1,130 +1,30 @@
 //! `touch2touch label`: masks drawn or taken over, review states and accepted poses, as the studio stores them.
 
-use std::path::PathBuf;
+mod args;
+mod report;
+
 use std::sync::Arc;
 
-use clap::Args;
-use serde::Serialize;
-
-use super::args::{DatasetArgs, FingerArg, keyed};
-use super::contact_mask::MaskArgs;
 use super::output::says;
-use super::pose::parse_start;
-use super::predict::{ModelArgs, Predictor};
-use super::{Common, Output, ToolArgs, VerbResult, find_pair};
+use super::predict::Predictor;
+use super::{Output, VerbResult, find_pair};
 use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
-use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{fill_holes, largest_island};
-use crate::domain::pose::{Registration, ToolModel};
-use crate::domain::rig::PadId;
+use crate::domain::pose::ToolModel;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::work::job::JobCx;
-use crate::work::labels::{HandMask, ImprintSource, Labels, PairLabels, Review, Revision};
+use crate::work::labels::{HandMask, ImprintSource, Labels, PairLabels, Revision};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
 use crate::work::tool::load_tool;
 
-/// Arguments of `label`.
-#[derive(Debug, Args)]
-pub(super) struct LabelArgs {
-    #[command(flatten)]
-    dataset: DatasetArgs,
-    /// The pair to label, by its name or a part of it that no other has; without it, all labels are listed.
-    #[arg(long)]
-    pair: Option<String>,
-    /// Set the review state.
-    #[arg(long, requires = "pair", value_parser = keyed::<Review>())]
-    review: Option<Review>,
-    /// Accept the pose of this imprint: what the registration answers, or `--pose`.
-    #[arg(long, value_name = "IMPRINT", requires = "pair", value_parser = keyed::<ImprintSource>())]
-    accept: Option<ImprintSource>,
-    /// The pose to accept instead: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as `10,0,-2`.
-    #[arg(long, value_name = "DEG,MM,MM", requires = "accept", value_parser = parse_start, allow_hyphen_values = true)]
-    pose: Option<PlanarPose>,
-    /// Withdraw the accepted pose of this imprint.
-    #[arg(long, value_name = "IMPRINT", requires = "pair", value_parser = keyed::<ImprintSource>())]
-    withdraw: Option<ImprintSource>,
-    /// Make the mask of `--mask` the corrected one.
-    #[arg(long, requires = "pair", conflicts_with = "remove_mask")]
-    adopt: bool,
-    /// Fill the holes of the mask.
-    #[arg(long, requires = "pair", conflicts_with = "remove_mask")]
-    fill_holes: bool,
-    /// Keep only the largest connected part of the mask.
-    #[arg(long, requires = "pair", conflicts_with = "remove_mask")]
-    largest_island: bool,
-    /// Remove the corrected mask: the automatic source is in force again.
-    #[arg(long, requires = "pair")]
-    remove_mask: bool,
-    /// Whose mask is changed: the name of one, or `both`.
-    #[arg(long, default_value = "both")]
-    finger: FingerArg,
-    /// The imprint that masks are made from.
-    #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
-    imprint: ImprintSource,
-    /// The registration.
-    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
-    engine: Registration,
-    #[command(flatten)]
-    mask: MaskArgs,
-    #[command(flatten)]
-    tool: ToolArgs,
-    #[command(flatten)]
-    model: ModelArgs,
-    #[command(flatten)]
-    common: Common,
-}
-
-/// What is stored of a pair.
-#[derive(Debug, Serialize)]
-struct Stored {
-    name: String,
-    review: &'static str,
-    /// The fingers with a corrected mask, and how many pixels it has.
-    masks: Vec<(String, usize)>,
-    /// From the measured, from the predicted imprint.
-    accepted: [Option<AcceptedPose>; 2],
-}
-
-impl Stored {
-    fn new(name: &str, labels: &PairLabels, dataset: &Dataset) -> Self {
-        let count = |mask: &Mask| mask.as_slice().iter().filter(|&&m| m).count();
-        let mask = |(pad, hand): (PadId, &HandMask)| (dataset.rig.pad_key(pad).to_string(), count(&hand.mask));
-        Self {
-            name: name.to_owned(),
-            review: labels.review.stored(),
-            masks: labels.masks.entries().map(mask).collect(),
-            accepted: labels.accepted,
-        }
-    }
-
-    fn text(&self) -> String {
-        let masks: Vec<String> = self.masks.iter().map(|(pad, px)| format!("{pad} {px} px")).collect();
-        let masks = if masks.is_empty() { "no corrected mask".to_owned() } else { masks.join(", ") };
-        let mut text = format!("{}: {}; {masks}", self.name, self.review);
-        for (of, accepted) in ["measured", "predicted"].iter().zip(self.accepted) {
-            if let Some(accepted) = accepted {
-                let place = accepted.pose.planar.inverse();
-                let by = if accepted.by_hand { ", by hand" } else { "" };
-                text += &format!("; {of} pose {:.1}° accepted{by}", place.theta_rad.to_degrees());
-            }
-        }
-        text
-    }
-}
-
-#[derive(Debug, Serialize)]
-struct Report {
-    /// Where labels lie.
-    folder: PathBuf,
-    /// The labeled pair, or all that are labeled.
-    pairs: Vec<Stored>,
-}
+pub(super) use args::LabelArgs;
+use report::{Report, Stored};
 
 pub(super) fn run(args: &LabelArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;

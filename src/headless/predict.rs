@@ -17,6 +17,7 @@ use crate::domain::sample::{PadTouch, Sample};
 use crate::infer::bundle::Ends;
 use crate::infer::engine::{EngineChoice, resolve};
 use crate::io::statistics::ShiftStatistics;
+use crate::work::adapt::unfinished_folder;
 use crate::work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
 use crate::work::error::TaskError;
 use crate::work::imprint::{self, chain_of, imprint_of};
@@ -118,6 +119,11 @@ impl Predictor {
             what,
             hint: "name another bundle, or switch the fit off with --fit-parts none".into(),
         }))
+    }
+
+    /// Where a run that is stopped is kept; nowhere with `--no-cache`.
+    pub(super) fn unfinished(&self) -> Option<PathBuf> {
+        if self.args.no_cache { None } else { unfinished_folder() }
     }
 
     /// The models themselves.

@@ -3,6 +3,7 @@
 
 mod done;
 mod one;
+mod recipe;
 mod summary;
 mod write;
 

@@ -1,16 +1,23 @@
 //! The generator fitted to the open pairs: which pairs, how far it is, and what the fit is worth.
 
-use eframe::egui::{self, RichText, ScrollArea, Ui, vec2};
+use eframe::egui::{self, Align2, FontId, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::cx::Cx;
+use super::images::{map_of, range_of};
 use super::theme::{SMALL, caption, section};
-use super::widget::{empty, progress};
+use super::thumbnail;
+use super::widget::{curves, empty, progress};
 use crate::app::action::Action;
 use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
 use crate::app::command::{AdaptCommand, Pane, TasksCommand};
-use crate::domain::units::{fixed, mm};
+use crate::domain::units::{fixed, mm, text_mm};
 use crate::work::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
+
+/// Between pictures, points.
+const GAP: f32 = 6.0;
+/// Height of a caption over a picture, points.
+const CAPTION: f32 = 16.0;
 
 /// Nothing is kept between frames.
 pub(super) type Memory = ();
@@ -21,28 +28,88 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ui.set_min_size(ui.available_size());
         choices(cx, ui);
         ui.separator();
-        let Some(found) = cx.state.adapt.result.clone() else {
-            let (what, why) = match cx.state.adapting() {
-                Some(_) => ("The scores appear when the fit was tried", "A second or two after the last prediction"),
-                None => (
-                    "The model is as it was trained, on simulated touches",
-                    "Some pairs of your own sensors tell where their windows lie, their scale and their pattern: the \
-                     model is fitted to them in seconds, and scored on pairs that were left out",
-                ),
-            };
-            let action = Action::FitPairs.command(cx.state);
-            let action = action.map(|_| ("Fit to my pairs", Action::FitPairs.tooltip()));
-            if empty::show(ui, what, why, action) {
-                cx.act(Action::FitPairs);
-            }
-            return;
-        };
+        let found = cx.state.adapt.result.clone();
+        if found.is_none() && cx.state.tuning_curves().is_empty() {
+            return nothing_yet(cx, ui);
+        }
         ScrollArea::vertical().auto_shrink(false).id_salt("fit").show(ui, |ui| {
-            scores(cx, ui, &found);
-            pads(cx, ui, &found);
-            remarks(cx, ui, &found);
+            if let Some(found) = &found {
+                scores(cx, ui, found);
+            }
+            tuning(cx, ui);
+            before_and_after(cx, ui);
+            if let Some(found) = &found {
+                pads(cx, ui, found);
+                remarks(cx, ui, found);
+            }
         });
     });
+}
+
+fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let (what, why) = match cx.state.adapting() {
+        Some(_) => ("The scores appear when the fit was tried", "A second or two after the last prediction"),
+        None => (
+            "The model is as it was trained, on simulated touches",
+            "Some pairs of your own sensors tell where their windows lie, their scale and their pattern: the model is \
+             fitted to them in seconds, and scored on pairs that were left out",
+        ),
+    };
+    let action = Action::FitPairs.command(cx.state).map(|_| ("Fit to my pairs", Action::FitPairs.tooltip()));
+    if empty::show(ui, what, why, action) {
+        cx.act(Action::FitPairs);
+    }
+}
+
+/// How the tuning goes, or went.
+fn tuning(cx: &Cx<'_>, ui: &mut Ui) {
+    let curves = cx.state.tuning_curves();
+    if curves.is_empty() {
+        return;
+    }
+    ui.add_space(8.0);
+    ui.label(section("Tuning", cx.p));
+    let of = |unit: &str| curves.iter().filter(|curve| curve.unit == unit).collect::<Vec<_>>();
+    let size = vec2(((ui.available_width() - 12.0) / 2.0).clamp(120.0, 420.0), 110.0);
+    ui.horizontal(|ui| {
+        curves::show(ui, size, "Loss (the strong line: the run under way, or the last)", &of("loss"));
+        curves::show(ui, size, "Raw dB on touches that were left out", &of("dB"));
+    });
+}
+
+/// A touch that was left out: what was felt, and what the model draws before and after.
+fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let state = cx.state;
+    let Some(held) = state.held_back() else { return };
+    ui.add_space(8.0);
+    ui.label(section("A touch that was left out", cx.p));
+    // A fit that was made again has other pictures.
+    let fit = state.adapt.result.as_ref().map(|found| found.seconds.to_bits());
+    let (map, range) = (map_of(state), range_of(state));
+    let scale = held.measured.height() as f32 / held.measured.width().max(1) as f32;
+    let width = ((ui.available_width() - 2.0 * GAP) / 3.0).clamp(40.0, 260.0);
+    let (area, _) = ui.allocate_exact_size(vec2(3.0 * width + 2.0 * GAP, CAPTION + width * scale), Sense::hover());
+    let all = [("Felt", &held.measured), ("As it was trained", &held.before), ("Fitted to the others", &held.after)];
+    for (i, (name, picture)) in all.into_iter().enumerate() {
+        let at = area.min + vec2(i as f32 * (width + GAP), 0.0);
+        ui.painter().text(at, Align2::LEFT_TOP, name, FontId::proportional(SMALL), cx.p.weak);
+        let rect = Rect::from_min_size(at + vec2(0.0, CAPTION), vec2(width, width * scale));
+        let response = ui.interact(rect, ui.scope_id().with(("held back", i)), Sense::hover());
+        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
+        let recipe = (held.pair, held.pad, fit);
+        thumbnail::depth(cx, ui.painter(), rect, ("held back", i), recipe, (picture, map, range));
+        if let Some(pos) = response.hover_pos() {
+            let share = (pos - rect.min) / rect.size();
+            let [w, h] = picture.size();
+            let (x, y) = ((share.x * w as f32) as usize, (share.y * h as f32) as usize);
+            if let Some(value) = picture.get(x, y).filter(|v| v.is_finite()) {
+                cx.shared.readout = Some(format!("{name} ({x}, {y})   {}", text_mm(f64::from(*value))));
+            }
+        }
+    }
+    let pad = state.rig().pad_key(held.pad).into_owned();
+    let text = format!("{} {pad}, in the colors of the imprints; choose a pair in the list to see its own", held.name);
+    ui.label(caption(text, cx.p));
 }
 
 /// Which pairs, and the buttons.
@@ -67,12 +134,18 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             "From {ENOUGH_PAIRS} pairs on a fit is sound; about a tenth of a second each, the first time"
         ));
         let mut tune = cx.state.adapt.tune;
-        let tip = format!(
-            "After the closed form, {TUNING_STEPS} steps of tuning the networks themselves: about a minute each on two free \
-             cores, four times over, because the score is of pairs that were left out"
-        );
+        let tip = "After the closed form, tune the networks themselves: four runs, because the score is of pairs that \
+                   were left out; a run that was cancelled goes on when the same is asked for again";
         if ui.checkbox(&mut tune, "tune the networks").on_hover_text(tip).changed() {
             cx.push(AdaptCommand::Tune(tune));
+        }
+        if tune {
+            let mut steps = cx.state.adapt.steps;
+            let drag = egui::DragValue::new(&mut steps).speed(1.0).range(TUNING_STEPS).suffix(" steps");
+            let drag = ui.add(drag).accessible_name("Steps of tuning");
+            if drag.on_hover_text("50 take about a minute on two free cores, for each of the four runs").changed() {
+                cx.push(AdaptCommand::Steps(steps));
+            }
         }
         match cx.state.adapting() {
             Some((ticket, task)) => {
@@ -80,7 +153,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                     (task.progress.fraction(), task.progress.text.clone(), task.cancelling);
                 progress::bar(ui, (ui.available_width() - 70.0).clamp(80.0, 360.0), fraction, &text);
                 let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
-                if cancel.on_hover_text("Stop; nothing is written").clicked() {
+                if cancel.on_hover_text("Stop; the same fit goes on from here when it is asked for again").clicked() {
                     cx.push(TasksCommand::Cancel(ticket));
                 }
             }

@@ -7,8 +7,8 @@ use eframe::egui::{
 use super::cx::{Cx, side_color};
 use super::images::{absent_text, failed, map_of, range_of};
 use super::theme::{SMALL, caption, section};
+use super::thumbnail;
 use super::widget::colorbar::gradient;
-use super::widget::texture::depth_image;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane, PredictCommand};
 use crate::app::keys::{EnsembleKey, ImprintSource, PredictionKey};
@@ -104,7 +104,8 @@ fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], poses: &[Option
         let angle = poses.get(i).copied().flatten().map(|pose| units::text_deg(pose.angle_rad));
         match state.seed_imprint(recipe) {
             Some(imprint) => {
-                picture(cx, ui, &painter, rect, ("seed", i), recipe, (imprint, map, range));
+                let shown = (recipe, state.settings.shift);
+                thumbnail::depth(cx, &painter, rect, ("seed", i), shown, (imprint, map, range));
                 shade(&painter, rect, Align2::LEFT_TOP, &recipe.seed.to_string());
                 shade(&painter, rect, Align2::RIGHT_BOTTOM, angle.as_deref().unwrap_or(""));
                 if state.chosen(recipe.touch.finger) == Some(recipe) {
@@ -129,20 +130,6 @@ fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], poses: &[Option
 fn cell(width: f32, columns: usize) -> egui::Vec2 {
     let w = ((width - GAP * (columns as f32 - 1.0)) / columns as f32).max(16.0);
     vec2(w, w * 140.0 / 175.0)
-}
-
-fn picture(
-    cx: &mut Cx<'_>,
-    ui: &Ui,
-    painter: &Painter,
-    rect: Rect,
-    slot: (&str, usize),
-    recipe: impl std::hash::Hash,
-    (image, map, range): (&DepthMap, ColorMap, Range),
-) {
-    let key = (recipe, cx.state.settings.shift, map, range.lo.to_bits(), range.hi.to_bits());
-    let texture = cx.shared.textures.get(ui.ctx(), slot, key, false, || (depth_image(image, map, range), None));
-    painter.image(texture.texture.id(), rect, Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0)), Color32::WHITE);
 }
 
 /// Small text over a picture.
@@ -192,7 +179,7 @@ fn maps(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], ensemble: &Ense
             continue;
         };
         let range = range.unwrap_or_else(|| of(map));
-        picture(cx, ui, &painter, rect, ("ensemble", i), (&key, ensemble.spread.count), (map, colors, range));
+        thumbnail::depth(cx, &painter, rect, ("ensemble", i), (&key, ensemble.spread.count), (map, colors, range));
         bar(cx, ui.painter(), pos2(left, rect.bottom() + 3.0), size.x, colors, range);
         if let Some(pos) = response.hover_pos() {
             let share = (pos - rect.min) / rect.size();

@@ -1,6 +1,9 @@
 //! Fitting a generator to pairs of a real rig, with the score that it earns on pairs it was not fitted to: [`adapt`].
 
+mod adapted;
 mod gather;
+#[cfg(feature = "tune")]
+mod kept;
 mod pose;
 mod score;
 #[cfg(feature = "tune")]
@@ -9,13 +12,13 @@ mod write;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
 use super::bundles::BundleInfo;
 use super::error::TaskError;
-use super::job::JobCx;
+use super::job::{Curve, JobCx};
 use super::mask::MaskChoice;
 use super::models::Models;
 use crate::domain::dataset::PairId;
@@ -31,8 +34,11 @@ use crate::domain::sample::Scale;
 use crate::infer::bundle::Role;
 use crate::infer::engine::EngineChoice;
 use crate::io::dataset::Dataset;
+use crate::io::folders;
 use crate::io::memory::peak_mib;
 
+pub use super::error::Remark;
+pub use adapted::{Adapted, HeldBack, MOST_SHOWN, PadSummary};
 use gather::{Touch, gather};
 pub use score::Scored;
 #[cfg(feature = "tune")]
@@ -41,10 +47,22 @@ use tune::tune;
 const WHAT: &str = "Fit the model to pairs";
 /// Fewer pairs leave ghosts of the training shapes in the predictions.
 pub const ENOUGH_PAIRS: usize = 10;
+/// Fewer steps of tuning are worth nothing: the rates rise for ten steps.
+const ENOUGH_STEPS: u32 = 30;
 /// A smaller gain is none.
 const LEAST_GAIN_DB: f64 = 0.2;
 /// Most touches that a closed form takes; more change nothing and fill the memory.
 const MOST_TOUCHES: usize = 1500;
+
+/// How long the networks themselves are tuned after the closed form.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tuning {
+    /// So many steps, once for each part that is left out and once for all.
+    Steps(u32),
+    /// As many steps as fit into this time, all these runs together; a few of them are timed first.
+    Within(Duration),
+}
 
 /// What is fitted, to what, and how it is tried.
 #[derive(Clone, Debug)]
@@ -57,72 +75,21 @@ pub struct AdaptSetup {
     pub config: GenerateConfig,
     /// The pairs.
     pub pairs: Vec<PairId>,
-    /// In how many parts the pairs are left out in turn; whole tools where three are known.
+    /// In how many parts the pairs are left out in turn; whole tools where three are known. 0 tries nothing.
     pub folds: usize,
     /// How contact is found where the data have poses, and with which model.
     pub mask: (MaskChoice, Option<BundleInfo>),
-    /// Steps of tuning the networks themselves after the closed form, for each part that is left out and for all; 0 is
-    /// none.
-    pub steps: u32,
+    /// Whether and how long the networks themselves are tuned.
+    pub tuning: Option<Tuning>,
+    /// Where a run of tuning that is stopped is kept, to go on from there when the same is asked for again.
+    pub unfinished: Option<PathBuf>,
     /// The folder of the new bundle; `None` only tries.
     pub out: Option<PathBuf>,
 }
 
-/// A pair that is not in the fit, or that speaks against the others.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Remark {
-    /// The pair.
-    pub name: String,
-    /// What is the matter.
-    pub why: String,
-}
-
-/// A fit with what it is worth.
-#[derive(Clone, Debug, Serialize)]
-pub struct Adapted {
-    /// Pairs it was made from.
-    pub pairs: usize,
-    /// Touches (fingers) of these.
-    pub touches: usize,
-    /// Pairs that could not be used.
-    pub left_out: Vec<Remark>,
-    /// Pairs that contradict the rest: they are in the fit, and worth a look.
-    pub doubtful: Vec<Remark>,
-    /// The unfitted model on all touches.
-    pub before: Scored,
-    /// The closed form on touches that it was not fitted to.
-    pub closed_form: Option<Scored>,
-    /// The tuned networks, likewise; `None` where nothing was tuned.
-    pub after: Option<Scored>,
-    /// Steps of tuning.
-    pub steps: u32,
-    /// Time of everything, seconds.
-    pub seconds: f64,
-    /// Time of the fit alone, seconds.
-    pub fit_seconds: f64,
-    /// The most memory that the program had so far, MiB, where the system tells.
-    pub peak_mib: Option<u64>,
-    /// What was found for each pad.
-    pub pads: Vec<PadSummary>,
-    /// What to be careful about.
-    pub warnings: Vec<String>,
-    /// The new bundle.
-    pub bundle: Option<PathBuf>,
-}
-
-/// What was found for a pad.
-#[derive(Clone, Debug, Serialize)]
-pub struct PadSummary {
-    /// The pad's name.
-    pub pad: String,
-    /// Touches.
-    pub touches: usize,
-    /// `[right, down]` in pixels of the decoder's picture.
-    pub offset_px: [f64; 2],
-    /// Gain of the straight line.
-    pub gain: f64,
-    /// Its offset, meters.
-    pub offset_m: f64,
+/// The user's folder for runs that were stopped; `None` without a folder for such files.
+pub fn unfinished_folder() -> Option<PathBuf> {
+    folders::program_cache().map(|folder| folder.join("unfinished"))
 }
 
 /// Predicts the pairs, fits the closed form, tries it on what was left out, and writes the new bundle.
@@ -144,60 +111,40 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
     let mut corrections = closed_form(&cases, pads).map_err(fail)?;
     let fit_seconds = fitting.elapsed().as_secs_f64();
     cx.check(WHAT)?;
-    cx.progress(0, 0, "trying the fit on pairs that were left out");
-    let tools: Vec<Option<&str>> = touches.iter().map(|t| t.tool.as_deref()).collect();
-    let grasps: Vec<u32> = touches.iter().map(|t| t.id.0).collect();
-    let folds = folds(&tools, &grasps, setup.folds.max(2));
-    let made = self::left_out(&cases, pads, &folds).map_err(fail)?;
-    cx.check(WHAT)?;
-    let plain: Vec<Option<&Grid<f32>>> = touches.iter().map(|t| Some(&t.prediction)).collect();
-    let unseen: Vec<Option<&Grid<f32>>> = made.iter().map(Option::as_ref).collect();
+    let (mut parts, mut unseen) = (Vec::new(), vec![None; touches.len()]);
+    if setup.folds > 0 {
+        cx.progress(0, 0, "trying the fit on pairs that were left out");
+        let tools: Vec<Option<&str>> = touches.iter().map(|t| t.tool.as_deref()).collect();
+        let grasps: Vec<u32> = touches.iter().map(|t| t.id.0).collect();
+        parts = folds(&tools, &grasps, setup.folds.max(2));
+        unseen = self::left_out(&cases, pads, &parts).map_err(fail)?;
+        cx.check(WHAT)?;
+    }
     let mut tools = BTreeMap::new();
-    let mut angles =
-        |pictures: &[Option<&Grid<f32>>]| pose::angles(dataset, setup, models, &mut tools, &touches, pictures, cx);
-    let mut before = score::scored(&touches, &plain, &dataset.rig)?;
-    let mut closed = score::scored(&touches, &unseen, &dataset.rig)?;
-    if let (Some(before), Some(closed)) = (&mut before, &mut closed) {
-        before.angle = angles(&plain)?;
-        closed.angle = angles(&unseen)?;
-    }
-    let before = before.ok_or_else(|| TaskError::new(WHAT, "no picture could be compared with its measurement"))?;
-    let names: BTreeSet<&str> = touches.iter().map(|t| t.name.as_str()).collect();
-    let doubtful = doubts(&cases, &made).into_iter().map(|doubt| remark(&touches, &doubt)).collect();
-    let mut warnings = Vec::new();
-    if names.len() < ENOUGH_PAIRS {
-        warnings.push(format!(
-            "{} pairs are few: with fewer than {ENOUGH_PAIRS} the shapes that the model was trained on show through; \
-             expect about 1.5 dB less than with thirty",
-            names.len()
-        ));
-    }
-    let gain = closed.as_ref().and_then(|closed| Some(closed.psnr_db? - before.psnr_db?));
-    if gain.is_some_and(|gain| gain < LEAST_GAIN_DB) {
-        warnings.push(
-            "on pairs that were left out the closed form is no better than the model as it is: these sensors need no fit, or \
-             more pairs"
-                .into(),
-        );
-    }
-    if grouped {
-        warnings.push(
-            "the pictures do not say which finger they are of: two lattices of markers were found, and named by where \
-             their windows lie"
-                .into(),
-        );
-    }
-    let mut graphs = BTreeMap::new();
-    let mut after = None;
-    if setup.steps > 0 {
-        let tuned = tune(setup, &touches, &corrections, &folds, &dataset.rig, cx)?;
-        let unseen: Vec<Option<&Grid<f32>>> = tuned.left_out.iter().map(Option::as_ref).collect();
-        after = score::scored(&touches, &unseen, &dataset.rig)?;
-        if let Some(after) = &mut after {
-            after.angle = angles(&unseen)?;
+    let mut scored = |pictures: &[Option<&Grid<f32>>]| -> Result<Option<Scored>, TaskError> {
+        let mut scored = score::scored(&touches, pictures, &dataset.rig)?;
+        if let Some(scored) = &mut scored {
+            scored.angle = pose::angles(dataset, setup, models, &mut tools, &touches, pictures, cx)?;
         }
-        (graphs, corrections) = (tuned.graphs, tuned.corrections);
+        Ok(scored)
+    };
+    let plain: Vec<Option<&Grid<f32>>> = touches.iter().map(|t| Some(&t.prediction)).collect();
+    let before =
+        scored(&plain)?.ok_or_else(|| TaskError::new(WHAT, "no picture could be compared with its measurement"))?;
+    let closed = scored(&references(&unseen))?;
+    let doubtful = doubts(&cases, &unseen).into_iter().map(|doubt| remark(&touches, &doubt)).collect();
+    let mut graphs = BTreeMap::new();
+    let (mut after, mut steps, mut curves) = (None, 0, Vec::new());
+    if let Some(tuning) = setup.tuning {
+        let tuned = tune(setup, tuning, &touches, &corrections, &parts, &dataset.rig, cx)?;
+        after = scored(&references(&tuned.left_out))?;
+        (graphs, corrections, steps, curves) = (tuned.graphs, tuned.corrections, tuned.steps, tuned.curves);
+        unseen = tuned.left_out;
     }
+    let names: BTreeSet<&str> = touches.iter().map(|t| t.name.as_str()).collect();
+    let warnings = warnings(setup, names.len(), &before, closed.as_ref(), grouped, steps);
+    let held_back = touches.iter().zip(&unseen).filter_map(|(touch, after)| Some(shown(touch, after.as_ref()?)));
+    let held_back = held_back.take(MOST_SHOWN).collect();
     let fitted = Fitted { source: source(dataset, setup, &touches), pads: with_lattices(&touches, corrections) };
     let summary = fitted.pads.entries().map(|(pad, fit)| PadSummary {
         pad: dataset.rig.pad_key(pad).into_owned(),
@@ -221,14 +168,73 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         before,
         closed_form: closed,
         after,
-        steps: setup.steps,
+        steps,
+        curves,
         seconds: begin.elapsed().as_secs_f64(),
         fit_seconds,
         peak_mib: peak_mib(),
         pads,
         warnings,
         bundle: bundle.map(Path::to_owned),
+        held_back,
     })
+}
+
+fn references(pictures: &[Option<DepthMap>]) -> Vec<Option<&DepthMap>> {
+    pictures.iter().map(Option::as_ref).collect()
+}
+
+fn shown(touch: &Touch, after: &DepthMap) -> HeldBack {
+    HeldBack {
+        pair: touch.id,
+        name: touch.name.clone(),
+        pad: touch.pad,
+        measured: touch.measured.clone(),
+        before: touch.imprint(&touch.prediction),
+        after: touch.imprint(after),
+    }
+}
+
+/// What to be careful about.
+fn warnings(
+    setup: &AdaptSetup,
+    pairs: usize,
+    before: &Scored,
+    closed: Option<&Scored>,
+    grouped: bool,
+    steps: u32,
+) -> Vec<String> {
+    let gain = closed.and_then(|closed| Some(closed.psnr_db? - before.psnr_db?));
+    let mut warnings = Vec::new();
+    if pairs < ENOUGH_PAIRS {
+        warnings.push(format!(
+            "{pairs} pairs are few: with fewer than {ENOUGH_PAIRS} the shapes that the model was trained on show through; \
+             expect about 1.5 dB less than with thirty"
+        ));
+    }
+    if setup.folds == 0 {
+        warnings.push("nothing was left out, so what the fit is worth on other pairs is not known".into());
+    }
+    if gain.is_some_and(|gain| gain < LEAST_GAIN_DB) {
+        warnings.push(
+            "on pairs that were left out the closed form is no better than the model as it is: these sensors need no fit, or \
+             more pairs"
+                .into(),
+        );
+    }
+    if grouped {
+        warnings.push(
+            "the pictures do not say which finger they are of: two lattices of markers were found, and named by where \
+             their windows lie"
+                .into(),
+        );
+    }
+    if (1..ENOUGH_STEPS).contains(&steps) {
+        warnings.push(format!(
+            "{steps} steps of tuning are few: fewer than {ENOUGH_STEPS} are hardly worth more than the closed form"
+        ));
+    }
+    warnings
 }
 
 /// Tuned networks with what lies behind them.
@@ -237,11 +243,14 @@ struct Tuned {
     corrections: Vec<Option<Correction>>,
     /// What networks that were tuned without it make of each touch, meters, on the decoder's grid.
     left_out: Vec<Option<DepthMap>>,
+    steps: u32,
+    curves: Vec<Curve>,
 }
 
 #[cfg(not(feature = "tune"))]
 fn tune(
     _: &AdaptSetup,
+    _: Tuning,
     _: &[Touch],
     _: &[Option<Correction>],
     _: &[usize],

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde::Serialize;
+
 /// What failed, why, and what to do about it. Shown once, in the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TaskError {
@@ -13,6 +15,15 @@ pub struct TaskError {
     pub hint: Option<String>,
     /// How it ended.
     pub kind: TaskErrorKind,
+}
+
+/// A pair that was left out of a pass over a data set, or that is worth a look.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Remark {
+    /// The pair.
+    pub name: String,
+    /// What is the matter.
+    pub why: String,
 }
 
 /// How a task ended without a result.

@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use serde::Serialize;
+
 use super::error::TaskError;
 use crate::domain::grid::DepthMap;
 use crate::domain::postprocess::ShiftMode;
@@ -23,8 +25,19 @@ impl Cancel {
     }
 }
 
+/// A curve that grows while a job runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Curve {
+    /// What it is of, e.g. `without part 1 of 3`.
+    pub name: String,
+    /// What its values are, e.g. `loss` or `dB`: curves of one unit belong into one picture.
+    pub unit: &'static str,
+    /// `[step, value]`.
+    pub points: Vec<[f64; 2]>,
+}
+
 /// How far a job is.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Progress {
     /// Steps done.
     pub done: u64,
@@ -32,6 +45,8 @@ pub struct Progress {
     pub total: u64,
     /// What is being done now, e.g. `step 12 of 20`.
     pub text: String,
+    /// What it has found so far, where that is worth watching.
+    pub curves: Arc<[Curve]>,
 }
 
 impl Progress {
@@ -104,7 +119,12 @@ impl JobCx {
 
     /// Says how far the job is.
     pub fn progress(&self, done: u64, total: u64, text: impl Into<String>) {
-        (self.sink)(Progress { done, total, text: text.into() });
+        self.show(Progress { done, total, text: text.into(), ..Progress::default() });
+    }
+
+    /// Says how far the job is, with what there is to see besides.
+    pub fn show(&self, progress: Progress) {
+        (self.sink)(progress);
     }
 
     /// # Errors

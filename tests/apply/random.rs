@@ -307,6 +307,7 @@ draws! {
     adapt: AdaptCommand {
         1 Choose(any_of::<AdaptPairs>()),
         1 Tune(any::<bool>()),
+        1 Steps(any::<u32>()),
         1 Start,
         1 Use,
     }
@@ -361,7 +362,7 @@ draws! {
             Arc::new(Preview { recipe, picture: PreviewPicture { step: 1, of: 2, depth: DepthMap::filled(2, 2, 0.0) } })
         })),
         1 Refitted(ticket(), Just(()).prop_map(|()| Box::new(statistics())), Just(None)),
-        1 Progressed(ticket(), Just(Progress { done: 3, total: 4, text: "step".into() })),
+        1 Progressed(ticket(), Just(Progress { done: 3, total: 4, text: "step".into(), ..Progress::default() })),
         1 Finished(ticket(), Just(None)),
         1 TaskFailed(ticket(), error()),
         1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Request::Sample(t.pair)), error()),
@@ -383,12 +384,14 @@ fn adapted() -> Adapted {
         closed_form: None,
         after: None,
         steps: 0,
+        curves: Vec::new(),
         seconds: 0.0,
         fit_seconds: 0.0,
         peak_mib: None,
         pads: Vec::new(),
         warnings: Vec::new(),
         bundle: None,
+        held_back: Vec::new(),
     }
 }
 

@@ -67,6 +67,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch stats", How::Run(&[], "--limit 1 --steps 1", &[0])),
     ("touch2touch evaluate", How::Run(&[("test-set", "PATH")], "--grasps 1 --steps 1 --resamples 0", &[0])),
     ("touch2touch adapt", How::Run(&[], "--limit 2 --steps 1", &[0])),
+    ("touch2touch training-data", How::Run(&[], "--limit 1 --grasps 1", &[0])),
     ("touch2touch pose", How::Run(&[], "--limit 1", &[0])),
     // The first of the faults may well have no pose.
     ("touch2touch pose faults", How::Run(&[], "--limit 1", &[0, 1])),
@@ -144,7 +145,7 @@ impl Stage {
                 ("CASES", _) => at("cases"),
                 ("FITTED", "--out") => at(&format!("fitted {number}")),
                 ("FITTED", _) => self.small_bundle.to_str().unwrap().to_owned(),
-                ("FILE" | "OUT" | "OUT.json" | "TABLE.md", _) => at(&format!("{number} {word}")),
+                ("FILE" | "OUT" | "OUT.json" | "SHARDS" | "TABLE.md", _) => at(&format!("{number} {word}")),
                 ("PY", _) => "/no/such/python".to_owned(),
                 (json, _) if json.starts_with("--json=") => format!("--json={}", at(&format!("{number} OUT.json"))),
                 (path, _) if path.starts_with("assets/") => repository().join(path).to_str().unwrap().to_owned(),

@@ -1,7 +1,7 @@
 //! The fit to one's own pairs in the studio, with the shipped models on a few simulated grasps.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Pane, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{AdaptCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 use touch2touch::work::bundles::BundleKind;
@@ -32,6 +32,10 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     rig.harness.get_by_label_contains("6 pairs are few");
     // What was simulated lies where the model expects it.
     rig.harness.get_by_label_contains("need no fit");
+    // A touch that was left out, before and after.
+    let held = rig.harness.state().state().held_back().cloned().unwrap();
+    assert!(held.before.size() == held.measured.size() && held.before != held.after, "{}", held.name);
+    rig.harness.get_by_label("Fitted to the others");
     rig.shoot("fit-after");
     // Fitted, but not taken yet.
     assert_eq!(rig.harness.state().state().bundle(BundleKind::Generator).unwrap().id, shipped.id);
@@ -44,4 +48,32 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
         now.is_fitted() && now.name.contains("fitted to") && Some(now.id.as_ref()) == state.fitted().map(|f| &*f.id)
     );
     rig.shoot("fit-used");
+}
+
+/// For the pictures only: minutes.
+#[test]
+#[ignore = "minutes: a look at the pane while the networks are tuned"]
+fn pictures_of_tuning() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("grasps");
+    write_dataset(&data, 3);
+    for size in [[1280.0, 800.0], [1920.0, 1080.0]] {
+        let Some(mut rig) = Rig::live(size, Place::Path(data.clone())) else { return };
+        rig.send(SettingsCommand::DismissHint);
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+        rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
+        rig.send(AdaptCommand::Tune(true));
+        rig.send(AdaptCommand::Steps(30));
+        rig.send(AdaptCommand::Start);
+        let running = |rig: &Rig| rig.harness.state().state().adapting().map(|(_, task)| task.progress.done);
+        while running(&rig).is_some_and(|done| done < 70) {
+            rig.harness.step();
+        }
+        rig.shoot(&format!("tuning-{}", size[0]));
+        while running(&rig).is_some() {
+            rig.harness.step();
+        }
+        rig.settle();
+        rig.shoot(&format!("tuned-{}", size[0]));
+    }
 }

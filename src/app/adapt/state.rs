@@ -1,19 +1,21 @@
 //! What the fit is asked for, and its last answer.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use super::super::labels::state::Review;
 use super::super::state::State;
 use super::super::tasks::state::{Task, Ticket};
 use crate::domain::dataset::PairId;
-use crate::work::adapt::{AdaptSetup, Adapted};
+use crate::work::adapt::{AdaptSetup, Adapted, HeldBack, Tuning};
 use crate::work::bundles::{BundleInfo, BundleKind};
+use crate::work::job::Curve;
 
 /// Parts in which pairs are left out in turn.
 const FOLDS: usize = 3;
 
-/// Steps of tuning: about a minute on two free cores for each part and for all.
-pub const TUNING_STEPS: u32 = 50;
+/// Steps of tuning that can be asked for.
+pub const TUNING_STEPS: RangeInclusive<u32> = 30..=5000;
 
 /// Which pairs are fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
@@ -39,18 +41,26 @@ impl AdaptPairs {
 }
 
 /// The fit and how it is asked for.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct AdaptState {
     /// Which pairs.
     pub pairs: AdaptPairs,
     /// Whether the networks themselves are tuned after the closed form.
     pub tune: bool,
+    /// With how many steps: 50 take about a minute on two free cores, for each part and for all.
+    pub steps: u32,
     /// The fit under way.
     pub running: Option<Ticket>,
     /// The last fit to the open data set.
     pub result: Option<Arc<Adapted>>,
     /// Its bundle.
     pub bundle: Option<Arc<str>>,
+}
+
+impl Default for AdaptState {
+    fn default() -> Self {
+        Self { pairs: AdaptPairs::default(), tune: false, steps: 50, running: None, result: None, bundle: None }
+    }
 }
 
 impl State {
@@ -83,7 +93,8 @@ impl State {
             pairs: self.adapt_pairs().collect(),
             folds: FOLDS,
             mask: (self.settings.mask.choice, self.bundle(BundleKind::Mask).ok().cloned()),
-            steps: if self.adapt.tune { TUNING_STEPS } else { 0 },
+            tuning: self.adapt.tune.then_some(Tuning::Steps(self.adapt.steps)),
+            unfinished: None,
             out: None,
         })
     }
@@ -92,6 +103,23 @@ impl State {
     pub fn adapting(&self) -> Option<(Ticket, &Task)> {
         let ticket = self.adapt.running?;
         Some((ticket, self.tasks.running.get(&ticket)?))
+    }
+
+    /// How the tuning goes, or how the last one went.
+    pub fn tuning_curves(&self) -> &[Curve] {
+        match (self.adapting(), &self.adapt.result) {
+            (Some((_, task)), _) => &task.progress.curves,
+            (None, Some(result)) => &result.curves,
+            (None, None) => &[],
+        }
+    }
+
+    /// The chosen touch as the model drew it before and after the fit; the first one where the chosen one is not among
+    /// those that were left out.
+    pub fn held_back(&self) -> Option<&HeldBack> {
+        let all = &self.adapt.result.as_ref()?.held_back;
+        let of_pair = || all.iter().filter(|held| Some(held.pair) == self.selection.pair);
+        of_pair().find(|held| held.pad == self.selection.finger).or_else(|| of_pair().next()).or_else(|| all.first())
     }
 
     /// Whether that is what predicts now.

@@ -47,6 +47,8 @@ pub struct LiveServices {
     config_folder: Option<PathBuf>,
     /// Where fitted models are kept.
     models_folder: Option<PathBuf>,
+    /// Where tuning that was stopped is kept.
+    unfinished: Option<PathBuf>,
     models: Models,
 }
 
@@ -55,7 +57,8 @@ impl LiveServices {
     pub fn new() -> Self {
         let store = store::user_folder().map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
         let models_folder = folders::program_data().map(|folder| folder.join("models"));
-        Self { config_folder: folders::config(), models_folder, models: Models::new(store) }
+        let unfinished = adapt::unfinished_folder();
+        Self { config_folder: folders::config(), models_folder, unfinished, models: Models::new(store) }
     }
 
     /// With settings, kept predictions and fitted models in a given folder; `None` keeps none.
@@ -63,7 +66,8 @@ impl LiveServices {
         let kept = folder.as_ref().map(|folder| folder.join("predictions"));
         let store = kept.map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
         let models_folder = folder.as_ref().map(|folder| folder.join("models"));
-        Self { config_folder: folder, models_folder, models: Models::new(store) }
+        let unfinished = folder.as_ref().map(|folder| folder.join("unfinished"));
+        Self { config_folder: folder, models_folder, unfinished, models: Models::new(store) }
     }
 }
 
@@ -216,7 +220,8 @@ impl Services for LiveServices {
         // Among the models that the program looks for at its start.
         let name = format!("fitted-to-{}", names::label(&dataset.title));
         let out = self.models_folder.as_ref().map(|folder| folder.join(name));
-        let adapted = adapt::adapt(dataset, &AdaptSetup { out, ..setup.clone() }, &self.models, cx)?;
+        let setup = AdaptSetup { out, unfinished: self.unfinished.clone(), ..setup.clone() };
+        let adapted = adapt::adapt(dataset, &setup, &self.models, cx)?;
         let bundle = adapted
             .bundle
             .as_ref()

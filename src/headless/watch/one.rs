@@ -1,24 +1,21 @@
 //! One touch: prediction, masks, pose, files.
 
 use std::collections::BTreeMap;
-use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::super::output::says;
 use super::super::predict::Predictor;
 use super::done::{Done, PoseMetrics, figures};
 use super::summary::Latency;
-use super::{Source, WatchArgs, write};
+use super::{Source, WatchArgs, recipe, write};
 use crate::domain::align::Ask;
-use crate::domain::grid::Mask;
 use crate::domain::pose::{Registration, ToolModel};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
-use crate::infer::engine::resolve;
 use crate::io::dataset::{Dataset, read_in_meters};
 use crate::io::follow::Ready;
 use crate::work::compare;
@@ -65,27 +62,7 @@ impl<'a> Worker<'a> {
 
     /// Everything the result depends on besides the touch.
     pub(super) fn recipe(&mut self, tool: Option<&str>, labels: &PairLabels) -> anyhow::Result<Value> {
-        let choice = self.args.mask.choice();
-        let model = self.predictor.mask_model(&choice)?.map(|model| model.id);
-        let drawn: Vec<Option<String>> = self
-            .args
-            .mask
-            .drawn(labels)
-            .into_iter()
-            .flat_map(|l| l.masks.iter())
-            .map(|m| Some(digest(&m.as_ref()?.mask)))
-            .collect();
-        let mask = json!({"choice": choice, "model": model.as_deref(), "drawn": drawn});
-        let config = self.predictor.config()?;
-        let shift = self.predictor.shift();
-        let engine = resolve(self.predictor.engine())?;
-        let bundle = self.predictor.bundle()?;
-        Ok(json!({
-            "bundle": bundle.name, "bundle_hash": *bundle.id, "runtime": engine,
-            "sampler": config.sampler, "steps": config.steps, "seed": config.seed, "eta": config.eta,
-            "spacing": config.spacing, "guidance": config.guidance, "shift": shift, "mask": mask, "registration": self.engine, "tool": tool,
-            "camera": self.args.camera, "version": env!("CARGO_PKG_VERSION"),
-        }))
+        recipe::recipe(self.args, &mut self.predictor, self.engine, tool, labels)
     }
 
     /// The CAD model of a tool, from memory; one that was not there is looked for again.
@@ -206,13 +183,6 @@ impl<'a> Worker<'a> {
             error_deg: found.error_rad.map(f64::to_degrees),
         })
     }
-}
-
-/// Tells one drawn mask from another.
-fn digest(mask: &Mask) -> String {
-    let mut hasher = DefaultHasher::new();
-    (mask.size(), mask.as_slice()).hash(&mut hasher);
-    format!("{:016x}", hasher.finish())
 }
 
 /// The CAD model of a tool: a file, one of the dataset's, or one of the demo's.

@@ -1,90 +1,98 @@
 //! Tuning the networks themselves on the touches, after the closed form.
 
-use std::collections::BTreeMap;
+mod source;
 
-use rayon::prelude::*;
-use touch2touch_tuning::{Config, NoiseSchedule, Pair, Placement, Query, Sampler, Start, Tuner};
+use std::time::{Duration, Instant};
 
-use super::gather::{Touch, on_grid};
-use super::{AdaptSetup, Tuned, WHAT};
-use crate::domain::catalog;
-use crate::domain::diffusion;
+use touch2touch_tuning::{Config, Pair, Query, Start, Tuner};
+
+use super::gather::Touch;
+use super::kept::Kept;
+use super::{AdaptSetup, Tuned, Tuning, WHAT};
 use crate::domain::fit::{Case, closed_form};
-use crate::domain::grid::{DepthMap, Grid, RgbGrid};
-use crate::domain::postprocess::{Correction, CorrectionParts};
-use crate::domain::rig::{Rig, SensorId, lab};
-use crate::domain::sim::{self, SimConfig};
-use crate::infer::bundle::{Bundle, BundleFile, GeneratorInput, Role, ScheduleKind};
-use crate::infer::generator::prepare;
-use crate::io::dataset::ASSUMED_IMPRINT_RANGE_M;
-use crate::io::files;
+use crate::domain::grid::DepthMap;
+use crate::domain::postprocess::Correction;
+use crate::domain::rig::Rig;
+use crate::infer::bundle::Role;
 use crate::work::error::TaskError;
-use crate::work::job::JobCx;
+use crate::work::job::{Curve, JobCx, Progress};
 
-/// Simulated grasps of each tool that keep the model from forgetting what it knows.
-const SIMULATED: u64 = 6;
+use source::Source;
+
 /// Pictures predicted at a time.
 const BATCH: usize = 16;
+/// Steps that are timed where the time is given.
+const TIMED: u32 = 2;
+/// The share of the time that goes into steps; the rest goes into predicting and scoring.
+const STEPPING: f64 = 0.85;
+/// How often the run is kept.
+const KEPT_EVERY: Duration = Duration::from_secs(20);
+/// Looks at touches that were left out, during a run.
+const LOOKS: usize = 5;
+/// Touches at a look.
+const LOOKED_AT: usize = 8;
 
-/// Tunes once for each fold without it, and once on everything.
+/// Tunes once for each part without it, and once on everything.
 pub(super) fn tune(
     setup: &AdaptSetup,
+    tuning: Tuning,
     touches: &[Touch],
     corrections: &[Option<Correction>],
-    folds: &[usize],
+    parts: &[usize],
     rig: &Rig,
     cx: &JobCx,
 ) -> Result<Tuned, TaskError> {
     let source = Source::open(setup)?;
-    let pads = rig.pads().len();
     let real: Vec<Pair> =
         touches.iter().map(|t| source.pair(&t.picture, &t.target, Some(t.pad.index()))).collect::<Result<_, _>>()?;
     cx.progress(0, 0, "simulating touches that keep the model from forgetting");
     let simulated = source.simulated(setup, rig)?;
     cx.check(WHAT)?;
-    let count = folds.iter().max().map_or(0, |most| most + 1);
-    let total = u64::from(setup.steps) * (count as u64 + 1);
-    let mut done = 0;
-    let mut run = |start: &Start, pairs: Vec<Pair>, what: String| -> Result<Tuner, TaskError> {
-        let config = Config { steps: setup.steps as usize, seed: setup.config.seed, ..Config::default() };
-        let mut tuner = Tuner::new(start, pairs, config).map_err(fail)?;
-        while tuner.steps_done() < tuner.steps() {
-            cx.check(WHAT)?;
-            let step = tuner.step().map_err(fail)?;
-            done += 1;
-            cx.progress(done, total, format!("tuning {what}: step {}, loss {:.4}", step.step, step.loss));
-        }
-        Ok(tuner)
+    let with_simulated = |real: Vec<Pair>| -> Vec<Pair> { real.into_iter().chain(simulated.iter().cloned()).collect() };
+    let count = parts.iter().max().map_or(0, |most| most + 1);
+    let kept = Kept::of(setup, touches);
+    let start = source.start(setup, source.placement(corrections));
+    let config = Config { seed: setup.config.seed, ..Config::default() };
+    let steps = match tuning {
+        Tuning::Steps(steps) => steps,
+        Tuning::Within(time) => steps_within(time, count + 1, &kept, cx, || {
+            Tuner::new(&start, with_simulated(real.clone()), config.clone()).map_err(fail)
+        })?,
     };
+    let config = Config { steps: steps as usize, ..config };
+    let total = u64::from(steps) * (count as u64 + 1);
+    let mut runs = Runs { kept: &kept, cx, config, total, done: 0, begin: Instant::now(), made: 0, curves: Vec::new() };
     let mut left_out: Vec<Option<DepthMap>> = vec![None; touches.len()];
-    for fold in 0..count {
-        let others: Vec<usize> = (0..touches.len()).filter(|&i| folds[i] != fold).collect();
-        let held: Vec<usize> = (0..touches.len()).filter(|&i| folds[i] == fold).collect();
+    for part in 0..count {
+        let others: Vec<usize> = (0..touches.len()).filter(|&i| parts[i] != part).collect();
         if others.is_empty() {
             continue;
         }
         let cases: Vec<Case<'_>> = others.iter().map(|&i| touches[i].case()).collect();
-        let without = closed_form(&cases, pads).map_err(|err| TaskError::from_error(WHAT, &err))?;
-        let start = source.start(setup, source.placement(&without));
-        let pairs = others.iter().map(|&i| real[i].clone()).chain(simulated.iter().cloned()).collect();
-        let tuner = run(&start, pairs, format!("without part {} of {count}", fold + 1))?;
-        for part in held.chunks(BATCH) {
-            // A pad that the others have no pair of has no place.
-            let known: Vec<usize> =
-                part.iter().copied().filter(|&i| without[touches[i].pad.index()].is_some()).collect();
-            let queries: Vec<Query<'_>> = known.iter().map(|&i| (real[i].picture.as_slice(), real[i].frame)).collect();
-            for (&i, units) in known.iter().zip(tuner.predict(&queries).map_err(fail)?) {
-                left_out[i] = Some(source.meters(units));
-            }
+        let without = closed_form(&cases, rig.pads().len()).map_err(|err| TaskError::from_error(WHAT, &err))?;
+        // A pad that the others have no pair of has no place.
+        let known = |&i: &usize| parts[i] == part && without[touches[i].pad.index()].is_some();
+        let held: Vec<usize> = (0..touches.len()).filter(known).collect();
+        let run = Run {
+            file: format!("part-{}", part + 1),
+            name: format!("without part {} of {count}", part + 1),
+            start: source.start(setup, source.placement(&without)),
+            pairs: with_simulated(others.iter().map(|&i| real[i].clone()).collect()),
+            held: held.iter().map(|&i| &real[i]).collect(),
+        };
+        for (i, units) in held.into_iter().zip(runs.predictions(&run)?) {
+            left_out[i] = Some(source.meters(units));
         }
     }
-    let start = source.start(setup, source.placement(corrections));
-    let pairs = real.iter().cloned().chain(simulated).collect();
-    let tuned = run(&start, pairs, "on all pairs".into())?.tuned();
+    let run =
+        Run { file: "all".into(), name: "on all pairs".into(), start, pairs: with_simulated(real), held: Vec::new() };
+    let tuned = runs.tuner(&run)?.tuned();
+    let curves = runs.curves;
+    kept.clear();
     let corrections = source.corrections(&tuned.placement, corrections);
     let graphs =
         [(Role::ConditionEncoder, tuned.encoder), (Role::Denoiser, tuned.denoiser), (Role::Decoder, tuned.decoder)];
-    Ok(Tuned { graphs: graphs.into(), corrections, left_out })
+    Ok(Tuned { graphs: graphs.into(), corrections, left_out, steps, curves })
 }
 
 fn fail(err: touch2touch_tuning::Error) -> TaskError {
@@ -92,147 +100,177 @@ fn fail(err: touch2touch_tuning::Error) -> TaskError {
         .with_hint("Networks of another kind than the shipped ones are fitted in closed form: leave --tune out.")
 }
 
-/// The generator that is tuned.
-struct Source {
-    graphs: BTreeMap<Role, Vec<u8>>,
-    schedule: NoiseSchedule,
-    /// How pictures are prepared, without mean and deviation: they belong to the networks that are tuned.
-    input: GeneratorInput,
-    mean: [f32; 3],
-    std: [f32; 3],
-    range_m: [f64; 2],
-    /// `[width, height]` of the decoder's picture.
-    size: [usize; 2],
-    turned: bool,
+/// How many steps fit into a time: a few are made and thrown away. A run that goes on keeps the number it began with.
+fn steps_within(
+    time: Duration,
+    runs: usize,
+    kept: &Kept,
+    cx: &JobCx,
+    tuner: impl FnOnce() -> Result<Tuner, TaskError>,
+) -> Result<u32, TaskError> {
+    const FILE: &str = "steps";
+    let text = kept.read(FILE).and_then(|bytes| String::from_utf8(bytes).ok());
+    if let Some(steps) = text.and_then(|text| text.parse::<u32>().ok()).filter(|&steps| steps > 0) {
+        return Ok(steps);
+    }
+    let begin = Instant::now();
+    cx.progress(0, 0, "timing a few steps");
+    let mut tuner = tuner()?;
+    // The first step pays for memory too.
+    tuner.step().map_err(fail)?;
+    let first = Instant::now();
+    for _ in 0..TIMED {
+        cx.check(WHAT)?;
+        tuner.step().map_err(fail)?;
+    }
+    let each = first.elapsed().as_secs_f64() / f64::from(TIMED);
+    let left = time.saturating_sub(begin.elapsed()).as_secs_f64() * STEPPING;
+    let steps = (left / runs as f64 / each.max(1e-6)).clamp(1.0, 100_000.0) as u32;
+    kept.write(FILE, steps.to_string().as_bytes());
+    Ok(steps)
 }
 
-impl Source {
-    fn open(setup: &AdaptSetup) -> Result<Self, TaskError> {
-        let bundle: Bundle = setup.bundle.open(WHAT)?;
-        let spec = bundle.generator().ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
-        let read = |file: &BundleFile| {
-            file.read(files::MODEL).map(std::borrow::Cow::into_owned).map_err(|err| TaskError::new(WHAT, err))
-        };
-        let schedule = &spec.schedule_spec;
-        let (Some(beta_start), Some(beta_end), ScheduleKind::ScaledLinear) =
-            (schedule.beta_start, schedule.beta_end, schedule.kind)
-        else {
-            return Err(TaskError::new(WHAT, "only networks with a scaled linear schedule are tuned"));
-        };
-        let graphs = bundle.files().map(|(role, file)| Ok((role, read(file)?))).collect::<Result<_, TaskError>>()?;
-        let range = spec.output.range_m.ok_or_else(|| TaskError::new(WHAT, "it predicts no depth"))?;
-        Ok(Self {
-            graphs,
-            schedule: NoiseSchedule { steps: schedule.steps, beta_start, beta_end },
-            mean: [0, 1, 2].map(|c| spec.input.mean.get(c).map_or(0.0, |&v| v as f32)),
-            std: [0, 1, 2].map(|c| spec.input.std.get(c).map_or(1.0, |&v| v as f32)),
-            input: GeneratorInput {
-                mean: vec![0.0; spec.input.mean.len()],
-                std: vec![1.0; spec.input.std.len()],
-                ..spec.input.clone()
-            },
-            range_m: range.into(),
-            size: spec.output.size,
-            turned: spec.output.rotation_deg == 180,
-        })
-    }
+/// One run of tuning.
+struct Run<'a> {
+    /// What its files are called.
+    file: String,
+    /// What people call it.
+    name: String,
+    start: Start,
+    pairs: Vec<Pair>,
+    /// What is left out.
+    held: Vec<&'a Pair>,
+}
 
-    fn start(&self, setup: &AdaptSetup, placement: Placement) -> Start {
-        let graph = |role| self.graphs.get(&role).cloned().unwrap_or_default();
-        let config = &setup.config;
-        let eta = if config.sampler == diffusion::Sampler::Ddpm { 1.0 } else { config.eta };
-        Start {
-            encoder: graph(Role::ConditionEncoder),
-            denoiser: graph(Role::Denoiser),
-            decoder: graph(Role::Decoder),
-            schedule: self.schedule,
-            sampler: Sampler { steps: config.steps as usize, eta, seed: config.seed },
-            mean: self.mean,
-            std: self.std,
-            range_m: self.range_m,
-            unit_m: ASSUMED_IMPRINT_RANGE_M,
-            placement,
+impl Run<'_> {
+    fn queries(&self) -> Vec<Query<'_>> {
+        self.held.iter().map(|pair| (pair.picture.as_slice(), pair.frame)).collect()
+    }
+}
+
+/// The loss, and PSNR on touches that were left out, dB: `[step, value]`.
+type Curves = [Vec<[f64; 2]>; 2];
+
+/// The runs one after the other, with what is kept and shown of them.
+struct Runs<'a> {
+    kept: &'a Kept,
+    cx: &'a JobCx,
+    config: Config,
+    /// Steps of all runs.
+    total: u64,
+    done: u64,
+    begin: Instant,
+    /// Steps made since then: what was kept took no time.
+    made: u64,
+    curves: Vec<Curve>,
+}
+
+impl Runs<'_> {
+    /// What the tuned networks make of the touches that were left out, in the tuner's units.
+    fn predictions(&mut self, run: &Run<'_>) -> Result<Vec<Vec<f32>>, TaskError> {
+        let file = format!("{}.left-out", run.file);
+        let pixels = run.pairs.first().map_or(0, |pair| pair.imprint.len());
+        if let Some(bytes) = self.kept.read(&file).filter(|bytes| bytes.len() == 4 * pixels * run.held.len()) {
+            self.done += self.config.steps as u64;
+            let curves = self.kept_curves(run);
+            self.curves.extend(named(run, &curves));
+            let values: Vec<f32> =
+                bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+            return Ok(values.chunks(pixels.max(1)).map(<[f32]>::to_vec).collect());
         }
-    }
-
-    fn pair(&self, picture: &RgbGrid, target: &DepthMap, frame: Option<usize>) -> Result<Pair, TaskError> {
-        let prepared = prepare(picture, &self.input).map_err(|err| TaskError::from_error(WHAT, &err))?;
-        let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
-        // Where nothing was measured, the mean of what was.
-        let finite = || target.as_slice().iter().filter(|v| v.is_finite()).map(|&v| f64::from(v));
-        let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
-        let unit = |&v: &f32| ((if v.is_finite() { f64::from(v) } else { mean } - lo) / (hi - lo)) as f32;
-        let imprint = target.as_slice().iter().map(unit).collect();
-        Ok(Pair { picture: prepared.into_data(), imprint, frame, weight: 1.0 })
-    }
-
-    /// Touches of the simulator, which lie where the model expects them; none for other rigs than the simulator's.
-    fn simulated(&self, setup: &AdaptSetup, rig: &Rig) -> Result<Vec<Pair>, TaskError> {
-        if *rig != *Rig::lab() {
-            return Ok(Vec::new());
+        let tuner = self.tuner(run)?;
+        let mut made = Vec::with_capacity(run.held.len());
+        for part in run.queries().chunks(BATCH) {
+            self.cx.check(WHAT)?;
+            made.extend(tuner.predict(part).map_err(fail)?);
         }
-        let input: SensorId = lab::GELSLIM_ID;
-        let all: Vec<(usize, u64)> =
-            (0..catalog::tools().len()).flat_map(|tool| (0..SIMULATED).map(move |grasp| (tool, grasp))).collect();
-        let made = all.into_par_iter().map(|(tool, grasp)| {
-            let seed = setup.config.seed.wrapping_mul(1000).wrapping_add(grasp + SIMULATED * tool as u64);
-            let sample = sim::simulate(&catalog::tools()[tool], sim::random_grasp(seed), seed, &SimConfig::default());
-            let touches = sample.pads.entries().filter_map(|(_, touch)| Some((touch.picture(input)?, touch.depth()?)));
-            touches
-                .map(|(picture, bubble)| {
-                    let target = on_grid(&bubble.imprint, None, self.turned, self.size);
-                    self.pair(&picture, &target, None)
-                })
-                .collect::<Result<Vec<Pair>, TaskError>>()
+        let bytes: Vec<u8> = made.iter().flatten().flat_map(|v: &f32| v.to_le_bytes()).collect();
+        self.kept.write(&file, &bytes);
+        self.kept.remove(&state_file(run));
+        Ok(made)
+    }
+
+    /// Tunes from where the run stands, to its end.
+    fn tuner(&mut self, run: &Run<'_>) -> Result<Tuner, TaskError> {
+        let state = self.kept.read(&state_file(run));
+        let resumed =
+            state.and_then(|state| Tuner::resume(&run.start, run.pairs.clone(), self.config.clone(), &state).ok());
+        let (mut tuner, mut curves) = match resumed {
+            Some(tuner) => (tuner, self.kept_curves(run)),
+            None => {
+                let tuner = Tuner::new(&run.start, run.pairs.clone(), self.config.clone()).map_err(fail)?;
+                (tuner, Curves::default())
+            }
+        };
+        self.done += tuner.steps_done() as u64;
+        let every = (tuner.steps() / LOOKS).max(1);
+        let mut last_kept = Instant::now();
+        while tuner.steps_done() < tuner.steps() {
+            if self.cx.cancel.is_cancelled() || last_kept.elapsed() > KEPT_EVERY {
+                self.keep(run, &tuner, &curves);
+                self.cx.check(WHAT)?;
+                last_kept = Instant::now();
+            }
+            let report = tuner.step().map_err(fail)?;
+            (self.done, self.made) = (self.done + 1, self.made + 1);
+            curves[0].push([report.step as f64, f64::from(report.loss)]);
+            if report.step.is_multiple_of(every) && !run.held.is_empty() {
+                curves[1].push([report.step as f64, look(&tuner, run)?]);
+            }
+            self.show(run, &curves, report.step);
+        }
+        self.curves.extend(named(run, &curves));
+        self.kept.write(&curves_file(run), &serde_json::to_vec(&curves).unwrap_or_default());
+        Ok(tuner)
+    }
+
+    fn keep(&self, run: &Run<'_>, tuner: &Tuner, curves: &Curves) {
+        self.kept.write(&state_file(run), &tuner.to_bytes());
+        self.kept.write(&curves_file(run), &serde_json::to_vec(curves).unwrap_or_default());
+    }
+
+    fn kept_curves(&self, run: &Run<'_>) -> Curves {
+        let bytes = self.kept.read(&curves_file(run)).unwrap_or_default();
+        serde_json::from_slice(&bytes).unwrap_or_default()
+    }
+
+    fn show(&self, run: &Run<'_>, curves: &Curves, step: usize) {
+        let left = self.begin.elapsed().as_secs_f64() / self.made as f64 * (self.total - self.done) as f64;
+        let left = match left {
+            left if left > 90.0 => format!("{:.0} min left", left / 60.0),
+            left => format!("{left:.0} s left"),
+        };
+        self.cx.show(Progress {
+            done: self.done,
+            total: self.total,
+            text: format!("tuning {}: step {step} of {}, about {left}", run.name, self.config.steps),
+            curves: self.curves.iter().cloned().chain(named(run, curves)).collect(),
         });
-        Ok(made.collect::<Result<Vec<_>, _>>()?.concat())
     }
+}
 
-    /// The closed form as the tuning begins with it: in units of 0..1.
-    fn placement(&self, corrections: &[Option<Correction>]) -> Placement {
-        let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
-        let pixels = self.size[0] * self.size[1];
-        let [gain, offset_m] = corrections.iter().flatten().next().map_or([1.0, 0.0], |c| c.line);
-        let of = |correction: &Option<Correction>| match correction {
-            Some(c) => (
-                [c.offset_px[1] as f32, c.offset_px[0] as f32],
-                c.field.as_slice().iter().map(|&v| (f64::from(v) / (hi - lo)) as f32).collect(),
-            ),
-            None => ([0.0; 2], vec![0.0; pixels]),
-        };
-        let (shift, field) = corrections.iter().map(of).unzip();
-        Placement { line: [gain as f32, ((gain * lo + offset_m - lo) / (hi - lo)) as f32], shift, field }
-    }
+fn state_file(run: &Run<'_>) -> String {
+    format!("{}.tuner", run.file)
+}
 
-    /// The other way: the corrections of the pads that were fitted.
-    fn corrections(&self, placement: &Placement, fitted: &[Option<Correction>]) -> Vec<Option<Correction>> {
-        let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
-        let [gain, offset] = placement.line.map(f64::from);
-        let line = [gain, offset * (hi - lo) + lo - gain * lo];
-        let flat = |value: f32| Grid::filled(self.size[0], self.size[1], value);
-        let of = |(pad, before): (usize, &Option<Correction>)| {
-            before.as_ref()?;
-            let [down, right] = placement.shift[pad].map(f64::from);
-            let width = self.size[0];
-            let field = Grid::from_fn(self.size[0], self.size[1], |x, y| {
-                (f64::from(placement.field[pad][y * width + x]) * (hi - lo)) as f32
-            });
-            Some(Correction {
-                offset_px: [right, down],
-                line,
-                mean: flat(0.0),
-                field,
-                gain: flat(1.0),
-                response: None,
-                parts: CorrectionParts::ALL,
-            })
-        };
-        fitted.iter().enumerate().map(of).collect()
-    }
+fn curves_file(run: &Run<'_>) -> String {
+    format!("{}.json", run.file)
+}
 
-    fn meters(&self, units: Vec<f32>) -> DepthMap {
-        let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
-        let width = self.size[0];
-        Grid::from_fn(self.size[0], self.size[1], |x, y| (lo + f64::from(units[y * width + x]) * (hi - lo)) as f32)
-    }
+fn named(run: &Run<'_>, [loss, left_out]: &Curves) -> impl Iterator<Item = Curve> {
+    let curve = |unit, points: &Vec<[f64; 2]>| Curve { name: run.name.clone(), unit, points: points.clone() };
+    [curve("loss", loss), curve("dB", left_out)].into_iter().filter(|curve| !curve.points.is_empty())
+}
+
+/// PSNR on some of the touches that were left out, as they are, dB.
+fn look(tuner: &Tuner, run: &Run<'_>) -> Result<f64, TaskError> {
+    let every = run.held.len().div_ceil(LOOKED_AT);
+    let queries: Vec<Query<'_>> = run.queries().into_iter().step_by(every).collect();
+    let made = tuner.predict(&queries).map_err(fail)?;
+    let psnr = |(made, pair): (&Vec<f32>, &&Pair)| {
+        let squares = made.iter().zip(&pair.imprint).map(|(a, b)| f64::from(a - b).powi(2));
+        -10.0 * (squares.sum::<f64>() / made.len() as f64).max(f64::MIN_POSITIVE).log10()
+    };
+    let all: Vec<f64> = made.iter().zip(run.held.iter().step_by(every)).map(psnr).collect();
+    Ok(all.iter().sum::<f64>() / all.len() as f64)
 }

@@ -1,0 +1,58 @@
+//! What is stored of pairs, for programs and for people.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use crate::domain::grid::Mask;
+use crate::domain::hand::AcceptedPose;
+use crate::domain::rig::PadId;
+use crate::io::dataset::Dataset;
+use crate::work::labels::{HandMask, PairLabels};
+
+/// What is stored of a pair.
+#[derive(Debug, Serialize)]
+pub(super) struct Stored {
+    name: String,
+    review: &'static str,
+    /// The fingers with a corrected mask, and how many pixels it has.
+    masks: Vec<(String, usize)>,
+    /// From the measured, from the predicted imprint.
+    accepted: [Option<AcceptedPose>; 2],
+}
+
+impl Stored {
+    pub(super) fn new(name: &str, labels: &PairLabels, dataset: &Dataset) -> Self {
+        let count = |mask: &Mask| mask.as_slice().iter().filter(|&&m| m).count();
+        let mask = |(pad, hand): (PadId, &HandMask)| (dataset.rig.pad_key(pad).to_string(), count(&hand.mask));
+        Self {
+            name: name.to_owned(),
+            review: labels.review.stored(),
+            masks: labels.masks.entries().map(mask).collect(),
+            accepted: labels.accepted,
+        }
+    }
+
+    pub(super) fn text(&self) -> String {
+        let masks: Vec<String> = self.masks.iter().map(|(pad, px)| format!("{pad} {px} px")).collect();
+        let masks = if masks.is_empty() { "no corrected mask".to_owned() } else { masks.join(", ") };
+        let mut text = format!("{}: {}; {masks}", self.name, self.review);
+        for (of, accepted) in ["measured", "predicted"].iter().zip(self.accepted) {
+            if let Some(accepted) = accepted {
+                let place = accepted.pose.planar.inverse();
+                let by = if accepted.by_hand { ", by hand" } else { "" };
+                text += &format!("; {of} pose {:.1}° accepted{by}", place.theta_rad.to_degrees());
+            }
+        }
+        text
+    }
+}
+
+/// What `label` answers.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    /// Where labels lie.
+    pub(super) folder: PathBuf,
+    /// The labeled pair, or all that are labeled.
+    pub(super) pairs: Vec<Stored>,
+}

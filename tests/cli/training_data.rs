@@ -1,0 +1,80 @@
+//! `training-data`: a data set in the lab's format and the simulator as shards of one folder.
+
+use std::path::Path;
+
+use serde_json::Value;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::rig::lab;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::masks::{MaskStore, StoredMask};
+
+use super::{error_text, json, run};
+
+fn about(shard: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(shard.join("done.json")).unwrap()).unwrap()
+}
+
+/// The values behind a header of 128 bytes.
+fn values(shard: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(shard.join(name)).unwrap()[128..].to_vec()
+}
+
+#[test]
+fn a_data_set_and_the_simulator_become_shards_of_one_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let (set, out) = (dir.path().join("set"), dir.path().join("shards"));
+    let [set_name, out_name] = [&set, &out].map(|path| path.to_str().unwrap());
+    let made = run(
+        &["simulate", "--out", set_name, "--tools", "pattern_36,pattern_31_rod", "--grasps", "2", "--seed", "3"],
+        dir.path(),
+    );
+    assert!(made.status.success(), "{}", error_text(&made));
+    // A mask by hand wins over the CAD model, and a pair marked "skip" is left out.
+    let dataset = Dataset::open(&set).unwrap();
+    let names: Vec<String> = dataset.index.pairs.iter().map(|pair| pair.name.clone()).collect();
+    let size = dataset.load(PairId(0)).unwrap().pad(lab::RIGHT).unwrap().depth().unwrap().imprint.clone();
+    let mask = size.map(|&depth| depth > 0.006);
+    let count = mask.as_slice().iter().filter(|&&on| on).count();
+    let stored = StoredMask { mask, base: "Threshold 6.00 mm".into(), person: "test".into(), saved_unix_s: 1 };
+    MaskStore::for_dataset(&dataset).unwrap().save(&names[0], lab::RIGHT, Some(&stored)).unwrap();
+    let skipped = run(&["label", set_name, "--pair", &names[3], "--review", "skip"], dir.path());
+    assert!(skipped.status.success(), "{}", error_text(&skipped));
+
+    let write = |more: &[&str]| {
+        run(&[&["training-data", set_name, "--out", out_name, "--per-shard", "2", "--json"], more].concat(), dir.path())
+    };
+    let second = json(&write(&["--shard", "2/2"]));
+    assert_eq!((&second["written"], &second["of_others"], &second["touches"]), (&1.into(), &1.into(), &2.into()));
+    let rest = json(&write(&[]));
+    assert_eq!((&rest["written"], &rest["already"], &rest["skipped"]), (&1.into(), &1.into(), &1.into()), "{rest}");
+    assert_eq!((&rest["contact"]["hand"], &rest["contact"]["cad"]), (&1.into(), &3.into()), "{rest}");
+    let again = json(&write(&[]));
+    assert_eq!((&again["written"], &again["already"]), (&0.into(), &2.into()), "{again}");
+    let shards = || {
+        let mut all: Vec<_> = std::fs::read_dir(&out).unwrap().map(|entry| entry.unwrap().path()).collect();
+        all.sort();
+        all
+    };
+    let [first, last] = <[_; 2]>::try_from(shards()).unwrap();
+    assert_eq!((&about(&first)["samples"], &about(&last)["samples"]), (&4.into(), &2.into()));
+    let pixels = lab::BUBBLE.width * lab::BUBBLE.height;
+    let contact = values(&first, "contact.npy");
+    assert_eq!(contact[..pixels].iter().filter(|&&on| on == 1).count(), count);
+    assert_eq!((contact.len(), values(&first, "gelslim.npy").len()), (4 * pixels, 4 * 3 * 128 * 128 * 2));
+    // What differs is not taken for what was asked.
+    let other = write(&["--limit", "1"]);
+    assert!(!other.status.success() && error_text(&other).contains("holds other data"), "{}", error_text(&other));
+    // One that was cut off is written again.
+    std::fs::remove_file(first.join("done.json")).unwrap();
+    assert_eq!(json(&write(&[]))["written"], 1);
+    assert_eq!(values(&first, "contact.npy"), contact);
+
+    let simulate = ["training-data", "simulator", "--grasps", "3", "--seed", "5", "--out", out_name, "--json"];
+    let simulated = json(&run(&simulate, dir.path()));
+    assert_eq!((&simulated["touches"], &simulated["contact"]["truth"]), (&6.into(), &6.into()), "{simulated}");
+    assert_eq!(shards().len(), 3, "shards of several sources lie beside each other");
+    let shard = shards().pop().unwrap();
+    assert_eq!((&about(&shard)["source"], &about(&shard)["mix"]), (&"simulator".into(), &"train".into()));
+    let refused = run(&["training-data", set_name, "--out", out_name, "--shard", "3/2"], dir.path());
+    assert!(error_text(&refused).contains("between 1 and N"), "{}", error_text(&refused));
+}
