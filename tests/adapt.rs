@@ -109,6 +109,8 @@ fn a_fit_is_scored_on_what_was_left_out_and_becomes_a_bundle_of_its_own() {
         assert!(!refused.status.success() && said(&refused).contains(why), "{}", said(&refused));
     }
     assert_eq!(json(&adapt(&["--out", out]))["bundle"], out, "a fit may be made again");
+    let twice = run(&["adapt", "--input", set, "--bundle", out, "--runtime", "rten", "--json"], dir.path());
+    assert!(said(&twice).contains("was fitted already") && said(&twice).contains("made from"), "{}", said(&twice));
     // A damaged fit is a damaged bundle.
     std::fs::write(Path::new(out).join("fit.npz"), b"no archive").unwrap();
     let broken = run(&["generate", "--input", set, "--out", set, "--bundle", out, "--runtime", "rten"], dir.path());

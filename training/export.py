@@ -130,12 +130,22 @@ def write(net, path, inputs, outputs, examples, f16=False):
 
 def sources(record):
     """What the shards hold, in words."""
-    real = sorted({r["source"] for r in record} - {"simulator"})
-    mixes = {r["mix"] for r in record if r["source"] == "simulator"}
+    real, mixes = real_sources(record), {r["mix"] for r in record if "mix" in r}
     parts = [f"real touches of {', '.join(real)}"] if real else []
     if mixes:
         parts.append("simulated touches; the unseen tools are " + ("among them" if "unseen" in mixes else "not among them"))
     return "; ".join(parts)
+
+
+def real_sources(record):
+    """The real data sets among the shards; older shards are the simulator's and say nothing of it."""
+    return sorted({r.get("source", "simulator") for r in record} - {"simulator"})
+
+
+def titled(name, shards):
+    """The bundle's name: what it is, and what it learned from."""
+    real = real_sources(shards.record())
+    return f"{name}, {', '.join(real)}" if real else f"{name}, simulated data"
 
 
 def provenance(note, shards, states, differences):
@@ -172,7 +182,7 @@ def generator_bundle(args, out, name, nets, shapes, steps, states):
                            for i in range(0, len(chosen), 32)]).double()
     measured = shards.metres("imprint", chosen).double()
     return {
-        "format": "touch2touch-bundle", "format_version": 1, "kind": "generator", "name": name, "files": files,
+        "format": "touch2touch-bundle", "format_version": 1, "kind": "generator", "name": titled(name, shards), "files": files,
         "input": {"sensor": "gelslim", "size": [128, 128], "scale": "0..1", "mean": list(data.MEAN),
                   "std": list(data.STD), "resampling": "bilinear", "rotation_deg": 0},
         "condition": {"shape": list(shapes[0])},
@@ -204,7 +214,7 @@ def generator(args, out):
     if args.average_with:
         averaged((encoder, denoiser, decoder), args)
     shapes = (models.CONDITION, 16, 16), (models.LATENT, 16, 16)
-    return generator_bundle(args, out, "Latent diffusion, simulated data", (encoder, denoiser, decoder), shapes, args.steps,
+    return generator_bundle(args, out, "Latent diffusion", (encoder, denoiser, decoder), shapes, args.steps,
                             {"autoencoder": ae, "generator": state})
 
 
@@ -223,36 +233,36 @@ def one_shot(args, out):
     else:
         nets, shape = (net, OneShot(), Picture()), (1, 128, 128)
     title = {"vqvae": "VQ-VAE", "l1unet": "L1 UNet", "visgel": "VisGel"}[args.what]
-    return generator_bundle(args, out, f"{title}, simulated data", nets, (shape, shape), 1, {args.what: state})
+    return generator_bundle(args, out, title, nets, (shape, shape), 1, {args.what: state})
 
 
 def classifier(args, out):
     state = torch.load(Path(args.run) / "classifier.pt", weights_only=True)
-    net = baselines.Classifier()
+    net, shards = baselines.Classifier(), data.Shards(args.data)
     net.load_state_dict(state["nets"]["classifier"])
     entry, difference = write(Named(net.eval()), out / "tool_classifier.onnx", ("imprint",), ("logits", "features"),
                               (torch.rand(2, 1, 128, 128),), args.fp16)
     return {
         "format": "touch2touch-bundle", "format_version": 1, "kind": "tool_classifier",
-        "name": "Tool classifier, simulated data", "files": {"tool_classifier": entry},
+        "name": titled("Tool classifier", shards), "files": {"tool_classifier": entry},
         "input": {"sensor": "bubble", "size": [128, 128], "range_m": list(data.RANGE_M), "rotation_deg": 180},
         "output": {"classes": list(baselines.NAMES), "features": Named.FEATURES},
-        "provenance": provenance(args.note, data.Shards(args.data), {"classifier": state}, {"tool_classifier": difference}),
+        "provenance": provenance(args.note, shards, {"classifier": state}, {"tool_classifier": difference}),
     }
 
 
 def mask(args, out):
     state = torch.load(Path(args.run) / "mask.pt", weights_only=True)
-    net = models.MaskUNet()
+    net, shards = models.MaskUNet(), data.Shards(args.data)
     net.load_state_dict(state["nets"]["mask"])
     entry, difference = write(net.eval(), out / "mask_unet.onnx", ("imprint",), "logits", (torch.rand(2, 1, 140, 175),), args.fp16)
     return {
         "format": "touch2touch-bundle", "format_version": 1, "kind": "mask_unet",
-        "name": "Mask UNet, simulated data", "files": {"mask_unet": entry},
+        "name": titled("Mask UNet", shards), "files": {"mask_unet": entry},
         "input": {"sensor": "bubble", "size": [175, 140], "range_m": list(data.MASK_RANGE_M), "cast": "saturate",
                   "rotation_deg": 0},
         "output": {"classes": 2, "threshold": 0.5},
-        "provenance": provenance(args.note, data.Shards(args.data), {"mask": state}, {"mask_unet": difference}),
+        "provenance": provenance(args.note, shards, {"mask": state}, {"mask_unet": difference}),
     }
 
 

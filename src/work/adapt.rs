@@ -100,6 +100,10 @@ pub fn unfinished_folder() -> Option<PathBuf> {
 pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx) -> Result<Adapted, TaskError> {
     let begin = Instant::now();
     let fail = |err: FitError| TaskError::from_error(WHAT, &err);
+    if let Some(fit) = setup.bundle.fit() {
+        return Err(TaskError::new(WHAT, format!("{} was fitted already", setup.bundle.name))
+            .with_hint(format!("Fit the bundle that it was made from, {}, to all your pairs.", fit.from)));
+    }
     if let Some(out) = &setup.out {
         write::check_folder(out, &setup.bundle)?;
     }

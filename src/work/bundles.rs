@@ -108,12 +108,17 @@ impl BundleInfo {
 
     /// Whether it was fitted to a rig.
     pub fn is_fitted(&self) -> bool {
-        self.generator.as_ref().is_some_and(|generator| generator.fit.is_some())
+        self.fit().is_some()
+    }
+
+    /// What it was fitted to, where it was.
+    pub fn fit(&self) -> Option<&FitSource> {
+        self.generator.as_ref()?.fit.as_ref()
     }
 
     /// Why a generator that was fitted is not for this sample, in words.
     pub fn misgiving(&self, sample: &Sample) -> Option<String> {
-        self.generator.as_ref()?.fit.as_ref()?.misgiving(sample)
+        self.fit()?.misgiving(sample)
     }
 
     /// Whether it can be used with the sensors of `rig`.

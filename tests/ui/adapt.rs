@@ -48,6 +48,9 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
         now.is_fitted() && now.name.contains("fitted to") && Some(now.id.as_ref()) == state.fitted().map(|f| &*f.id)
     );
     rig.shoot("fit-used");
+    // It is made again from what it was made from.
+    let setup = rig.harness.state().state().adapt_setup().unwrap();
+    assert_eq!((setup.bundle.id, setup.pairs.len()), (shipped.id, 6));
 }
 
 /// For the pictures only: minutes.

@@ -78,14 +78,23 @@ impl State {
         }
     }
 
+    /// What is fitted: the chosen generator, or what that was fitted from.
+    fn to_be_fitted(&self) -> Option<&BundleInfo> {
+        let chosen = self.bundle(BundleKind::Generator).ok()?;
+        match chosen.fit() {
+            Some(fit) => self.library.bundle(&fit.from_sha256),
+            None => Some(chosen),
+        }
+    }
+
     /// Whether there is something to fit, and pairs to fit it to.
     pub fn can_adapt(&self) -> bool {
-        self.bundle(BundleKind::Generator).is_ok() && self.adapt_pairs().next().is_some()
+        self.to_be_fitted().is_some() && self.adapt_pairs().next().is_some()
     }
 
     /// What a fit started now would do; `None` without data, pairs or a depth generator.
     pub fn adapt_setup(&self) -> Option<AdaptSetup> {
-        let bundle = self.bundle(BundleKind::Generator).ok()?.clone();
+        let bundle = self.to_be_fitted()?.clone();
         self.can_adapt().then(|| AdaptSetup {
             config: self.settings.generate.config(&bundle),
             bundle,
