@@ -147,6 +147,11 @@ pub fn write_shards(
             }
         }
         let touches = writer.touches();
+        if touches == 0 {
+            // The trainer cannot read a shard of nothing, and what is mended should be tried again.
+            std::fs::remove_dir_all(&folder).map_err(fail)?;
+            continue;
+        }
         let left_out = &done.left_out[first_left_out..];
         let mut about = reader.about();
         about["request"] = json!(request);
@@ -159,7 +164,7 @@ pub fn write_shards(
         done.touches += touches;
         done.contact = done.contact.and(contact);
     }
-    if done.written > 0 && done.touches == 0 {
+    if done.touches == 0 && !done.left_out.is_empty() {
         let why = done.left_out.first().map_or_else(String::new, |first| format!("; {}: {}", first.name, first.why));
         return Err(TaskError::new(WHAT, format!("no pair can be used{why}"))
             .with_hint("Training needs pairs of a GelSlim image and the Soft Bubble's imprint of the same grasp."));

@@ -78,3 +78,20 @@ fn a_data_set_and_the_simulator_become_shards_of_one_folder() {
     let refused = run(&["training-data", set_name, "--out", out_name, "--shard", "3/2"], dir.path());
     assert!(error_text(&refused).contains("between 1 and N"), "{}", error_text(&refused));
 }
+
+#[test]
+fn what_cannot_be_used_leaves_nothing_behind() {
+    let dir = tempfile::tempdir().unwrap();
+    let (set, out) = (dir.path().join("set"), dir.path().join("shards"));
+    std::fs::create_dir(&set).unwrap();
+    for name in ["a_gelslim.png", "a_bubble.png"] {
+        std::fs::write(set.join(name), b"not a picture").unwrap();
+    }
+    let [set, out_name] = [&set, &out].map(|path| path.to_str().unwrap());
+    for _ in 0..2 {
+        let refused = run(&["training-data", set, "--out", out_name], dir.path());
+        let said = error_text(&refused);
+        assert!(!refused.status.success() && said.contains("no pair can be used") && said.contains("a_"), "{said}");
+        assert_eq!(std::fs::read_dir(&out).unwrap().count(), 0);
+    }
+}
