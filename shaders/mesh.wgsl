@@ -8,9 +8,16 @@ struct MeshUniform {
     color: vec4<f32>,
     // 0 = solid, 1 = x-ray (more opaque where the surface turns away from the eye).
     xray: u32,
+    // 1 = where a corner has a value, the color map shows it.
+    scalar: u32,
+    // Values at the ends of the color map.
+    lo: f32,
+    hi: f32,
+    map: u32,
+    // 1 = what a plane lays open is filled.
+    closed: u32,
     unused_0: u32,
     unused_1: u32,
-    unused_2: u32,
 }
 
 @group(1) @binding(0) var<uniform> mesh: MeshUniform;
@@ -19,31 +26,61 @@ struct Varying {
     @builtin(position) clip: vec4<f32>,
     @location(0) in_world: vec3<f32>,
     @location(1) normal: vec3<f32>,
+    // The value, and whether there is one (1) or not (0).
+    @location(2) value: vec2<f32>,
 }
 
 @vertex
-fn vs_main(@location(0) position: vec3<f32>, @location(1) normal: vec3<f32>) -> Varying {
+fn vs_main(
+    @location(0) position: vec3<f32>,
+    @location(1) normal: vec3<f32>,
+    @location(2) value: vec2<f32>,
+) -> Varying {
     var out: Varying;
     let in_world = mesh.world_from_mesh * vec4<f32>(position, 1.0);
     out.in_world = in_world.xyz;
     out.clip = view.clip_from_world * in_world;
     // Rigid motions only: normals turn like directions.
     out.normal = (mesh.world_from_mesh * vec4<f32>(normal, 0.0)).xyz;
+    out.value = value;
     return out;
 }
 
 @fragment
-fn fs_main(in: Varying) -> @location(0) vec4<f32> {
+fn fs_main(in: Varying, @builtin(front_facing) outside: bool) -> @location(0) vec4<f32> {
+    if view.plane_count > 0u {
+        if is_cut(in.in_world) {
+            discard;
+        }
+        if mesh.closed != 0u && mesh.xray == 0u && !outside {
+            // The inside of a closed surface is seen only through the cut: drawn flat and hatched it is the cut.
+            let stripe = fract((in.clip.x + in.clip.y) / 7.0) < 0.2;
+            return vec4<f32>(mesh.color.rgb * select(0.72, 0.4, stripe), 1.0);
+        }
+    }
     let to_eye = towards_eye(in.in_world);
     // The side that is seen is lit, whichever way the triangle was wound.
     var normal = normalize(in.normal);
     normal = normal * select(-1.0, 1.0, dot(normal, to_eye) >= 0.0);
-    let facing = clamp(dot(normal, to_eye), 0.0, 1.0);
     if mesh.xray != 0u {
+        let facing = clamp(dot(normal, to_eye), 0.0, 1.0);
         let rim = (1.0 - facing) * (1.0 - facing);
         return vec4<f32>(mesh.color.rgb, mix(mesh.color.a * 0.6, min(mesh.color.a * 2.5, 1.0), rim));
     }
-    // A head light and a weaker one from above; the sum stays below 1, so that the color stays itself.
-    let light = 0.25 + 0.55 * facing + 0.20 * clamp(dot(normal, view.up_in_world.xyz), 0.0, 1.0);
-    return vec4<f32>(srgb_from_linear(linear_from_srgb(mesh.color.rgb) * light), mesh.color.a);
+    var color = mesh.color.rgb;
+    var light = light_on(normal);
+    if mesh.scalar != 0u {
+        let mapped = scalar_color(mesh.map, bitcast<u32>(in.value.x / max(in.value.y, 1.0e-3)), mesh.lo, mesh.hi);
+        color = mix(color, mapped, in.value.y);
+        // A color that is to be read must not be taken for a darker one of its map.
+        light = mix(light, 0.5 + 0.5 * light, in.value.y);
+    }
+    return vec4<f32>(srgb_from_linear(linear_from_srgb(color) * light), mesh.color.a);
+}
+
+// A key light and a soft one from above; the sum stays below 1, so that the color stays itself. CPU twin: gpu::mesh::light_on.
+fn light_on(normal: vec3<f32>) -> f32 {
+    let key = clamp(dot(normal, view.key_in_world.xyz), 0.0, 1.0);
+    let above = 0.5 + 0.5 * dot(normal, view.up_in_world.xyz);
+    return 0.24 + 0.16 * above + 0.60 * key;
 }

@@ -11,7 +11,7 @@ struct PointVertex {
 
 struct PointsUniform {
     world_from_points: mat4x4<f32>,
-    // One color for all (mode 2).
+    // One color for all (mode 2), and the opacity.
     color: vec4<f32>,
     highlight: vec4<f32>,
     // Values at the ends of the color map (mode 1).
@@ -54,8 +54,9 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
     if is_hidden(point.position) {
         return out;
     }
-    var clip = view.clip_from_world * (cloud.world_from_points * vec4<f32>(point.position, 1.0));
-    if clip.w <= 0.0 {
+    let in_world = cloud.world_from_points * vec4<f32>(point.position, 1.0);
+    var clip = view.clip_from_world * in_world;
+    if clip.w <= 0.0 || is_cut(in_world.xyz) {
         return out;
     }
     var diameter = cloud.size;
@@ -75,9 +76,9 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
     if is_extra {
         out.color = cloud.highlight;
     } else if cloud.color_mode == 0u {
-        out.color = unpack4x8unorm(point.payload);
+        out.color = unpack4x8unorm(point.payload) * vec4<f32>(1.0, 1.0, 1.0, cloud.color.a);
     } else if cloud.color_mode == 1u {
-        out.color = vec4<f32>(scalar_color(cloud.map, point.payload, cloud.lo, cloud.hi), 1.0);
+        out.color = vec4<f32>(scalar_color(cloud.map, point.payload, cloud.lo, cloud.hi), cloud.color.a);
     } else {
         out.color = cloud.color;
     }
@@ -94,5 +95,5 @@ fn fs_main(in: Varying) -> @location(0) vec4<f32> {
         // A dark rim keeps the highlight visible on any color.
         return vec4<f32>(in.color.rgb * 0.15, 1.0);
     }
-    return vec4<f32>(in.color.rgb, 1.0);
+    return in.color;
 }

@@ -12,6 +12,7 @@ pub mod cloud;
 pub mod colormap;
 pub mod contact;
 pub mod dataset;
+pub mod deviation;
 pub mod diffusion;
 pub mod ensemble;
 pub mod evaluation;

@@ -11,6 +11,7 @@ pub use context::Gpu;
 pub use eframe::wgpu;
 
 pub mod context;
+pub mod edges;
 pub mod guides;
 pub mod lines;
 pub mod mesh;

@@ -14,6 +14,7 @@ pub mod adapt;
 pub mod bundles;
 pub mod cloud;
 pub mod compare;
+pub mod deviation;
 pub mod ensemble;
 pub mod error;
 pub mod evaluate;

@@ -7,14 +7,15 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec2, DVec3};
 use touch2touch::domain::colormap::{ColorMap, Range};
 use touch2touch::domain::mesh::TriMesh;
+use touch2touch::gpu::edges::EdgeStyle;
 use touch2touch::gpu::lines::{LinesItem, LinesStyle, Segment};
-use touch2touch::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
+use touch2touch::gpu::mesh::{self, Look, MeshItem, MeshStyle, Shading};
 use touch2touch::gpu::pick;
 use touch2touch::gpu::pipelines::Pipelines;
 use touch2touch::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use touch2touch::gpu::scene::{SceneData, SceneRenderer};
 use touch2touch::gpu::target::{Picture, Target};
-use touch2touch::gpu::view::{Camera, Preset};
+use touch2touch::gpu::view::{Camera, Plane, Preset};
 use touch2touch::gpu::{Gpu, GpuError, guides, shaders};
 
 use crate::support;
@@ -84,7 +85,14 @@ fn square(center: DVec3, normal: DVec3, half: f64) -> TriMesh {
 }
 
 fn mesh_item(mesh: TriMesh, style: MeshStyle) -> MeshItem {
-    MeshItem { name: "mesh".into(), revision: 0, mesh: Arc::new(mesh), shading: Shading::Flat, style }
+    MeshItem {
+        name: "mesh".into(),
+        revision: 0,
+        mesh: Arc::new(mesh),
+        shading: Shading::Flat,
+        values: Arc::default(),
+        style,
+    }
 }
 
 /// Pixels that are not background.
@@ -442,4 +450,178 @@ fn a_refused_call_is_a_value() {
     assert!(matches!(&error, GpuError::Device { what, .. } if what.contains("cannot be")), "{error}");
     let error = shaders::compile(&gpu, "nowhere.wgsl").unwrap_err();
     assert_eq!(error.to_string(), "shader nowhere.wgsl is not there");
+}
+
+/// A sphere around the origin; its corners are shared.
+fn sphere(radius: f64, rings: u32) -> TriMesh {
+    let mut mesh = TriMesh::default();
+    let around = 2 * rings;
+    for i in 0..=rings {
+        let (sp, cp) = (std::f64::consts::PI * f64::from(i) / f64::from(rings)).sin_cos();
+        for j in 0..around {
+            let (st, ct) = (std::f64::consts::TAU * f64::from(j) / f64::from(around)).sin_cos();
+            mesh.vertices.push(DVec3::new(sp * ct, sp * st, cp) * radius);
+        }
+    }
+    for i in 0..rings {
+        for j in 0..around {
+            let at = |i: u32, j: u32| i * around + j % around;
+            mesh.triangles.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
+            mesh.triangles.push([at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)]);
+        }
+    }
+    mesh
+}
+
+/// sRGB to light and back.
+fn encoded(linear: f64) -> f64 {
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
+fn decoded(srgb: f64) -> f64 {
+    if srgb <= 0.040_45 { srgb / 12.92 } else { ((srgb + 0.055) / 1.055).powf(2.4) }
+}
+
+#[test]
+fn a_sphere_is_shaded_as_the_light_says() {
+    let Some(mut view) = View::new() else { return };
+    let style = MeshStyle { color: [0.8, 0.5, 0.3], ..MeshStyle::default() };
+    for (revision, orthographic) in [(1, true), (2, false)] {
+        view.camera = Camera { orthographic, ..Camera::default() };
+        let item = MeshItem { revision, shading: Shading::Smooth, ..mesh_item(sphere(0.02, 64), style) };
+        let picture = view.picture(&SceneData { meshes: vec![item], ..scene() });
+        let [right, up, back] = view.camera.axes();
+        let mut brightest = (0u8, 0.0);
+        for (a, b) in [(0.0, 0.0), (-0.5, 0.5), (0.5, 0.3), (0.4, -0.6), (-0.2, -0.7)] {
+            let normal: DVec3 = (right * a + up * b + back * (1.0f64 - a * a - b * b).sqrt()).normalize();
+            let [x, y] = view.pixel(normal * 0.02);
+            let light = mesh::light_on(normal, &view.camera);
+            let found = picture.rgb(x, y).unwrap();
+            for (channel, color) in style.color.into_iter().enumerate() {
+                let wanted = 255.0 * encoded(decoded(f64::from(color)) * light);
+                // A pixel of the sphere spans a degree or two.
+                assert!((f64::from(found[channel]) - wanted).abs() < 6.0, "{a} {b}: {found:?}, {wanted} ({light})");
+            }
+            if found[0] > brightest.0 {
+                brightest = (found[0], a);
+            }
+        }
+        assert!(brightest.1 < 0.0, "the key light comes from the left");
+    }
+}
+
+#[test]
+fn depth_shading_darkens_below_a_step_and_nothing_else() {
+    let Some(mut view) = View::new() else { return };
+    for orthographic in [true, false] {
+        view.camera = Camera { orthographic, ..Camera::default() };
+        let [right, _, back] = view.camera.axes();
+        let style = MeshStyle { color: [0.8; 3], ..MeshStyle::default() };
+        // A wall, and a smaller plate 4 mm in front of it.
+        let wall = MeshItem { name: "wall".into(), ..mesh_item(square(DVec3::ZERO, back, 0.03), style) };
+        let plate = MeshItem { name: "plate".into(), ..mesh_item(square(back * 0.004, back, 0.01), style) };
+        let mut picture = |eye_dome: bool| {
+            view.picture(&SceneData { meshes: vec![wall.clone(), plate.clone()], eye_dome, ..scene() })
+        };
+        let (plain, shaded) = (picture(false), picture(true));
+        let (_, u) = back.any_orthonormal_pair();
+        // Away from the plate's corner along its own edge.
+        let (v, _) = back.any_orthonormal_pair();
+        let edge = back * 0.004 + v * 0.01;
+        let [x, y] = view.pixel(edge);
+        let outward = {
+            let (a, _) = view.camera.project(edge, SIZE).unwrap();
+            let (b, _) = view.camera.project(edge + v * 0.001, SIZE).unwrap();
+            (b - a).normalize()
+        };
+        let beside =
+            |by: f64| [(f64::from(x) + 0.5 + outward.x * by) as u32, (f64::from(y) + 0.5 + outward.y * by) as u32];
+        let value = |picture: &Picture, [x, y]: [u32; 2]| i32::from(picture.rgb(x, y).unwrap()[0]);
+        // The first pixels of the wall beyond the plate's edge; which they are depends on where the edge falls.
+        let darker = [0.5, 1.0, 1.5, 2.0].map(|by| value(&plain, beside(by)) - value(&shaded, beside(by)));
+        assert!(darker.iter().any(|by| *by > 25), "{darker:?}");
+        let far = beside(8.0);
+        assert_eq!(value(&shaded, far), value(&plain, far), "the wall away from the step");
+        let middle = view.pixel(back * 0.004 + (right + u) * 0.001);
+        assert_eq!(value(&shaded, middle), value(&plain, middle), "the plate");
+        assert_eq!(shaded.rgb(1, 1), Some(BACKGROUND));
+    }
+}
+
+#[test]
+fn distances_on_a_surface_have_the_colors_of_their_cpu_twin() {
+    let Some(mut view) = View::new() else { return };
+    let back = view.camera.axes()[2];
+    let range = Range { lo: -0.001, hi: 0.001 };
+    let map = ColorMap::Diverging;
+    for (revision, value) in [(1, -0.0012f32), (2, -0.0005), (3, 0.0), (4, 0.0004), (5, 0.002), (6, f32::NAN)] {
+        let mesh = square(DVec3::ZERO, back, 0.02);
+        let style = MeshStyle { color: [0.5; 3], map, range, ..MeshStyle::default() };
+        let values: Arc<[f32]> = vec![value; mesh.vertices.len()].into();
+        let item = MeshItem { revision, values, ..mesh_item(mesh, style) };
+        let [x, y] = view.pixel(DVec3::ZERO);
+        let found = view.picture(&SceneData { meshes: vec![item], ..scene() }).rgb(x, y).unwrap();
+        let light = mesh::light_on(back, &view.camera);
+        let (color, light) =
+            if value.is_nan() { ([0.5; 3], light) } else { (map.rgb(range.unit(value)), 0.5 + 0.5 * light) };
+        for (found, color) in found.into_iter().zip(color) {
+            let wanted = 255.0 * encoded(decoded(f64::from(color)) * light);
+            assert!((f64::from(found) - wanted).abs() < 3.0, "{value}: {found} {wanted}");
+        }
+    }
+}
+
+#[test]
+fn a_plane_cuts_meshes_and_points_and_fills_what_it_lays_open() {
+    let Some(mut view) = View::new() else { return };
+    view.camera = Camera { orthographic: true, ..Camera::default() };
+    let back = view.camera.axes()[2];
+    let style = MeshStyle { color: [0.9, 0.1, 0.1], ..MeshStyle::default() };
+    let ball = MeshItem { shading: Shading::Smooth, ..mesh_item(sphere(0.02, 32), style) };
+    let inner = cloud(&[back * 0.012], &[[0, 255, 0]], PointSize::Px(9.0));
+    let mut picture = |cut: Vec<Plane>, closed: bool| {
+        let mesh = MeshItem { style: MeshStyle { closed, ..style }, ..ball.clone() };
+        view.picture(&SceneData { meshes: vec![mesh], clouds: vec![inner.clone()], cut, ..scene() })
+    };
+    let center = [SIZE[0] / 2, SIZE[1] / 2];
+    let whole = picture(vec![], true);
+    let red = whole.rgb(center[0], center[1]).unwrap();
+    assert!(red[0] > 150 && red[1] < 120, "the ball hides the point: {red:?}");
+    // The near half goes away, and the point with it: one sees the cut, flat and hatched.
+    let open = picture(vec![Plane::through(DVec3::ZERO, -back)], true);
+    let reds: std::collections::BTreeSet<u8> = (0..7).map(|i| open.rgb(center[0] + i, center[1]).unwrap()[0]).collect();
+    assert_eq!(reds.len(), 2, "a flat color and its stripes: {reds:?}");
+    let bowl = picture(vec![Plane::through(DVec3::ZERO, -back)], false);
+    assert!(!reds.contains(&bowl.rgb(center[0], center[1]).unwrap()[0]), "an open surface is lit, not filled");
+    // The far half goes away: nothing changes for the eye.
+    assert_eq!(picture(vec![Plane::through(DVec3::ZERO, back)], true).rgb(center[0], center[1]), Some(red));
+    // Everything goes away.
+    assert!(inked(&picture(vec![Plane::through(back, back)], true)).is_empty());
+}
+
+#[test]
+fn an_outline_shows_edges_alone_and_faintly_what_is_behind() {
+    let Some(mut view) = View::new() else { return };
+    let back = view.camera.axes()[2];
+    let edges = EdgeStyle { color: [0.0, 1.0, 0.0], opacity: 1.0, width_px: 3.0, creases: true };
+    let style = MeshStyle { look: Look::Outline, edges: Some(edges), ..MeshStyle::default() };
+    let item = MeshItem { name: "outline".into(), ..mesh_item(square(DVec3::ZERO, back, 0.02), style) };
+    let (v, _) = back.any_orthonormal_pair();
+    let [inside, on] = [view.pixel(DVec3::ZERO), view.pixel(v * 0.02)];
+    let alone = view.picture(&SceneData { meshes: vec![item.clone()], ..scene() });
+    assert_eq!(alone.rgb(inside[0], inside[1]), Some(BACKGROUND), "no face");
+    assert_eq!(alone.rgb(on[0], on[1]), Some([0, 255, 0]), "an edge");
+    let wall = MeshStyle { color: [0.6; 3], ..MeshStyle::default() };
+    let wall = MeshItem { name: "wall".into(), ..mesh_item(square(back * 0.01, back, 0.05), wall) };
+    let meshes = vec![wall, item];
+    let hidden = view.picture(&SceneData { meshes: meshes.clone(), ..scene() }).rgb(on[0], on[1]).unwrap();
+    assert!(hidden[1] > hidden[0] + 20 && hidden[0] > 40, "faint: {hidden:?}");
+    let with_depth = view.picture(&SceneData { meshes, eye_dome: true, ..scene() }).rgb(on[0], on[1]).unwrap();
+    assert_eq!(with_depth, hidden, "the same in the picture of two passes");
+    // A ball has its silhouette, and no edge of its facets.
+    let ball = MeshItem { name: "ball".into(), ..mesh_item(sphere(0.02, 48), style) };
+    let ball = view.picture(&SceneData { meshes: vec![ball], ..scene() });
+    assert_eq!(ball.rgb(inside[0], inside[1]), Some(BACKGROUND));
+    let ring = inked(&ball).len();
+    assert!((150..2500).contains(&ring), "{ring} pixels of a ring");
 }

@@ -6,12 +6,19 @@ struct ViewUniform {
     clip_from_world: mat4x4<f32>,
     // xyz, w = 1: where the eye is (perspective). xyz, w = 0: the direction towards it (orthographic).
     eye_in_world: vec4<f32>,
-    // Towards the top of the screen; light comes from above the eye.
+    // Towards the top of the screen; soft light comes from there.
     up_in_world: vec4<f32>,
+    // Towards the key light: above the eye, to its left.
+    key_in_world: vec4<f32>,
+    // How clip depth becomes meters in front of the eye, see meters_of.
+    depth: vec4<f32>,
     size_px: vec2<f32>,
     // Pixels per meter where clip w = 1; divide by clip w for any other place.
     px_per_m: f32,
-    unused: f32,
+    // How many of the planes cut.
+    plane_count: u32,
+    // Normal and offset: what has dot(normal, p) + offset < 0 is cut away.
+    planes: array<vec4<f32>, 8>,
 }
 
 @group(0) @binding(0) var<uniform> view: ViewUniform;
@@ -34,6 +41,25 @@ fn offset_px(clip: vec4<f32>, px: vec2<f32>) -> vec4<f32> {
 // The unit vector from a point towards the eye.
 fn towards_eye(p_in_world: vec3<f32>) -> vec3<f32> {
     return normalize(view.eye_in_world.xyz - p_in_world * view.eye_in_world.w);
+}
+
+// Meters in front of the eye of a clip depth. Perspective (depth.z = 0): depth.x / z. Orthographic: depth.x - depth.y z.
+fn meters_of(z: f32) -> f32 {
+    return select(depth_parallel(z), view.depth.x / max(z, 1.0e-9), view.depth.z == 0.0);
+}
+
+fn depth_parallel(z: f32) -> f32 {
+    return view.depth.x - view.depth.y * z;
+}
+
+// Whether a point lies behind one of the cutting planes.
+fn is_cut(p_in_world: vec3<f32>) -> bool {
+    for (var i = 0u; i < view.plane_count; i++) {
+        if dot(view.planes[i].xyz, p_in_world) + view.planes[i].w < 0.0 {
+            return true;
+        }
+    }
+    return false;
 }
 
 // Two triangles that cover -1..1, vertex 0..5.

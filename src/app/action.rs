@@ -10,9 +10,10 @@ use super::inspect::state::Inspected;
 use super::keys::{ImprintSource, Registration, Request, ShiftMode};
 use super::labels::state::Review;
 use super::library::state::Place;
+use super::settings::state::scene::{LayerLook, SceneLayer, SceneLook};
 use super::settings::state::{ColorRange, MaskTool, Theme, Workspace};
 use super::state::{Absent, State};
-use super::workbench::state::{Layer, SceneTool};
+use super::workbench::state::{Layer, SceneTool, Section};
 use crate::domain::hand::HandAxis;
 
 /// A key, by what is printed on it.
@@ -312,9 +313,15 @@ actions! {
     CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl_alt(K::Num2)];
     CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl_alt(K::Num3)];
     CameraTop, View, "View from the top", "Looks along the tool", [ctrl_alt(K::Num4)];
-    NextLayer, View, "Next layer", "Goes through the layers of the 3D panes: none, residuals, reasons, lines", [plain(K::V)];
+    NextLayer, View, "Next layer", "Goes through the layers of the 3D panes: none, residuals, reasons, distance, lines", [plain(K::V)];
     AnimateWeakest, View, "Animate weak direction", "Moves the tool to and fro by at most 2 mm and 2° in the direction that the contact determines least", [];
     BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [];
+    Section, View, "Cut open", "Cuts the 3D views open with a plane, or no longer", [plain(K::X)];
+    WindowOnly, View, "GelSlim's window only", "Draws in 3D only what the GelSlims see, or all of it", [plain(K::W)];
+    MembraneSurface, View, "Membrane as a surface", "Draws the membrane in 3D as a surface, or as points", [];
+    EyeDome, View, "Depth shading", "Darkens in 3D what lies behind its neighbors (eye-dome lighting), or not", [];
+    Parallel, View, "Parallel projection", "Looks at 3D along parallel lines, or in perspective", [plain(K::I)];
+    CopyCamera, View, "Copy the camera", "Copies where the 3D view under the pointer looks from; Ctrl+V over a 3D view takes it over", [];
     LinkCameras, View, "Link cameras", "Moves both 3D views together", [];
     Footprint, View, "GelSlim window", "Draws the GelSlim's window on bubble images", [];
     SwitchTheme, View, "Dark or light", "Switches between the dark and the light theme", [];
@@ -518,6 +525,31 @@ impl Action {
             }
             Self::AnimateWeakest => does(WorkbenchCommand::SetAnimateWeakest(!state.workbench.animate_weakest)),
             Self::BothClouds => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds)),
+            Self::Section => {
+                let next = if state.workbench.section.is_some() { None } else { Some(Section::default()) };
+                does(WorkbenchCommand::SetSection(next))
+            }
+            Self::WindowOnly => {
+                let scene = &settings.scene;
+                does(SettingsCommand::SetScene(SceneLook { only_window: !scene.only_window, ..scene.clone() }))
+            }
+            Self::MembraneSurface => {
+                let scene = &settings.scene;
+                let surface = scene.layer(SceneLayer::Surface);
+                let points = scene.layer(SceneLayer::Membrane);
+                let changed = scene.clone().with(SceneLayer::Surface, LayerLook { shown: !surface.shown, ..surface });
+                let points = LayerLook { shown: surface.shown, ..points };
+                does(SettingsCommand::SetScene(changed.with(SceneLayer::Membrane, points)))
+            }
+            Self::EyeDome => {
+                let scene = &settings.scene;
+                does(SettingsCommand::SetScene(SceneLook { eye_dome: !scene.eye_dome, ..scene.clone() }))
+            }
+            Self::Parallel => {
+                let scene = &settings.scene;
+                does(SettingsCommand::SetScene(SceneLook { orthographic: !scene.orthographic, ..scene.clone() }))
+            }
+            Self::CopyCamera => ui(UiRequest::CopyCamera),
             Self::LinkCameras => does(SettingsCommand::SetCamerasLinked(!settings.cameras_linked)),
             Self::Footprint => does(SettingsCommand::SetFootprintVisible(!settings.footprint_visible)),
             Self::SwitchTheme => {

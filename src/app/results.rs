@@ -19,6 +19,7 @@ pub mod basin;
 pub mod cache;
 pub mod cloud;
 pub mod comparison;
+pub mod deviation;
 pub mod ensemble;
 pub mod imprint;
 pub mod inspection;
@@ -235,6 +236,8 @@ results! {
     Run(run::RunKey) in runs, 32 * MIB;
     /// Reasons, residuals and distances of a recorded registration from the engine's own starts.
     Layers(layers::LayersKey) in layers, 16 * MIB;
+    /// Signed distances between contact points and the registered model.
+    Deviation(deviation::DeviationKey) in deviations, 64 * MIB;
     /// The steps of a recorded registration, made ready to be looked through.
     Inspection(inspection::InspectionKey) in inspections, 64 * MIB;
     /// Where starts lead.

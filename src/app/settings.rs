@@ -2,6 +2,7 @@
 
 pub mod state;
 
+pub use state::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
 pub use state::{
     BRUSH_RADIUS_PX, ColorMap, ColorRange, GenerateSettings, MAX_CACHE_MIB, MAX_RECENT, MaskChoice, MaskSettings,
     MaskSource, MaskTool, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
@@ -55,6 +56,8 @@ pub enum SettingsCommand {
     SetCacheBudget(u32),
     /// Whether the 3D views move together.
     SetCamerasLinked(bool),
+    /// How the 3D views look.
+    SetScene(SceneLook),
     /// The workspace in front.
     SetWorkspace(Workspace),
     /// The arrangement of the panes of a workspace, in the window's format.
@@ -100,6 +103,7 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
         SettingsCommand::SetRuntime(runtime) => settings.runtime = runtime,
         SettingsCommand::SetCacheBudget(mib) => settings.cache_mib = mib,
         SettingsCommand::SetCamerasLinked(linked) => settings.cameras_linked = linked,
+        SettingsCommand::SetScene(look) => settings.scene = look.validated(),
         SettingsCommand::SetWorkspace(workspace) => settings.workspace = workspace,
         SettingsCommand::SetLayout(workspace, layout) => {
             settings.layouts.insert(workspace.name().to_owned(), layout);

@@ -134,6 +134,7 @@ impl Wanted<'_> {
             self.ask(run);
         }
         self.layers(source);
+        self.deviation(source);
     }
 
     fn neighbors(&mut self) {

@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::{HandTry, Layer, Picked, PoseOf, SceneTool, Workbench};
+pub use state::{HandTry, Layer, Picked, PoseOf, SECTION_REACH_M, SceneTool, Section, SectionAxis, Workbench};
 
 use glam::DVec3;
 
@@ -26,6 +26,8 @@ pub enum WorkbenchCommand {
     SetAnimateWeakest(bool),
     /// Whether each 3D pane shows the clouds of both imprints.
     SetBothClouds(bool),
+    /// What cuts the 3D views open; nothing does without one.
+    SetSection(Option<Section>),
     /// What a click does.
     SetTool(SceneTool),
     /// Whether the tool can leave the plane; closing it brings the tool back into the plane.
@@ -56,6 +58,10 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
         WorkbenchCommand::SetLayer(layer) => bench.layer = layer,
         WorkbenchCommand::SetAnimateWeakest(on) => bench.animate_weakest = on,
         WorkbenchCommand::SetBothClouds(on) => bench.both_clouds = on,
+        WorkbenchCommand::SetSection(section) => {
+            let within = |s: Section| Section { at_m: s.at_m.clamp(-SECTION_REACH_M, SECTION_REACH_M), ..s };
+            bench.section = section.filter(|s| s.at_m.is_finite()).map(within);
+        }
         WorkbenchCommand::SetTool(tool) => {
             bench.tool = tool;
             bench.marks.clear();

@@ -5,6 +5,7 @@
 use glam::{DVec2, DVec3};
 
 use super::grid::{DepthMap, Mask};
+use super::mesh::TriMesh;
 use super::sample::DepthCamera;
 
 /// Why an imprint cannot be lifted.
@@ -122,6 +123,33 @@ pub(super) fn check(imprint: &DepthMap, camera: &DepthCamera) -> Result<(), Clou
 
 fn same_size(what: &'static str, size: [usize; 2], imprint: &DepthMap) -> Result<(), CloudError> {
     if size == imprint.size() { Ok(()) } else { Err(CloudError::Size { what, size, imprint: imprint.size() }) }
+}
+
+/// Neighbors farther apart than this are no surface: the membrane jumps there, or a pixel flies, meters.
+const JUMP_M: f64 = 0.002_5;
+
+/// The surface through points of neighboring pixels (`pixels` in row order, one per point), cut where it jumps. Its
+/// vertices are the points, in their order.
+pub fn surface(points: &[DVec3], pixels: &[[u16; 2]]) -> TriMesh {
+    let at = |x: u16, y: u16| {
+        let found = pixels.binary_search_by_key(&(y, x), |p| (p[1], p[0])).ok()?;
+        points.get(found).filter(|p| p.is_finite()).map(|p| (found as u32, *p))
+    };
+    let mut triangles = Vec::new();
+    let mut add = |corners: [Option<(u32, DVec3)>; 3]| {
+        if let [Some(a), Some(b), Some(c)] = corners
+            && [a.1 - b.1, b.1 - c.1, c.1 - a.1].iter().all(|edge| edge.length_squared() <= JUMP_M * JUMP_M)
+        {
+            triangles.push([a.0, b.0, c.0]);
+        }
+    };
+    for &[x, y] in pixels {
+        let (Some(right), Some(below)) = (x.checked_add(1), y.checked_add(1)) else { continue };
+        let (a, b, c, d) = (at(x, y), at(right, y), at(x, below), at(right, below));
+        add([a, c, b]);
+        add([b, c, d]);
+    }
+    TriMesh { vertices: points.to_vec(), triangles }
 }
 
 #[cfg(test)]

@@ -61,6 +61,11 @@ pub fn angle_error(a: f64, b: f64) -> f64 {
     wrap_angle(a - b).abs()
 }
 
+/// A number from a file or a text box, brought into a range; what is not finite becomes `default`.
+pub fn clamp_or(value: f32, lo: f32, hi: f32, default: f32) -> f32 {
+    if value.is_finite() { value.clamp(lo, hi) } else { default }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

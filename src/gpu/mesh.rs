@@ -7,9 +7,12 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, DVec3};
 
 use super::buffer::{Elements, Uniform};
+use super::edges::{EdgeData, EdgeStyle};
 use super::pipelines::Pipelines;
-use super::vertex::MeshVertex;
+use super::vertex::{CREASE_RAD, MeshVertex};
+use super::view::Camera;
 use super::{Gpu, GpuError, view, wgpu};
+use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::mesh::TriMesh;
 
 /// A mesh to be shown.
@@ -21,8 +24,10 @@ pub struct MeshItem {
     pub revision: u64,
     /// Meters, in its own frame. Triangles with a corner that does not exist or is not finite are left out.
     pub mesh: Arc<TriMesh>,
-    /// How edges are shaded.
+    /// How normals are made.
     pub shading: Shading,
+    /// A value per vertex, shown through [`MeshStyle::map`] and [`MeshStyle::range`] where it is finite; empty for none.
+    pub values: Arc<[f32]>,
     /// Everything that may change at every frame.
     pub style: MeshStyle,
 }
@@ -43,8 +48,10 @@ pub enum Look {
     /// Hides them, or tints them where the opacity is below 1.
     #[default]
     Solid,
-    /// Lets all of them through; its outline is stronger than its faces.
+    /// Lets all of them through; its rim is stronger than its faces.
     XRay,
+    /// No faces: [`MeshStyle::edges`] alone, faint where something is in front.
+    Outline,
 }
 
 /// How a mesh looks and where it is.
@@ -56,13 +63,30 @@ pub struct MeshStyle {
     pub color: [f32; 3],
     /// 0..1.
     pub opacity: f32,
-    /// Solid or x-ray.
+    /// Solid, x-ray, or edges alone.
     pub look: Look,
+    /// Its edges, if they are drawn.
+    pub edges: Option<EdgeStyle>,
+    /// For [`MeshItem::values`].
+    pub map: ColorMap,
+    /// For [`MeshItem::values`].
+    pub range: Range,
+    /// Whether the surface has an inside: what a plane lays open is then filled.
+    pub closed: bool,
 }
 
 impl Default for MeshStyle {
     fn default() -> Self {
-        Self { world_from_mesh: DAffine3::IDENTITY, color: [0.75, 0.75, 0.78], opacity: 1.0, look: Look::Solid }
+        Self {
+            world_from_mesh: DAffine3::IDENTITY,
+            color: [0.75, 0.75, 0.78],
+            opacity: 1.0,
+            look: Look::Solid,
+            edges: None,
+            map: ColorMap::Diverging,
+            range: Range { lo: 0.0, hi: 1.0 },
+            closed: true,
+        }
     }
 }
 
@@ -73,9 +97,20 @@ pub(super) struct MeshUniform {
     pub(super) world_from_mesh: [f32; 16],
     pub(super) color: [f32; 4],
     pub(super) xray: u32,
+    pub(super) scalar: u32,
+    pub(super) lo: f32,
+    pub(super) hi: f32,
+    pub(super) map: u32,
+    pub(super) closed: u32,
     pub(super) unused_0: u32,
     pub(super) unused_1: u32,
-    pub(super) unused_2: u32,
+}
+
+/// How bright a surface is, 0..1, for a unit normal towards the eye, with the directions of the camera. Twin of the
+/// function in `shaders/mesh.wgsl`.
+pub fn light_on(normal: DVec3, camera: &Camera) -> f64 {
+    let [_, up, _] = camera.axes();
+    0.24 + 0.16 * (0.5 + 0.5 * normal.dot(up)) + 0.60 * normal.dot(camera.key_light()).clamp(0.0, 1.0)
 }
 
 /// A mesh on the device.
@@ -85,6 +120,7 @@ pub(super) struct MeshData {
     vertices: Elements,
     uniform: Uniform<MeshUniform>,
     bindings: wgpu::BindGroup,
+    edges: Option<EdgeData>,
 }
 
 impl MeshData {
@@ -103,27 +139,45 @@ impl MeshData {
             Some(data) if data.uploaded == wanted => (data, false),
             old => {
                 let label = format!("Mesh::{}", item.name);
-                let (buffer, uniform) = old.map_or((None, None), |d| (Some(d.vertices.buffer), Some(d.uniform)));
-                let corners = vertices(&item.mesh, item.shading);
+                let (buffer, uniform, edges) =
+                    old.map_or((None, None, None), |d| (Some(d.vertices.buffer), Some(d.uniform), d.edges));
+                let corners = vertices(&item.mesh, item.shading, &item.values);
                 let vertices = Elements::upload(gpu, &label, &corners, wgpu::BufferUsages::VERTEX, buffer)?;
                 let uniform = uniform.unwrap_or_else(|| Uniform::new(gpu, &label));
                 let bindings = pipelines.bind(gpu, &label, &uniform.buffer, None);
-                (Self { uploaded: wanted, vertices, uniform, bindings }, true)
+                (Self { uploaded: wanted, vertices, uniform, bindings, edges }, true)
             }
         };
-        let [r, g, b] = item.style.color;
+        let style = &item.style;
+        let [r, g, b] = style.color;
+        let world_from_mesh = view::matrix(&style.world_from_mesh);
+        // An empty or infinite range shows the middle color, as on the CPU.
+        let sound = (style.range.hi - style.range.lo).is_finite();
+        let range = if sound { style.range } else { Range { lo: 0.0, hi: 0.0 } };
         let written = data.uniform.set(
             gpu,
             MeshUniform {
-                world_from_mesh: view::matrix(&item.style.world_from_mesh),
-                color: [r, g, b, item.style.opacity.clamp(0.0, 1.0)],
-                xray: u32::from(item.style.look == Look::XRay),
+                world_from_mesh,
+                color: [r, g, b, style.opacity.clamp(0.0, 1.0)],
+                xray: u32::from(style.look == Look::XRay),
+                scalar: u32::from(!item.values.is_empty()),
+                lo: range.lo,
+                hi: range.hi,
+                map: style.map as u32,
+                closed: u32::from(style.closed),
                 unused_0: 0,
                 unused_1: 0,
-                unused_2: 0,
             },
         );
-        Ok((data, [uploaded, written]))
+        let mut did = [uploaded, written];
+        let old = data.edges.take();
+        if let Some(edges) = &style.edges {
+            let what = (item.name.as_str(), item.revision, &*item.mesh);
+            let (found, [list, numbers]) = EdgeData::update(gpu, pipelines, old, what, (world_from_mesh, edges))?;
+            data.edges = Some(found);
+            did = [did[0] | list, did[1] | numbers];
+        }
+        Ok((data, did))
     }
 
     /// Draws with the view bound to group 0.
@@ -132,15 +186,27 @@ impl MeshData {
         pass.set_vertex_buffer(0, self.vertices.buffer.slice(..));
         pass.draw(0..self.vertices.count, 0..1);
     }
+
+    /// Draws its edges with the view bound to group 0.
+    pub(super) fn draw_edges(&self, pass: &mut wgpu::RenderPass<'_>) {
+        if let Some(edges) = &self.edges {
+            edges.draw(pass);
+        }
+    }
 }
 
 /// The corners of all triangles with their normals, three per triangle.
-fn vertices(mesh: &TriMesh, shading: Shading) -> Vec<MeshVertex> {
-    /// Faces that meet at less than this are one rounded surface.
-    const CREASE_RAD: f64 = 40.0 / 180.0 * std::f64::consts::PI;
+fn vertices(mesh: &TriMesh, shading: Shading, values: &[f32]) -> Vec<MeshVertex> {
     let corner = |i: &u32| mesh.vertices.get(*i as usize).copied().filter(|p| p.is_finite());
-    let faces: Vec<[DVec3; 3]> =
-        mesh.triangles.iter().filter_map(|t| Some([corner(&t[0])?, corner(&t[1])?, corner(&t[2])?])).collect();
+    let value = |i: u32| match values.get(i as usize) {
+        Some(v) if v.is_finite() => [*v, 1.0],
+        _ => [0.0; 2],
+    };
+    let (faces, values): (Vec<[DVec3; 3]>, Vec<[[f32; 2]; 3]>) = mesh
+        .triangles
+        .iter()
+        .filter_map(|t| Some(([corner(&t[0])?, corner(&t[1])?, corner(&t[2])?], t.map(value))))
+        .unzip();
     // Twice the area long: large triangles have more say in a shared normal.
     let areas: Vec<DVec3> = faces.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect();
     // By position, not by index: the corners of an STL file are not shared.
@@ -154,14 +220,14 @@ fn vertices(mesh: &TriMesh, shading: Shading) -> Vec<MeshVertex> {
         }
     }
     let mut out = Vec::with_capacity(faces.len() * 3);
-    for (face, area) in faces.iter().zip(&areas) {
+    for ((face, area), values) in faces.iter().zip(&areas).zip(values) {
         let own = area.normalize_or_zero();
-        for p in face {
+        for (p, value) in face.iter().zip(values) {
             let neighbors = around.get(&key(*p)).map_or(&[][..], Vec::as_slice);
             let rounded: DVec3 =
                 neighbors.iter().map(|&f| areas[f]).filter(|n| n.normalize_or_zero().dot(own) > CREASE_RAD.cos()).sum();
             let normal = rounded.try_normalize().unwrap_or(own);
-            out.push(MeshVertex { position: view::position(*p), normal: normal.as_vec3().to_array() });
+            out.push(MeshVertex { position: view::position(*p), normal: normal.as_vec3().to_array(), value });
         }
     }
     out
@@ -188,12 +254,12 @@ mod tests {
     #[test]
     fn smooth_rounds_a_tube_and_keeps_a_box_sharp() {
         let radial = |v: &MeshVertex| v.normal[0] * v.position[0] + v.normal[1] * v.position[1];
-        for v in vertices(&tube(24), Shading::Smooth) {
+        for v in vertices(&tube(24), Shading::Smooth, &[]) {
             // 2 of 3 (or 1 of 3) triangles at a corner belong to one side: a few degrees off the radius.
             assert!(radial(&v) > 0.995);
         }
         for (mesh, shading) in [(tube(4), Shading::Smooth), (tube(24), Shading::Flat)] {
-            let v = vertices(&mesh, shading);
+            let v = vertices(&mesh, shading, &[]);
             for t in v.chunks(3) {
                 assert_eq!(t[0].normal, t[1].normal);
                 assert_eq!(t[0].normal, t[2].normal);
@@ -208,7 +274,7 @@ mod tests {
         mesh.vertices.push(DVec3::NAN);
         mesh.triangles.push([0, 1, 8]);
         mesh.triangles.push([0, 0, 0]);
-        let v = vertices(&mesh, Shading::Smooth);
+        let v = vertices(&mesh, Shading::Smooth, &[]);
         assert_eq!(v.len(), 9 * 3, "the one without area stays and is invisible");
         assert!(v.iter().flat_map(|v| v.normal).all(f32::is_finite));
     }

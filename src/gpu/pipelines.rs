@@ -12,14 +12,23 @@ pub struct Pipelines {
     pub(super) plain_layout: wgpu::BindGroupLayout,
     /// A uniform and a storage buffer.
     pub(super) pulled_layout: wgpu::BindGroupLayout,
+    /// The depth of a target.
+    pub(super) depth_layout: wgpu::BindGroupLayout,
     pub(super) points: wgpu::RenderPipeline,
+    /// Hides nothing.
+    pub(super) points_translucent: wgpu::RenderPipeline,
     /// Hides what is behind it.
     pub(super) mesh_solid: wgpu::RenderPipeline,
     /// Hides nothing.
     pub(super) mesh_xray: wgpu::RenderPipeline,
+    pub(super) edges: wgpu::RenderPipeline,
+    /// Hidden by nothing.
+    pub(super) edges_overlay: wgpu::RenderPipeline,
     pub(super) lines: wgpu::RenderPipeline,
     /// Hidden by nothing.
     pub(super) lines_overlay: wgpu::RenderPipeline,
+    /// Darkens what lies behind its neighbors; reads the depth and so has none.
+    pub(super) edl: wgpu::RenderPipeline,
 }
 
 /// What differs between the pipelines.
@@ -28,9 +37,23 @@ struct Variant<'a> {
     module: &'a wgpu::ShaderModule,
     item_layout: &'a wgpu::BindGroupLayout,
     vertices: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    /// Entry point of the fragment stage.
+    fragment: &'a str,
     blend: bool,
-    depth_write: bool,
-    depth_test: bool,
+    depth: Depth,
+}
+
+/// What a pipeline does with depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Depth {
+    /// Tests and writes it.
+    Hides,
+    /// Tests it alone.
+    Tests,
+    /// Neither, in a pass that has it.
+    Ignores,
+    /// Its pass has none.
+    Absent,
 }
 
 impl Pipelines {
@@ -40,8 +63,10 @@ impl Pipelines {
     /// [`GpuError::Shader`] with file and line, or [`GpuError::Device`] with the driver's reason: to be shown in
     /// place of the view.
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
-        let [points, mesh, lines] = ["points.wgsl", "mesh.wgsl", "lines.wgsl"].map(|name| shaders::compile(gpu, name));
-        let (points, mesh, lines) = (points?, mesh?, lines?);
+        let compiled = |name| shaders::compile(gpu, name);
+        let (points, mesh, edges) = (compiled("points.wgsl")?, compiled("mesh.wgsl")?, compiled("edges.wgsl")?);
+        let lines = compiled("lines.wgsl")?;
+        let edl = compiled(if gpu.samples > 1 { "edl_many.wgsl" } else { "edl_one.wgsl" })?;
         gpu.guarded("building the render pipelines", || {
             let uniform = binding(0, wgpu::BufferBindingType::Uniform);
             let storage = binding(1, wgpu::BufferBindingType::Storage { read_only: true });
@@ -51,15 +76,16 @@ impl Pipelines {
             let view_layout = layout("Pipelines::view_layout", &[uniform]);
             let plain_layout = layout("Pipelines::plain_layout", &[uniform]);
             let pulled_layout = layout("Pipelines::pulled_layout", &[uniform, storage]);
+            let depth_layout = layout("Pipelines::depth_layout", &[depth_texture(gpu.samples > 1)]);
             let build = |variant: Variant<'_>| build(gpu, &view_layout, &variant);
             let pulled = Variant {
                 label: "Points::pipeline",
                 module: &points,
                 item_layout: &pulled_layout,
                 vertices: &[],
+                fragment: "fs_main",
                 blend: false,
-                depth_write: true,
-                depth_test: true,
+                depth: Depth::Hides,
             };
             let lit = Variant {
                 label: "Mesh::solid",
@@ -71,20 +97,49 @@ impl Pipelines {
             };
             Ok(Self {
                 points: build(Variant { ..pulled }),
+                points_translucent: build(Variant {
+                    label: "Points::translucent",
+                    blend: true,
+                    depth: Depth::Tests,
+                    ..pulled
+                }),
                 mesh_solid: build(Variant { ..lit }),
-                mesh_xray: build(Variant { label: "Mesh::xray", depth_write: false, ..lit }),
+                mesh_xray: build(Variant { label: "Mesh::xray", depth: Depth::Tests, ..lit }),
+                edges: build(Variant {
+                    label: "Edges::pipeline",
+                    module: &edges,
+                    blend: true,
+                    depth: Depth::Tests,
+                    ..pulled
+                }),
+                edges_overlay: build(Variant {
+                    label: "Edges::overlay",
+                    module: &edges,
+                    fragment: "fs_hidden",
+                    blend: true,
+                    depth: Depth::Ignores,
+                    ..pulled
+                }),
                 lines: build(Variant { label: "Lines::pipeline", module: &lines, blend: true, ..pulled }),
                 lines_overlay: build(Variant {
                     label: "Lines::overlay",
                     module: &lines,
                     blend: true,
-                    depth_write: false,
-                    depth_test: false,
+                    depth: Depth::Ignores,
+                    ..pulled
+                }),
+                edl: build(Variant {
+                    label: "Edl::pipeline",
+                    module: &edl,
+                    item_layout: &depth_layout,
+                    blend: true,
+                    depth: Depth::Absent,
                     ..pulled
                 }),
                 view_layout,
                 plain_layout,
                 pulled_layout,
+                depth_layout,
             })
         })
     }
@@ -106,6 +161,15 @@ impl Pipelines {
             .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
     }
+
+    /// Binds the depth of a target.
+    pub(super) fn bind_depth(&self, gpu: &Gpu, depth: &wgpu::TextureView) -> wgpu::BindGroup {
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("Edl::depth"),
+            layout: &self.depth_layout,
+            entries: &[wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(depth) }],
+        })
+    }
 }
 
 /// One buffer for both stages.
@@ -118,6 +182,20 @@ fn binding(binding: u32, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEn
     }
 }
 
+/// The depth of a target, for the fragment stage.
+fn depth_texture(multisampled: bool) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry {
+        binding: 0,
+        visibility: wgpu::ShaderStages::FRAGMENT,
+        ty: wgpu::BindingType::Texture {
+            sample_type: wgpu::TextureSampleType::Depth,
+            view_dimension: wgpu::TextureViewDimension::D2,
+            multisampled,
+        },
+        count: None,
+    }
+}
+
 /// Builds one pipeline.
 fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) -> wgpu::RenderPipeline {
     let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -125,7 +203,17 @@ fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) 
         bind_group_layouts: &[Some(view_layout), Some(variant.item_layout)],
         immediate_size: 0,
     });
-    let compare = if variant.depth_test { wgpu::CompareFunction::GreaterEqual } else { wgpu::CompareFunction::Always };
+    let compare = match variant.depth {
+        Depth::Hides | Depth::Tests => wgpu::CompareFunction::GreaterEqual,
+        Depth::Ignores | Depth::Absent => wgpu::CompareFunction::Always,
+    };
+    let depth_stencil = wgpu::DepthStencilState {
+        format: DEPTH_FORMAT,
+        depth_write_enabled: Some(variant.depth == Depth::Hides),
+        depth_compare: Some(compare),
+        stencil: wgpu::StencilState::default(),
+        bias: wgpu::DepthBiasState::default(),
+    };
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(variant.label),
         layout: Some(&layout),
@@ -136,17 +224,11 @@ fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) 
             buffers: variant.vertices,
         },
         primitive: wgpu::PrimitiveState::default(),
-        depth_stencil: Some(wgpu::DepthStencilState {
-            format: DEPTH_FORMAT,
-            depth_write_enabled: Some(variant.depth_write),
-            depth_compare: Some(compare),
-            stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
-        }),
+        depth_stencil: (variant.depth != Depth::Absent).then_some(depth_stencil),
         multisample: wgpu::MultisampleState { count: gpu.samples, ..Default::default() },
         fragment: Some(wgpu::FragmentState {
             module: variant.module,
-            entry_point: Some("fs_main"),
+            entry_point: Some(variant.fragment),
             compilation_options: wgpu::PipelineCompilationOptions::default(),
             targets: &[Some(wgpu::ColorTargetState {
                 format: COLOR_FORMAT,

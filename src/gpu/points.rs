@@ -58,6 +58,8 @@ pub struct CloudStyle {
     pub range: Range,
     /// Diameter.
     pub size: PointSize,
+    /// 0..1; below 1 nothing is hidden by the points.
+    pub opacity: f32,
     /// Index of a point to mark; one that does not exist marks nothing.
     pub selected: Option<usize>,
     /// sRGB, 0..1, of the marked point.
@@ -72,6 +74,7 @@ impl Default for CloudStyle {
             map: ColorMap::Viridis,
             range: Range { lo: 0.0, hi: 1.0 },
             size: PointSize::Px(3.0),
+            opacity: 1.0,
             selected: None,
             highlight: [1.0, 0.85, 0.1],
         }
@@ -189,14 +192,15 @@ fn uniform(style: &CloudStyle, color_mode: u32, stride: u32, drawn: u32, selecte
         PointSize::Px(px) => (px, 0),
         PointSize::Meters(m) => (m, 1),
     };
-    let opaque = |[r, g, b]: [f32; 3]| [r, g, b, 1.0];
+    let [r, g, b] = style.color;
+    let [hr, hg, hb] = style.highlight;
     // An empty or infinite range shows the middle color, as on the CPU.
     let sound = (style.range.hi - style.range.lo).is_finite();
     let range = if sound { style.range } else { Range { lo: 0.0, hi: 0.0 } };
     PointsUniform {
         world_from_points: view::matrix(&style.world_from_points),
-        color: opaque(style.color),
-        highlight: opaque(style.highlight),
+        color: [r, g, b, style.opacity.clamp(0.0, 1.0)],
+        highlight: [hr, hg, hb, 1.0],
         lo: range.lo,
         hi: range.hi,
         size: if size.is_finite() { size } else { 1.0 },

@@ -1,6 +1,7 @@
 //! A scene, and the renderer of one view of it.
 //!
-//! Draw order: lines, opaque meshes, points, translucent meshes, x-ray meshes, overlay lines.
+//! Draw order: lines, opaque meshes and their edges, points, outlines, what is translucent, x-ray meshes; eye-dome
+//! lighting; outlines behind something, overlay lines.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -12,8 +13,8 @@ use super::lines::{LinesData, LinesItem};
 use super::mesh::{Look, MeshData, MeshItem};
 use super::pipelines::Pipelines;
 use super::points::{CloudItem, PointsData};
-use super::target::Target;
-use super::view::{Camera, ViewUniform};
+use super::target::{Pass, Target};
+use super::view::{Camera, Plane, ViewUniform};
 use super::{Gpu, GpuError, wgpu};
 
 /// Everything that one view shows. Cheap to make anew for every frame: the geometry is shared.
@@ -27,13 +28,27 @@ pub struct SceneData {
     pub meshes: Vec<MeshItem>,
     /// Lines, with different names.
     pub lines: Vec<LinesItem>,
+    /// What cuts meshes and points; only [`MAX_PLANES`] do.
+    ///
+    /// [`MAX_PLANES`]: super::view::MAX_PLANES
+    pub cut: Vec<Plane>,
+    /// Whether what lies behind its neighbors is darkened (eye-dome lighting).
+    pub eye_dome: bool,
     /// The camera is being moved: only so many points are drawn as [`SceneRenderer::moving_points`] allows.
     pub moving: bool,
 }
 
 impl Default for SceneData {
     fn default() -> Self {
-        Self { background: [0.1, 0.11, 0.13], clouds: vec![], meshes: vec![], lines: vec![], moving: false }
+        Self {
+            background: [0.1, 0.11, 0.13],
+            clouds: vec![],
+            meshes: vec![],
+            lines: vec![],
+            cut: vec![],
+            eye_dome: false,
+            moving: false,
+        }
     }
 }
 
@@ -77,6 +92,8 @@ pub struct SceneRenderer {
     clouds: BTreeMap<String, PointsData>,
     meshes: BTreeMap<String, MeshData>,
     lines: BTreeMap<String, LinesData>,
+    /// The depth of the target of this generation.
+    depth: Option<(u64, wgpu::BindGroup)>,
     shown: Option<Shown>,
     counters: Counters,
 }
@@ -86,6 +103,7 @@ pub struct SceneRenderer {
 struct Shown {
     target: u64,
     background: [f32; 3],
+    eye_dome: bool,
     order: Vec<(Layer, String)>,
 }
 
@@ -94,9 +112,14 @@ struct Shown {
 enum Layer {
     Lines,
     OpaqueMesh,
+    Edges,
     Points,
+    Outline,
     TranslucentMesh,
+    TranslucentPoints,
     XRayMesh,
+    /// From here on over everything.
+    HiddenOutline,
     OverlayLines,
 }
 
@@ -121,6 +144,7 @@ impl SceneRenderer {
                 clouds: BTreeMap::new(),
                 meshes: BTreeMap::new(),
                 lines: BTreeMap::new(),
+                depth: None,
                 shown: None,
                 counters: Counters::default(),
             })
@@ -143,7 +167,15 @@ impl SceneRenderer {
         let before = self.shown.take();
         let result = gpu.guarded("drawing a 3D view", || {
             let changed = self.update(gpu, scene, camera, target.size())?;
-            let shown = Shown { target: target.generation(), background: scene.background, order: order(scene) };
+            if scene.eye_dome && self.depth.as_ref().is_none_or(|(of, _)| *of != target.generation()) {
+                self.depth = Some((target.generation(), self.pipelines.bind_depth(gpu, target.depth())));
+            }
+            let shown = Shown {
+                target: target.generation(),
+                background: scene.background,
+                eye_dome: scene.eye_dome,
+                order: order(scene),
+            };
             let draw = changed || before.as_ref() != Some(&shown);
             if draw {
                 self.draw(gpu, &shown, target);
@@ -167,8 +199,10 @@ impl SceneRenderer {
 
     /// Sends what changed; returns whether anything did.
     fn update(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, size: [u32; 2]) -> Result<bool, GpuError> {
-        let mut done =
-            Counters { uniforms: u64::from(self.view.set(gpu, camera.uniform(size))), ..Counters::default() };
+        let mut done = Counters {
+            uniforms: u64::from(self.view.set(gpu, camera.uniform(size, &scene.cut))),
+            ..Counters::default()
+        };
         let mut count = |[uploaded, written]: [bool; 2]| {
             done.uploads += u64::from(uploaded);
             done.uniforms += u64::from(written);
@@ -206,26 +240,55 @@ impl SceneRenderer {
     fn draw(&mut self, gpu: &Gpu, shown: &Shown, target: &Target) {
         let label = Some("Scene::encoder");
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
-        {
-            let mut pass = target.begin(&mut encoder, shown.background);
-            pass.set_bind_group(0, &self.view_bindings, &[]);
-            for (layer, name) in &shown.order {
-                pass.set_pipeline(match layer {
-                    Layer::Lines => &self.pipelines.lines,
-                    Layer::OpaqueMesh | Layer::TranslucentMesh => &self.pipelines.mesh_solid,
-                    Layer::Points => &self.pipelines.points,
-                    Layer::XRayMesh => &self.pipelines.mesh_xray,
-                    Layer::OverlayLines => &self.pipelines.lines_overlay,
-                });
-                match layer {
-                    Layer::Lines | Layer::OverlayLines => self.lines.get(name).map(|d| d.draw(&mut pass)),
-                    Layer::Points => self.clouds.get(name).map(|d| d.draw(&mut pass)),
-                    _ => self.meshes.get(name).map(|d| d.draw(&mut pass)),
-                };
+        let over = shown.order.iter().position(|(layer, _)| *layer >= Layer::HiddenOutline);
+        let (within, over) = shown.order.split_at(over.unwrap_or(shown.order.len()));
+        let edl = self.depth.as_ref().filter(|_| shown.eye_dome).map(|(_, depth)| depth);
+        let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
+        match edl {
+            None => self.draw_layers(&mut target.begin(&mut encoder, whole), &shown.order),
+            Some(depth) => {
+                self.draw_layers(&mut target.begin(&mut encoder, Pass { last: false, ..whole }), within);
+                {
+                    let on = Pass { clear: None, with_depth: false, last: over.is_empty() };
+                    let mut pass = target.begin(&mut encoder, on);
+                    pass.set_pipeline(&self.pipelines.edl);
+                    pass.set_bind_group(0, &self.view_bindings, &[]);
+                    pass.set_bind_group(1, depth, &[]);
+                    pass.draw(0..6, 0..1);
+                }
+                if !over.is_empty() {
+                    self.draw_layers(&mut target.begin(&mut encoder, Pass { clear: None, ..whole }), over);
+                }
             }
         }
         gpu.queue.submit([encoder.finish()]);
         self.counters.renders += 1;
+    }
+
+    fn draw_layers(&self, pass: &mut wgpu::RenderPass<'_>, order: &[(Layer, String)]) {
+        pass.set_bind_group(0, &self.view_bindings, &[]);
+        for (layer, name) in order {
+            pass.set_pipeline(match layer {
+                Layer::Lines => &self.pipelines.lines,
+                Layer::OpaqueMesh | Layer::TranslucentMesh => &self.pipelines.mesh_solid,
+                Layer::Edges | Layer::Outline => &self.pipelines.edges,
+                Layer::HiddenOutline => &self.pipelines.edges_overlay,
+                Layer::Points => &self.pipelines.points,
+                Layer::TranslucentPoints => &self.pipelines.points_translucent,
+                Layer::XRayMesh => &self.pipelines.mesh_xray,
+                Layer::OverlayLines => &self.pipelines.lines_overlay,
+            });
+            match layer {
+                Layer::Lines | Layer::OverlayLines => self.lines.get(name).map(|d| d.draw(pass)),
+                Layer::Points | Layer::TranslucentPoints => self.clouds.get(name).map(|d| d.draw(pass)),
+                Layer::Edges | Layer::Outline | Layer::HiddenOutline => {
+                    self.meshes.get(name).map(|d| d.draw_edges(pass))
+                }
+                Layer::OpaqueMesh | Layer::TranslucentMesh | Layer::XRayMesh => {
+                    self.meshes.get(name).map(|d| d.draw(pass))
+                }
+            };
+        }
     }
 }
 
@@ -235,15 +298,21 @@ fn order(scene: &SceneData) -> Vec<(Layer, String)> {
         let layer = if l.style.overlay { Layer::OverlayLines } else { Layer::Lines };
         (layer, l.name.clone())
     });
-    let meshes = scene.meshes.iter().map(|m| {
-        let layer = match m.style.look {
-            Look::XRay => Layer::XRayMesh,
-            Look::Solid if m.style.opacity < 1.0 => Layer::TranslucentMesh,
-            Look::Solid => Layer::OpaqueMesh,
+    let meshes = scene.meshes.iter().flat_map(|m| {
+        let layers: &[Layer] = match (m.style.look, m.style.edges.is_some()) {
+            (Look::XRay, _) => &[Layer::XRayMesh],
+            (Look::Outline, _) => &[Layer::Outline, Layer::HiddenOutline],
+            (Look::Solid, edges) if m.style.opacity < 1.0 => {
+                &[Layer::TranslucentMesh, Layer::Edges][..1 + usize::from(edges)]
+            }
+            (Look::Solid, edges) => &[Layer::OpaqueMesh, Layer::Edges][..1 + usize::from(edges)],
         };
-        (layer, m.name.clone())
+        layers.iter().map(|layer| (*layer, m.name.clone()))
     });
-    let clouds = scene.clouds.iter().map(|c| (Layer::Points, c.name.clone()));
+    let clouds = scene
+        .clouds
+        .iter()
+        .map(|c| (if c.style.opacity < 1.0 { Layer::TranslucentPoints } else { Layer::Points }, c.name.clone()));
     let mut all: Vec<_> = lines.chain(meshes).chain(clouds).collect();
     all.sort_by_key(|(layer, _)| *layer);
     all

@@ -8,7 +8,12 @@ use super::{Gpu, GpuError, wgpu};
 /// Every file of `shaders/`: its path below that folder, and its text.
 pub const SHADERS: &[(&str, &str)] = &[
     ("common/color.wgsl", include_str!("../../shaders/common/color.wgsl")),
+    ("common/edl.wgsl", include_str!("../../shaders/common/edl.wgsl")),
+    ("common/stroke.wgsl", include_str!("../../shaders/common/stroke.wgsl")),
     ("common/view.wgsl", include_str!("../../shaders/common/view.wgsl")),
+    ("edges.wgsl", include_str!("../../shaders/edges.wgsl")),
+    ("edl_many.wgsl", include_str!("../../shaders/edl_many.wgsl")),
+    ("edl_one.wgsl", include_str!("../../shaders/edl_one.wgsl")),
     ("lines.wgsl", include_str!("../../shaders/lines.wgsl")),
     ("mesh.wgsl", include_str!("../../shaders/mesh.wgsl")),
     ("points.wgsl", include_str!("../../shaders/points.wgsl")),
@@ -241,7 +246,17 @@ mod tests {
     fn rust_and_wgsl_structs_have_the_same_layout() {
         check_layout!(
             "common/view.wgsl",
-            view::ViewUniform { clip_from_world, eye_in_world, up_in_world, size_px, px_per_m, unused }
+            view::ViewUniform {
+                clip_from_world,
+                eye_in_world,
+                up_in_world,
+                key_in_world,
+                depth,
+                size_px,
+                px_per_m,
+                plane_count,
+                planes,
+            }
         );
         check_layout!("points.wgsl", points::PointVertex { position, payload });
         check_layout!(
@@ -264,7 +279,15 @@ mod tests {
                 unused_2,
             }
         );
-        check_layout!("mesh.wgsl", mesh::MeshUniform { world_from_mesh, color, xray, unused_0, unused_1, unused_2 });
+        check_layout!(
+            "mesh.wgsl",
+            mesh::MeshUniform { world_from_mesh, color, xray, scalar, lo, hi, map, closed, unused_0, unused_1 }
+        );
+        check_layout!("edges.wgsl", edges::EdgeVertex { a, always, b, unused, normal_a, normal_b });
+        check_layout!(
+            "edges.wgsl",
+            edges::EdgesUniform { world_from_mesh, color, width_px, creases, unused_0, unused_1 }
+        );
         check_layout!("lines.wgsl", lines::LineVertex { position, color });
         check_layout!("lines.wgsl", lines::LinesUniform { world_from_lines, width_px, opacity, unused_0, unused_1 });
     }

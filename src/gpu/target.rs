@@ -44,7 +44,8 @@ impl Target {
             let resolved_view = view(resolved.clone());
             let multisampled =
                 (gpu.samples > 1).then(|| view(texture("Target::multisampled", COLOR_FORMAT, gpu.samples, attachment)));
-            let depth = view(texture("Target::depth", DEPTH_FORMAT, gpu.samples, attachment));
+            let depth_usage = attachment | wgpu::TextureUsages::TEXTURE_BINDING;
+            let depth = view(texture("Target::depth", DEPTH_FORMAT, gpu.samples, depth_usage));
             let generation = GENERATION.fetch_add(1, Ordering::Relaxed);
             Ok(Self { size, generation, resolved, resolved_view, multisampled, depth })
         })
@@ -78,17 +79,26 @@ impl Target {
         &self.resolved_view
     }
 
-    /// Starts a pass that clears everything to `background` (sRGB).
-    pub(super) fn begin<'e>(
-        &self,
-        encoder: &'e mut wgpu::CommandEncoder,
-        background: [f32; 3],
-    ) -> wgpu::RenderPass<'e> {
-        let [r, g, b] = background.map(f64::from);
+    /// The depth of every sample, for shaders.
+    pub(super) fn depth(&self) -> &wgpu::TextureView {
+        &self.depth
+    }
+
+    /// Starts a pass.
+    pub(super) fn begin<'e>(&self, encoder: &'e mut wgpu::CommandEncoder, pass: Pass) -> wgpu::RenderPass<'e> {
         let (view, resolve_target, store) = match &self.multisampled {
             // The samples are not needed once they are resolved.
-            Some(samples) => (samples, Some(&self.resolved_view), wgpu::StoreOp::Discard),
+            Some(samples) if pass.last => (samples, Some(&self.resolved_view), wgpu::StoreOp::Discard),
+            Some(samples) => (samples, None, wgpu::StoreOp::Store),
             None => (&self.resolved_view, None, wgpu::StoreOp::Store),
+        };
+        let color_load = pass.clear.map_or(wgpu::LoadOp::Load, |color| {
+            let [r, g, b] = color.map(f64::from);
+            wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 })
+        });
+        let depth_ops = wgpu::Operations {
+            load: if pass.clear.is_some() { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load },
+            store: if pass.last { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store },
         };
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("Scene::pass"),
@@ -96,11 +106,11 @@ impl Target {
                 view,
                 depth_slice: None,
                 resolve_target,
-                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }), store },
+                ops: wgpu::Operations { load: color_load, store },
             })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            depth_stencil_attachment: pass.with_depth.then_some(wgpu::RenderPassDepthStencilAttachment {
                 view: &self.depth,
-                depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(0.0), store: wgpu::StoreOp::Discard }),
+                depth_ops: Some(depth_ops),
                 stencil_ops: None,
             }),
             ..Default::default()
@@ -151,6 +161,17 @@ impl Target {
     fn possible(gpu: &Gpu, size: [u32; 2]) -> [u32; 2] {
         size.map(|s| s.clamp(1, gpu.device.limits().max_texture_dimension_2d))
     }
+}
+
+/// What a pass does with the picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pass {
+    /// Clears everything to this color (sRGB) first; without one the picture goes on.
+    pub clear: Option<[f32; 3]>,
+    /// Whether it tests against depth.
+    pub with_depth: bool,
+    /// Whether the picture is finished after it.
+    pub last: bool,
 }
 
 /// A picture in memory.

@@ -63,6 +63,34 @@ impl Ray {
     }
 }
 
+/// Planes that can cut at a time.
+pub const MAX_PLANES: usize = 8;
+/// What is nearer to the eye is not drawn, as a share of the distance.
+const NEAR: f64 = 0.02;
+/// Depths of a parallel projection: so many distances to both sides of the target.
+const ORTHOGRAPHIC_REACH: f64 = 40.0;
+
+/// A plane that cuts a scene: what has `normal · p + offset_m < 0` is not drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Unit vector towards what stays, world.
+    pub normal: DVec3,
+    /// Meters.
+    pub offset_m: f64,
+}
+
+impl Plane {
+    /// The plane through a point (meters, world) that keeps the side of `normal`.
+    pub fn through(point: DVec3, normal: DVec3) -> Self {
+        Self { normal, offset_m: -normal.dot(point) }
+    }
+
+    /// Meters that a point lies on the side that stays.
+    pub fn height(&self, p: DVec3) -> f64 {
+        self.normal.dot(p) + self.offset_m
+    }
+}
+
 /// A camera that looks at `target` from `distance`. Plain numbers, so that views can be linked and stored.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -172,14 +200,14 @@ impl Camera {
         let aspect = aspect(size);
         let focal = 1.0 / (0.5 * self.fov_rad).tan();
         let rows = if self.orthographic {
-            // Depth 0..1 over 40 distances to both sides of the target: parallel rays have no near side.
+            // Parallel rays have no near side.
             let scale = focal / self.distance;
-            let reach = 40.0 * self.distance;
+            let reach = ORTHOGRAPHIC_REACH * self.distance;
             let depth = z / (2.0 * reach) + DVec4::W * (0.5 + self.distance / (2.0 * reach));
             [x * (scale / aspect), y * scale, depth, DVec4::W]
         } else {
-            // Infinite far plane; nearer than 2 % of the distance is cut.
-            [x * (focal / aspect), y * focal, DVec4::W * (0.02 * self.distance), -z]
+            // Infinite far plane.
+            [x * (focal / aspect), y * focal, DVec4::W * (NEAR * self.distance), -z]
         };
         DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose()
     }
@@ -204,18 +232,35 @@ impl Camera {
         }
     }
 
-    /// The camera for the device.
-    pub(super) fn uniform(&self, size: [u32; 2]) -> ViewUniform {
+    /// The unit vector towards the key light, world: above the eye, to its left.
+    pub fn key_light(&self) -> DVec3 {
+        let [right, up, back] = self.axes();
+        (back + 0.55 * up - 0.45 * right).normalize()
+    }
+
+    /// The camera for the device, with the first [`MAX_PLANES`] planes that cut.
+    pub(super) fn uniform(&self, size: [u32; 2], cut: &[Plane]) -> ViewUniform {
         let [_, up, back] = self.axes();
         let eye = if self.orthographic { back.extend(0.0) } else { self.eye().extend(1.0) };
         let at_one = if self.orthographic { 1.0 } else { self.distance };
+        let depth = if self.orthographic {
+            let reach = ORTHOGRAPHIC_REACH * self.distance;
+            [self.distance + reach, 2.0 * reach, 1.0, self.distance]
+        } else {
+            [NEAR * self.distance, 0.0, 0.0, self.distance]
+        };
         ViewUniform {
             clip_from_world: self.clip_from_world(size).as_mat4().to_cols_array(),
             eye_in_world: eye.as_vec4().to_array(),
             up_in_world: up.extend(0.0).as_vec4().to_array(),
+            key_in_world: self.key_light().extend(0.0).as_vec4().to_array(),
+            depth: depth.map(|v| v as f32),
             size_px: size.map(|s| s.max(1) as f32),
             px_per_m: (self.px_per_m(size) * at_one) as f32,
-            unused: 0.0,
+            plane_count: cut.len().min(MAX_PLANES) as u32,
+            planes: std::array::from_fn(|i| {
+                cut.get(i).map_or([0.0; 4], |plane| plane.normal.extend(plane.offset_m).as_vec4().to_array())
+            }),
         }
     }
 }
@@ -263,9 +308,12 @@ pub(super) struct ViewUniform {
     pub(super) clip_from_world: [f32; 16],
     pub(super) eye_in_world: [f32; 4],
     pub(super) up_in_world: [f32; 4],
+    pub(super) key_in_world: [f32; 4],
+    pub(super) depth: [f32; 4],
     pub(super) size_px: [f32; 2],
     pub(super) px_per_m: f32,
-    pub(super) unused: f32,
+    pub(super) plane_count: u32,
+    pub(super) planes: [[f32; 4]; MAX_PLANES],
 }
 
 /// A position for the device; one that is not finite (or not in reach of f32) becomes one that shaders leave out.

@@ -248,6 +248,13 @@ impl StudioApp {
                 let only = over.and_then(Pane::side).filter(|_| !self.state.settings.cameras_linked);
                 self.panes.memories.scene.look_from(only, preset);
             }
+            UiRequest::CopyCamera => {
+                let over = self.panes.hovered.and_then(|pane| match pane.kind() {
+                    Kind::Scene(source) => Some(source),
+                    _ => None,
+                });
+                ctx.copy_text(self.panes.memories.scene.camera_text(over.unwrap_or_default()));
+            }
             UiRequest::Fit => {
                 let memories = &mut self.panes.memories;
                 match self.panes.hovered.map(Pane::kind) {
@@ -279,6 +286,8 @@ impl StudioApp {
                     Some(_) => None,
                     None => self.panes.hovered.or(Some(Pane::Measured)),
                 };
+                // The picture is of another shape.
+                self.panes.memories.scene.fit();
             }
             UiRequest::ResetWorkspace => {
                 let workspace = self.state.settings.workspace;

@@ -4,15 +4,18 @@ mod build;
 mod gizmo;
 mod hands;
 mod layers;
+mod legend;
 mod measure;
 mod overlay;
+mod section;
 mod steps;
+mod verdict;
 
 use eframe::egui::{self, Color32, Ui};
 use glam::{DAffine3, DVec3};
 use strum::IntoEnumIterator as _;
 
-use build::{SceneCloud, SceneMesh};
+use build::{SceneCloud, SceneMesh, SceneSurface};
 use gizmo::Gizmo;
 use layers::LayerColors;
 use steps::StepLines;
@@ -21,8 +24,9 @@ use super::cx::Cx;
 use super::images;
 use super::scene_view::{SceneOutput, SceneView};
 use super::widget::empty;
+use crate::app::action::Action;
 use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
-use crate::app::keys::ImprintSource;
+use crate::app::keys::{DatasetSeq, ImprintSource};
 use crate::app::state::Lookup;
 use crate::app::workbench::WorkbenchCommand;
 use crate::domain::rig::PadId;
@@ -32,6 +36,9 @@ use crate::gpu::view::{Camera, Preset};
 use crate::work::cloud::Clouds;
 
 pub(super) use overlay::{angle_text, error_color, pose_details};
+
+/// Width of the column of buttons, points.
+const BUTTONS: f32 = 28.0;
 
 /// How near the pointer must be to a point to mean it, physical pixels.
 const PICK_PX: f64 = 9.0;
@@ -43,6 +50,10 @@ pub(super) struct Memory {
     views: [SceneView; 2],
     /// Points on the device.
     clouds: [Option<SceneCloud>; 2],
+    /// Membranes as surfaces, while they are shown.
+    surfaces: [Option<SceneSurface>; 2],
+    /// The data set that the views were fitted to.
+    fitted: Option<DatasetSeq>,
     /// Colors of the contact points.
     layer_colors: [Option<LayerColors>; 2],
     /// The handles of the pose tool.
@@ -75,6 +86,11 @@ impl Memory {
         }
     }
 
+    /// The camera of a side, as text for the clipboard.
+    pub(super) fn camera_text(&self, source: ImprintSource) -> String {
+        serde_json::to_string(&self.views[source as usize].camera).unwrap_or_default()
+    }
+
     /// Where a point of the grasp frame (meters) appeared when a side was last drawn.
     pub(super) fn on_screen(&self, source: ImprintSource, point: DVec3) -> Option<egui::Pos2> {
         self.views[source as usize].on_screen(point)
@@ -104,12 +120,12 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         _ => {}
     }
     if let (Lookup::Ready(clouds), Ok(Some(key))) = (lookup, state.cloud_key(source)) {
-        build::update_cloud(memory, source, key, clouds);
+        build::update_cloud(cx, memory, source, key, clouds);
     }
     if state.workbench.both_clouds {
         let other = other_side(source);
         if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(other), state.cloud_key(other)) {
-            build::update_cloud(memory, other, key, clouds);
+            build::update_cloud(cx, memory, other, key, clouds);
         }
     }
     build::update_mesh(cx, memory);
@@ -119,8 +135,25 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         ImprintSource::Measured => "3D view, measured",
         ImprintSource::Predicted => "3D view, predicted",
     };
+    let open = state.library.open.as_ref().map(|open| open.seq);
+    if memory.fitted != open {
+        memory.fitted = open;
+        memory.fit();
+    }
+    for view in &mut memory.views {
+        view.camera.orthographic = state.settings.scene.orthographic;
+    }
+    verdict::line(cx, ui, source);
+    section::bar(cx, ui, source);
     let held = memory.gizmo.holds(source);
-    let output = memory.views[source as usize].interact(ui, label, held);
+    // The buttons and the strip of the pose in hand stand beside the picture, not on it.
+    let area = ui.available_rect_before_wrap();
+    let column = area.with_min_x((area.right() - BUTTONS).max(area.left()));
+    let footer = hands::strip_height(cx.state, source).min(area.height() / 2.0);
+    let picture = egui::Rect::from_min_max(area.min, egui::pos2(column.left(), area.bottom() - footer));
+    let strip = picture.with_min_y(picture.bottom()).with_max_y(area.bottom());
+    let builder = egui::UiBuilder::new().max_rect(picture);
+    let output = ui.scope_builder(builder, |ui| memory.views[source as usize].interact(ui, label, held)).inner;
     if output.pointer.is_some() && state.workbench.side != source && memory.gizmo.is_free() {
         cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
     }
@@ -130,13 +163,26 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
     }
     let mut scene = build::scene_of(cx, memory, source, seconds);
-    let place = output.fit || !memory.views[source as usize].placed;
+    let pasted = pasted(ui, &output);
+    if let Some(camera) = pasted {
+        let orthographic = memory.views[source as usize].camera.orthographic;
+        memory.views[source as usize].camera = Camera { orthographic, ..camera };
+        memory.views[source as usize].placed = true;
+        if camera.orthographic != orthographic {
+            cx.act(Action::Parallel);
+        }
+    }
+    let aimed = match (output.fit, output.pointer, lookup) {
+        (true, Some(pointer), Lookup::Ready(clouds)) => aim(memory, source, &output, pointer, clouds),
+        _ => false,
+    };
+    let place = (output.fit && !aimed) || !memory.views[source as usize].placed;
     if place && let Some(bounds) = scene.bounds() {
         let view = &mut memory.views[source as usize];
         view.camera.fit(bounds, output.size);
         view.placed = true;
     }
-    if (output.moved || place) && state.settings.cameras_linked {
+    if (output.moved || place || aimed || pasted.is_some()) && state.settings.cameras_linked {
         let camera = memory.views[source as usize].camera;
         let other = &mut memory.views[1 - source as usize];
         other.camera = camera;
@@ -157,13 +203,40 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
     }
     overlay::show(cx, ui, memory, source, &output);
     let rect = output.response.rect;
+    overlay::sides(cx, ui, source, column);
     measure::marks(cx, ui, memory, source, &output);
     gizmo::show(cx, ui, memory, source, &output);
-    hands::tools(cx, ui, source, rect);
-    hands::strip(cx, ui, source, rect);
+    hands::tools(cx, ui, source, column);
+    hands::strip(cx, ui, source, strip);
     if let Lookup::Ready(clouds) = lookup {
         measure::card(cx, ui, source, rect, clouds);
     }
+}
+
+/// A camera that was pasted over a view.
+fn pasted(ui: &Ui, output: &SceneOutput) -> Option<Camera> {
+    output.pointer?;
+    ui.input(|i| {
+        i.events.iter().find_map(|event| match event {
+            egui::Event::Paste(text) => serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid),
+            _ => None,
+        })
+    })
+}
+
+/// Centers a view on the point under the pointer; whether there is one.
+fn aim(
+    memory: &mut Memory,
+    source: ImprintSource,
+    output: &SceneOutput,
+    pointer: glam::DVec2,
+    clouds: &Clouds,
+) -> bool {
+    let camera = &mut memory.views[source as usize].camera;
+    let Some((finger, index)) = nearest(clouds, camera, output.size, pointer) else { return false };
+    let Some(point) = clouds.finger(finger).and_then(|cloud| cloud.points.get(index)) else { return false };
+    camera.target = *point;
+    true
 }
 
 fn other_side(source: ImprintSource) -> ImprintSource {

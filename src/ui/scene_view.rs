@@ -38,6 +38,9 @@ impl Device {
     }
 }
 
+/// How much nearer a notch of the wheel brings the scene.
+const ZOOM_PER_NOTCH: f64 = 1.15;
+
 /// One view.
 #[derive(Default)]
 pub(super) struct SceneView {
@@ -115,7 +118,8 @@ impl SceneView {
         let pointer = pointer.map(|p| DVec2::new(f64::from(p.x), f64::from(p.y)));
         if response.contains_pointer() {
             let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
-            let factor = f64::from(pinch) * (f64::from(scroll) * 0.005).exp();
+            let notches = f64::from(scroll) / f64::from(ui.ctx().options(|o| o.input_options.line_scroll_speed));
+            let factor = f64::from(pinch) * ZOOM_PER_NOTCH.powf(notches);
             if factor != 1.0 {
                 self.camera.zoom(factor, pointer, size);
                 moved = true;

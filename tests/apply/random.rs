@@ -25,10 +25,11 @@ use touch2touch::app::results::ambiguity::AmbiguityKey;
 use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::{
-    ColorMap, ColorRange, GenerateSettings, MaskChoice, MaskSettings, MaskSource, MaskTool, Settings, Theme, Workspace,
+    ColorMap, ColorRange, GenerateSettings, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
+    SceneLayer, SceneLook, Settings, Theme, Workspace,
 };
 use touch2touch::app::tasks::Ticket;
-use touch2touch::app::workbench::{Layer, Picked, SceneTool};
+use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};
 use touch2touch::domain::align::basin::Plane;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::diffusion::GenerateConfig;
@@ -103,6 +104,21 @@ fn number() -> impl Strategy<Value = f32> {
 
 fn point() -> impl Strategy<Value = DVec3> {
     [number(), number(), number()].prop_map(|p| DVec3::from(p.map(f64::from)))
+}
+
+fn section() -> impl Strategy<Value = Section> {
+    (any_of::<SectionAxis>(), number(), any::<bool>()).prop_map(|(axis, at, flipped)| Section {
+        axis,
+        at_m: f64::from(at),
+        flipped,
+    })
+}
+
+fn scene() -> impl Strategy<Value = SceneLook> {
+    (any_of::<SceneLayer>(), [number(), number(), number()], any::<bool>()).prop_map(|(layer, [a, b, c], on)| {
+        let look = LayerLook { shown: on, color: None, opacity: a, size: LayerSize::Mm(b) };
+        SceneLook { distance_m: c, eye_dome: on, ..SceneLook::default() }.with(layer, look)
+    })
 }
 
 fn planar() -> impl Strategy<Value = PlanarPose> {
@@ -284,6 +300,7 @@ draws! {
         1 SetLayer(any_of::<Layer>()),
         1 SetAnimateWeakest(any::<bool>()),
         1 SetBothClouds(any::<bool>()),
+        1 SetSection(proptest::option::of(section())),
         3 SetTool(any_of::<SceneTool>()),
         1 SetSixDof(any::<bool>()),
         1 SetSide(source()),
@@ -333,6 +350,7 @@ draws! {
         1 SetRuntime(any_of::<EngineChoice>()),
         1 SetCacheBudget(any::<u32>()),
         1 SetCamerasLinked(any::<bool>()),
+        1 SetScene(scene()),
         1 SetWorkspace(any_of::<Workspace>()),
         1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
         1 DismissHint,

@@ -4,8 +4,8 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{Command, LibraryCommand, PredictCommand, SettingsCommand};
 use touch2touch::app::inspect::{BasinColor, InspectCommand};
 use touch2touch::app::library::Place;
-use touch2touch::app::settings::{MaskSource, Theme, Workspace};
-use touch2touch::app::workbench::{Layer, SceneTool, WorkbenchCommand};
+use touch2touch::app::settings::{LayerLook, MaskSource, SceneLayer, SceneLook, Theme, Workspace};
+use touch2touch::app::workbench::{Layer, SceneTool, Section, SectionAxis, WorkbenchCommand};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::hand::HandAxis;
@@ -126,5 +126,34 @@ fn pictures_of_the_faults() {
             rig.shoot(&format!("fault-{name}-{}", layer.name()).to_lowercase());
         }
         rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
+    }
+}
+
+/// The looks of the 3D views, for looking at.
+#[test]
+#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
+fn pictures_of_the_3d_views() {
+    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
+        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
+        rig.send(SettingsCommand::DismissHint);
+        rig.send(LibraryCommand::Select(PairId(30)));
+        rig.send(PredictCommand::Generate);
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+        rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::Distance)));
+        rig.shoot(&format!("{name}-3d-distance"));
+        let hidden = LayerLook { shown: false, ..SceneLayer::Membrane.preset() };
+        let surface = LayerLook { shown: true, ..SceneLayer::Surface.preset() };
+        let look = SceneLook::default().with(SceneLayer::Membrane, hidden);
+        rig.send(SettingsCommand::SetScene(look.clone()));
+        rig.shoot(&format!("{name}-3d-distance-alone"));
+        rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
+        rig.send(SettingsCommand::SetScene(look.clone().with(SceneLayer::Surface, surface)));
+        rig.shoot(&format!("{name}-3d-surface"));
+        let section = Section { axis: SectionAxis::Tool, at_m: 0.0, flipped: false };
+        rig.send(Command::Workbench(WorkbenchCommand::SetSection(Some(section))));
+        rig.send(SettingsCommand::SetScene(SceneLook { only_window: true, orthographic: true, ..look }));
+        rig.shoot(&format!("{name}-3d-section"));
+        rig.send(SettingsCommand::SetTheme(Theme::Light));
+        rig.shoot(&format!("{name}-3d-light"));
     }
 }

@@ -1,5 +1,7 @@
 //! What a person prefers. Kept between runs; never part of undo.
 
+pub mod scene;
+
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
@@ -9,9 +11,11 @@ use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
 use crate::domain::postprocess::RefitShift;
+use crate::domain::units::clamp_or;
 use crate::infer::engine::EngineChoice;
 use crate::work::bundles::BundleInfo;
 pub use crate::work::mask::{MaskChoice, MaskSource};
+use scene::SceneLook;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
 pub const SETTINGS_VERSION: u32 = 1;
@@ -56,6 +60,8 @@ pub struct Settings {
     pub cache_mib: u32,
     /// Whether the 3D views of prediction and measurement move together.
     pub cameras_linked: bool,
+    /// How the 3D views look.
+    pub scene: SceneLook,
     /// Whether the mask is drawn over imprints.
     pub mask_visible: bool,
     /// Whether only the outline of the mask is drawn.
@@ -92,6 +98,7 @@ impl Default for Settings {
             runtime: EngineChoice::default(),
             cache_mib: 512,
             cameras_linked: true,
+            scene: SceneLook::default(),
             mask_visible: true,
             mask_outline: false,
             mask_opacity: 0.35,
@@ -118,14 +125,11 @@ impl Settings {
         }
         self.generate = self.generate.validated();
         self.mask = self.mask.validated();
+        self.scene = self.scene.validated();
         self.cache_mib = self.cache_mib.min(MAX_CACHE_MIB);
         self.recent.truncate(MAX_RECENT);
         self
     }
-}
-
-fn clamp_or(value: f32, lo: f32, hi: f32, default: f32) -> f32 {
-    if value.is_finite() { value.clamp(lo, hi) } else { default }
 }
 
 /// Colors of the window.

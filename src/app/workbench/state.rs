@@ -22,6 +22,8 @@ pub enum Layer {
     Residuals,
     /// What became of each.
     Reasons,
+    /// How far each lies outside or inside the model, and the same on the model's surface.
+    Distance,
     /// Lines to the model.
     Correspondences,
 }
@@ -33,6 +35,7 @@ impl Layer {
             Self::None => "None",
             Self::Residuals => "Residuals",
             Self::Reasons => "Reasons",
+            Self::Distance => "Distance",
             Self::Correspondences => "Lines",
         }
     }
@@ -43,6 +46,9 @@ impl Layer {
             Self::None => "Contact points in one color",
             Self::Residuals => "Contact points colored by their distance to the model, in millimeters",
             Self::Reasons => "Contact points colored by what became of them in the registration",
+            Self::Distance => {
+                "Contact points and the model's surface colored by their signed distance, in millimeters: blue inside, red outside"
+            }
             Self::Correspondences => "Lines from contact points to the model",
         }
     }
@@ -72,6 +78,52 @@ impl SceneTool {
         }
     }
 }
+
+/// The axis that a cutting plane stands on, grasp frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
+pub enum SectionAxis {
+    /// x: the closing axis, from finger to finger.
+    #[default]
+    Closing,
+    /// y: across.
+    Lateral,
+    /// z: along the tool.
+    Tool,
+}
+
+impl SectionAxis {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Closing => "x, finger to finger",
+            Self::Lateral => "y, across",
+            Self::Tool => "z, along the tool",
+        }
+    }
+
+    /// The unit vector, grasp frame.
+    pub fn unit(self) -> DVec3 {
+        match self {
+            Self::Closing => DVec3::X,
+            Self::Lateral => DVec3::Y,
+            Self::Tool => DVec3::Z,
+        }
+    }
+}
+
+/// A plane that cuts the 3D views open: what lies beyond it along its axis is not drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Section {
+    /// The axis it stands on.
+    pub axis: SectionAxis,
+    /// Where on it, meters.
+    pub at_m: f64,
+    /// Whether what lies before it is left out instead.
+    pub flipped: bool,
+}
+
+/// How far from the middle of the grasp a plane can stand, meters.
+pub const SECTION_REACH_M: f64 = 0.06;
 
 /// A point that was clicked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,6 +166,8 @@ pub struct Workbench {
     pub animate_weakest: bool,
     /// Whether each 3D pane shows the clouds of both imprints.
     pub both_clouds: bool,
+    /// What cuts the 3D views open.
+    pub section: Option<Section>,
     /// What a click does.
     pub tool: SceneTool,
     /// Whether the tool can leave the plane.
@@ -134,6 +188,7 @@ impl Default for Workbench {
             layer: Layer::None,
             animate_weakest: false,
             both_clouds: false,
+            section: None,
             tool: SceneTool::Look,
             six_dof: false,
             side: ImprintSource::Measured,
@@ -217,6 +272,11 @@ impl State {
             && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
                 || bench.picked.is_some_and(|picked| picked.source == source));
         in_scene || (self.needs(Need::Layers) && bench.side == source)
+    }
+
+    /// Whether a 3D view shows the distances between an imprint and the model.
+    pub fn shows_deviation(&self, source: ImprintSource) -> bool {
+        self.workbench.layer == Layer::Distance && self.needs(Need::Scene(source))
     }
 
     /// How far the registered poses of measurement and prediction are apart, where both are there.

@@ -5,15 +5,20 @@ use std::sync::Arc;
 use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
-use super::{Memory, layers, rgb, steps};
+use super::{Memory, layers, other_side, rgb, steps};
 use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource};
+use crate::app::settings::{LayerLook, LayerSize, SceneLayer};
+use crate::app::workbench::Layer;
+use crate::domain::cloud::surface;
 use crate::domain::mesh::TriMesh;
 use crate::domain::rig::PerPad;
+use crate::gpu::edges::EdgeStyle;
 use crate::gpu::guides;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
+use crate::gpu::view::Plane;
 use crate::ui::cx::{Cx, side_color};
 use crate::ui::images::CONTACT;
 use crate::ui::theme::{self, Palette};
@@ -27,6 +32,15 @@ pub(super) struct SceneCloud {
     pub revision: u64,
     /// Per finger: the membrane and the contact.
     pub fingers: PerPad<[Arc<[DVec3]>; 2]>,
+    /// What the GelSlims see of it: smallest and largest y and z, grasp frame.
+    pub window: Option<[DVec3; 2]>,
+}
+
+/// The membranes of a cloud as surfaces, made only while they are shown.
+pub(super) struct SceneSurface {
+    key: CloudKey,
+    revision: u64,
+    fingers: PerPad<Arc<TriMesh>>,
 }
 
 /// A CAD model as the renderer takes it.
@@ -40,7 +54,17 @@ pub(super) struct SceneMesh {
 }
 
 /// Points for the renderer, made again only for another cloud.
-pub(super) fn update_cloud(memory: &mut Memory, source: ImprintSource, key: CloudKey, clouds: &Clouds) {
+pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: CloudKey, clouds: &Clouds) {
+    let surfaces = cx.state.settings.scene.layer(SceneLayer::Surface).shown;
+    let held = &mut memory.surfaces[source as usize];
+    if !surfaces {
+        *held = None;
+    } else if held.as_ref().is_none_or(|h| h.key != key) {
+        memory.revision += 1;
+        let fingers =
+            clouds.fingers.as_ref().map(|cloud| cloud.map(|cloud| Arc::new(surface(&cloud.points, &cloud.pixels))));
+        *held = Some(SceneSurface { key: key.clone(), revision: memory.revision, fingers });
+    }
     let held = &mut memory.clouds[source as usize];
     if held.as_ref().is_some_and(|h| h.key == key) {
         return;
@@ -54,7 +78,24 @@ pub(super) fn update_cloud(memory: &mut Memory, source: ImprintSource, key: Clou
     let convert = |f: &FingerCloud| [part(f, false), part(f, true)];
     memory.revision += 1;
     let fingers = clouds.fingers.as_ref().map(|cloud| cloud.map(convert));
-    *held = Some(SceneCloud { key, revision: memory.revision, fingers });
+    *held = Some(SceneCloud { key, revision: memory.revision, fingers, window: window(cx, clouds) });
+}
+
+/// The box around the points that the color sensors see; x is left open.
+fn window(cx: &Cx<'_>, clouds: &Clouds) -> Option<[DVec3; 2]> {
+    let rig = cx.state.rig();
+    let size = rig.depth()?.size();
+    let mut found: Option<[DVec3; 2]> = None;
+    for (pad, cloud) in clouds.fingers.entries() {
+        let Some(seen) = rig.seen_mask(pad, size) else { continue };
+        for (p, at) in cloud.points.iter().zip(&cloud.pixels).filter(|(p, _)| p.is_finite()) {
+            if seen.get(at[0].into(), at[1].into()) == Some(&true) {
+                let [lo, hi] = found.unwrap_or([*p, *p]);
+                found = Some([lo.min(*p), hi.max(*p)]);
+            }
+        }
+    }
+    found
 }
 
 pub(super) fn update_mesh(cx: &Cx<'_>, memory: &mut Memory) {
@@ -68,35 +109,93 @@ pub(super) fn update_mesh(cx: &Cx<'_>, memory: &mut Memory) {
     memory.mesh = Some(SceneMesh { key, revision: memory.revision, mesh: Arc::new(tool.model.mesh.clone()) });
 }
 
+/// The color of a layer: the person's, else the theme's. No two layers share one.
+pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Color32 {
+    if let Some([r, g, b]) = cx.state.settings.scene.layer(layer).color {
+        return Color32::from_rgb(r, g, b);
+    }
+    let p = cx.p;
+    match layer {
+        // The membrane recedes, the contact stands out.
+        SceneLayer::Membrane => theme::mix(p.canvas, side_color(p, source), 0.6),
+        SceneLayer::Surface => theme::mix(p.canvas, side_color(p, source), 0.45),
+        SceneLayer::Contact => CONTACT,
+        SceneLayer::OtherContact => side_color(p, other_side(source)),
+        SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => p.accent,
+        SceneLayer::Cad if cx.state.by_hand(source).is_some() => p.good,
+        SceneLayer::Cad | SceneLayer::Registered => p.cad,
+        SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, other_side(source)), 0.7),
+        SceneLayer::TrueCad => p.strong,
+        SceneLayer::Pins => p.pins[0],
+        SceneLayer::Guides => p.weak,
+    }
+}
+
 /// Everything one side shows at time `seconds`.
 pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64) -> SceneData {
-    let mut scene = SceneData { background: rgb(cx.p.canvas), ..SceneData::default() };
+    let look = &cx.state.settings.scene;
+    let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: look.eye_dome, ..SceneData::default() };
+    scene.cut = cut(cx, memory, source);
     clouds(cx, memory, source, &mut scene);
+    surfaces(cx, memory, source, &mut scene);
     pointed(cx, source, &mut scene);
     picked(cx, source, &mut scene);
     meshes(cx, memory, source, seconds, &mut scene);
     scene.lines.extend(layers::ellipse(cx, source));
     steps::add(cx, memory, source, &mut scene);
-    guides(cx, &mut scene);
+    if look.layer(SceneLayer::Guides).shown {
+        guides(cx, &mut scene);
+    }
     scene
+}
+
+/// The planes that cut a view open.
+fn cut(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Plane> {
+    let mut planes = Vec::new();
+    if let Some(section) = cx.state.workbench.section {
+        let axis = section.axis.unit();
+        let side = if section.flipped { axis } else { -axis };
+        planes.push(Plane::through(axis * section.at_m, side));
+    }
+    let window = memory.clouds[source as usize].as_ref().and_then(|cloud| cloud.window);
+    if let Some([lo, hi]) = window.filter(|_| cx.state.settings.scene.only_window) {
+        for axis in [DVec3::Y, DVec3::Z] {
+            planes.extend([Plane::through(lo, axis), Plane::through(hi, -axis)]);
+        }
+    }
+    planes
+}
+
+fn point_size(size: LayerSize) -> PointSize {
+    match size {
+        LayerSize::Px(px) => PointSize::Px(px),
+        LayerSize::Mm(mm) => PointSize::Meters(mm * 1e-3),
+    }
+}
+
+fn cloud_style(look: LayerLook, color: Color32) -> CloudStyle {
+    CloudStyle { color: rgb(color), size: point_size(look.size), opacity: look.opacity, ..CloudStyle::default() }
 }
 
 /// Membrane and contact points of both fingers.
 fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
     if let Some(cloud) = &memory.clouds[source as usize] {
         for (finger, parts) in cloud.fingers.entries() {
-            // The membrane recedes, the contact stands out.
-            let rest = theme::mix(cx.p.canvas, side_color(cx.p, source), 0.6);
-            let looks = [(PointSize::Px(1.2), rest, "membrane"), (PointSize::Meters(0.000_3), CONTACT, "contact")];
-            for (part, (size, color, name)) in parts.iter().zip(looks) {
+            for (part, (layer, name)) in
+                parts.iter().zip([(SceneLayer::Membrane, "membrane"), (SceneLayer::Contact, "contact")])
+            {
+                let look = cx.state.settings.scene.layer(layer);
+                if !look.shown {
+                    continue;
+                }
                 let mut item = CloudItem {
                     name: format!("{name} {}", cx.state.finger_name(finger)),
                     revision: cloud.revision,
                     points: part.clone(),
                     colors: PointColors::One,
-                    style: CloudStyle { color: rgb(color), size, ..CloudStyle::default() },
+                    style: cloud_style(look, color(cx, source, layer)),
                 };
-                if name == "contact" {
+                if layer == SceneLayer::Contact {
                     layers::paint(memory, source, finger, &mut item);
                 }
                 scene.clouds.push(item);
@@ -104,13 +203,32 @@ fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
         }
     }
     if cx.state.workbench.both_clouds {
-        other_cloud(cx, memory, super::other_side(source), scene);
+        other_cloud(cx, memory, source, scene);
+    }
+}
+
+/// The membranes as surfaces.
+fn surfaces(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
+    let look = cx.state.settings.scene.layer(SceneLayer::Surface);
+    let Some(held) = memory.surfaces[source as usize].as_ref().filter(|_| look.shown) else { return };
+    let color = rgb(color(cx, source, SceneLayer::Surface));
+    for (finger, mesh) in held.fingers.entries() {
+        scene.meshes.push(MeshItem {
+            name: format!("surface {}", cx.state.finger_name(finger)),
+            revision: held.revision,
+            mesh: mesh.clone(),
+            shading: Shading::Smooth,
+            values: Arc::default(),
+            style: MeshStyle { color, opacity: look.opacity, closed: false, ..MeshStyle::default() },
+        });
     }
 }
 
 /// The contact points of the other side, in its color, where both are shown in one view.
-fn other_cloud(cx: &Cx<'_>, memory: &Memory, other: ImprintSource, scene: &mut SceneData) {
-    let Some(cloud) = &memory.clouds[other as usize] else { return };
+fn other_cloud(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
+    let other = other_side(source);
+    let look = cx.state.settings.scene.layer(SceneLayer::OtherContact);
+    let Some(cloud) = memory.clouds[other as usize].as_ref().filter(|_| look.shown) else { return };
     // What is of another pair is no comparison.
     if cx.state.cloud_key(other) != Ok(Some(cloud.key.clone())) {
         return;
@@ -121,11 +239,7 @@ fn other_cloud(cx: &Cx<'_>, memory: &Memory, other: ImprintSource, scene: &mut S
             revision: cloud.revision,
             points: contact.clone(),
             colors: PointColors::One,
-            style: CloudStyle {
-                color: rgb(side_color(cx.p, other)),
-                size: PointSize::Meters(0.000_3),
-                ..CloudStyle::default()
-            },
+            style: cloud_style(look, color(cx, source, SceneLayer::OtherContact)),
         });
     }
 }
@@ -166,57 +280,66 @@ fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
     }
 }
 
-/// The CAD model at the registered and at the true pose.
+/// The models that a side can show now, each with its pose: the shaded one is [`SceneLayer::Cad`], the others are
+/// outlines to compare it with.
+pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(SceneLayer, DAffine3)> {
+    let state = cx.state;
+    let mut found = Vec::new();
+    // The step that is looked at, else what was registered.
+    let registered = steps::pose(cx, source).or_else(|| Some(state.pose(source).shown()?.grasp_from_object));
+    let held = state.workbench.hand(source).map(|hand| hand.pose);
+    match (held.or_else(|| state.by_hand(source)), registered) {
+        (Some(pose), registered) => {
+            found.push((SceneLayer::Cad, pose.to_affine()));
+            found.extend(registered.map(|pose| (SceneLayer::Registered, pose.to_affine())));
+        }
+        (None, Some(pose)) => {
+            found.push((SceneLayer::Cad, layers::swayed(cx, source, pose, seconds).to_affine()));
+        }
+        (None, None) => {}
+    }
+    let other = state.pose(other_side(source)).ready().filter(|_| state.workbench.both_clouds);
+    found.extend(other.map(|pose| (SceneLayer::OtherCad, pose.grasp_from_object.to_affine())));
+    let truth = state.sample().ready().and_then(|sample| sample.grasp_from_object);
+    found.extend(truth.map(|pose| (SceneLayer::TrueCad, pose.to_affine())));
+    found
+}
+
+/// The model, shaded where the tool is and as outlines where else it could be.
 fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64, scene: &mut SceneData) {
     let state = cx.state;
     let tool_now = state.tool().ready().map(|t| t.name.as_str());
-    if let Some(mesh) = memory.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) {
-        let item = |name: &str, style: MeshStyle| MeshItem {
-            name: name.into(),
+    let Some(mesh) = memory.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) else { return };
+    let settings = &state.settings.scene;
+    for (layer, world_from_mesh) in models(cx, source, seconds) {
+        let look = settings.layer(layer);
+        if !look.shown {
+            continue;
+        }
+        let color = color(cx, source, layer);
+        let mut item = MeshItem {
+            name: format!("CAD {layer:?}"),
             revision: mesh.revision,
             mesh: mesh.mesh.clone(),
             shading: Shading::Smooth,
-            style,
+            values: Arc::default(),
+            style: layers::outline(world_from_mesh, color, look),
         };
-        // The step that is looked at, else what was registered.
-        let registered = steps::pose(cx, source).or_else(|| Some(state.pose(source).shown()?.grasp_from_object));
-        let mut show = |name: &str, world_from_mesh: DAffine3, color: Color32, look: Look| {
-            let opacity = if look == Look::Solid { 0.9 } else { 0.6 };
-            scene.meshes.push(item(name, MeshStyle { world_from_mesh, color: rgb(color), opacity, look }));
-        };
-        // Where a hand holds the tool, or put it, the registered pose is its shadow.
-        let hand = state.workbench.hand(source).map(|hand| (hand.pose, cx.p.accent));
-        let set = hand.or_else(|| state.by_hand(source).map(|pose| (pose, cx.p.good)));
-        match (set, registered) {
-            (Some((pose, color)), registered) => {
-                show("CAD by hand", pose.to_affine(), color, Look::Solid);
-                if let Some(registered) = registered {
-                    show("CAD", registered.to_affine(), cx.p.cad, Look::XRay);
-                }
-            }
-            (None, Some(registered)) => {
-                let pose = layers::swayed(cx, source, registered, seconds);
-                // Colored points are what is looked at: the model lets them through.
-                let colored = memory.layer_colors[source as usize].is_some();
-                show("CAD", pose.to_affine(), cx.p.cad, if colored { Look::XRay } else { Look::Solid });
-            }
-            (None, None) => {}
+        if layer == SceneLayer::Cad {
+            // Where the points' own colors are looked at, the model lets them through.
+            let through = memory.layer_colors[source as usize].is_some()
+                && matches!(state.workbench.layer, Layer::Residuals | Layer::Reasons);
+            let edge = theme::mix(color, cx.p.canvas, 0.7);
+            let edges = EdgeStyle { color: rgb(edge), opacity: 0.9, width_px: 1.2, creases: true };
+            item.style = MeshStyle {
+                look: if through { Look::XRay } else { Look::Solid },
+                opacity: if through { 0.6 } else { look.opacity },
+                edges: settings.edges.then_some(edges),
+                ..item.style
+            };
+            layers::paint_model(memory, source, world_from_mesh, &mut item);
         }
-        let other = super::other_side(source);
-        if let Some(pose) = state.pose(other).ready().filter(|_| state.workbench.both_clouds) {
-            show("CAD of the other side", pose.grasp_from_object.to_affine(), side_color(cx.p, other), Look::XRay);
-        }
-        if let Some(truth) = state.sample().ready().and_then(|s| s.grasp_from_object) {
-            scene.meshes.push(item(
-                "CAD at the true pose",
-                MeshStyle {
-                    world_from_mesh: truth.to_affine(),
-                    color: rgb(cx.p.truth),
-                    opacity: 0.6,
-                    look: Look::XRay,
-                },
-            ));
-        }
+        scene.meshes.push(item);
     }
 }
 

@@ -1,9 +1,11 @@
 //! Hands on: the buttons of the tools in a 3D view, and the strip of the pose that a hand holds.
 
-use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
 
+use super::overlay::SIDES;
 use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
+use crate::app::settings::SceneLayer;
 use crate::app::state::State;
 use crate::app::workbench::{HandTry, Layer, SceneTool};
 use crate::domain::hand::{HandCost, HandPose, PoseDifference};
@@ -11,18 +13,16 @@ use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption};
 
-/// The tools, below the buttons that turn the view.
-pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
-    let top = rect.top() + 164.0;
-    let place = Rect::from_min_max(pos2(rect.right() - 28.0, top), pos2(rect.right() - 4.0, rect.bottom()));
-    if place.height() < 130.0 {
-        return;
-    }
+/// The tools, below the buttons that turn the view; those that do not fit are left to menu and keys.
+pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, column: Rect) {
+    let place = column.shrink2(vec2(2.0, 4.0)).with_min_y(column.top() + SIDES);
+    let fit = (place.height() / 26.0).floor().max(0.0) as usize;
     let builder = UiBuilder::new().max_rect(place).id_salt(("tools", source as usize));
     ui.scope_builder(builder, |ui| {
         ui.spacing_mut().item_spacing.y = 2.0;
         let side = source.name().to_lowercase();
         let bench = &cx.state.workbench;
+        let scene = &cx.state.settings.scene;
         let (tool, both, layer) = (bench.tool, bench.both_clouds, bench.layer);
         for (action, letter, on) in [
             (Action::PoseTool, "P", tool == SceneTool::Pose),
@@ -30,7 +30,14 @@ pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
             (Action::MeasureAngle, "A", tool == SceneTool::Angle),
             (Action::NextLayer, "V", layer != Layer::None),
             (Action::BothClouds, "2", both),
-        ] {
+            (Action::Section, "X", cx.state.workbench.section.is_some()),
+            (Action::WindowOnly, "W", scene.only_window),
+            (Action::MembraneSurface, "M", scene.layer(SceneLayer::Surface).shown),
+            (Action::Parallel, "I", scene.orthographic),
+        ]
+        .into_iter()
+        .take(fit)
+        {
             let color = if on { cx.p.strong } else { cx.p.weak };
             let text = RichText::new(letter).size(11.0).color(color);
             let fill = if on { cx.p.selected } else { cx.p.panel };
@@ -44,17 +51,26 @@ pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
     });
 }
 
+/// The pose that a hand holds on a side, or would hold.
+fn held(state: &State, source: ImprintSource) -> Option<HandPose> {
+    let bench = &state.workbench;
+    if bench.tool != SceneTool::Pose || bench.hand.as_ref().is_some_and(|hand| hand.source != source) {
+        return None;
+    }
+    Some(bench.hand(source).map_or_else(|| state.hand_begins(source), |hand| hand.pose))
+}
+
+/// Height of the strip of the pose in hand, points; 0 where there is none.
+pub(super) fn strip_height(state: &State, source: ImprintSource) -> f32 {
+    let lines = |pose: HandPose| if pose.is_planar() { 4.0 } else { 5.0 };
+    held(state, source).map_or(0.0, |pose| 25.0 + 14.0 * lines(pose))
+}
+
 /// The pose in hand: where it is, what it costs, and what can be done with it.
 pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
-    let bench = &cx.state.workbench;
-    if bench.tool != SceneTool::Pose || bench.hand.as_ref().is_some_and(|hand| hand.source != source) {
-        return;
-    }
-    let hand = bench.hand(source).cloned();
-    let pose = hand.as_ref().map_or_else(|| cx.state.hand_begins(source), |hand| hand.pose);
-    let lines = if pose.is_planar() { 4.0 } else { 5.0 };
-    let size = vec2((rect.width() - 44.0).min(430.0), 17.0 + 14.0 * lines);
-    let place = Rect::from_min_size(pos2(rect.left() + 8.0, rect.bottom() - 90.0 - size.y), size);
+    let Some(pose) = held(cx.state, source) else { return };
+    let hand = cx.state.workbench.hand(source).cloned();
+    let place = rect.shrink(2.0);
     let builder = UiBuilder::new().max_rect(place).id_salt(("hand", source as usize));
     ui.scope_builder(builder, |ui| {
         ui.painter().rect(place, 4.0, cx.p.panel.gamma_multiply(0.95), (1.0, cx.p.accent), egui::StrokeKind::Inside);

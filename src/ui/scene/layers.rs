@@ -5,16 +5,20 @@ use std::sync::Arc;
 use eframe::egui::Color32;
 use glam::{DAffine3, DVec2, DVec3};
 
-use super::Memory;
+use super::{Memory, rgb};
 use crate::app::command::Pane;
 use crate::app::keys::{ImprintSource, PoseKey};
+use crate::app::settings::{LayerLook, LayerSize};
 use crate::app::workbench::Layer;
 use crate::domain::align::Observability;
 use crate::domain::align::reason::Reason;
-use crate::domain::colormap::Range;
+use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::frames::PlanarPose;
+use crate::domain::mesh::TriMesh;
 use crate::domain::rig::{PadId, PerPad};
+use crate::gpu::edges::EdgeStyle;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
+use crate::gpu::mesh::{Look, MeshItem, MeshStyle};
 use crate::gpu::points::{CloudItem, PointColors, PointSize};
 use crate::ui::cx::Cx;
 use crate::ui::layers::{RESIDUAL_MAP, reason_rgb};
@@ -30,13 +34,22 @@ const SWAY_S: f64 = 2.0;
 pub(super) struct LayerColors {
     key: (PoseKey, Layer),
     revision: u64,
+    /// Values at the ends of the color map, meters; of distances the settings say.
     range: Range,
     fingers: PerPad<PointColors>,
+    /// Of distances: the model's painted surface, and the pose that it is of.
+    surface: Option<(Arc<TriMesh>, Arc<[f32]>, DAffine3)>,
 }
+
+/// The colors of distances: blue inside, red outside.
+pub(super) const DISTANCE_MAP: ColorMap = ColorMap::Diverging;
 
 /// Makes the colors of a side's contact points, where a layer is on and its figures are there.
 pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let layer = cx.state.workbench.layer;
+    if layer == Layer::Distance {
+        return update_distances(cx, memory, source);
+    }
     let held = &mut memory.layer_colors[source as usize];
     let layers = cx.state.layers(source).ready();
     let (Some(layers), Ok(Some(key)), Layer::Residuals | Layer::Reasons) = (layers, cx.state.pose_key(source), layer)
@@ -58,7 +71,49 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
         revision: memory.revision,
         range: Range { lo: 0.0, hi: layers.range_m as f32 },
         fingers: layers.fits.as_ref().map(|fits| fits.map(colors)),
+        surface: None,
     });
+}
+
+/// Makes the colors of distances, where they are there.
+fn update_distances(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
+    let held = &mut memory.layer_colors[source as usize];
+    let (Some(found), Ok(Some(key))) = (cx.state.deviation(source).ready(), cx.state.pose_key(source)) else {
+        *held = None;
+        return;
+    };
+    let (key, reach) = ((key, Layer::Distance), cx.state.settings.scene.distance_m);
+    let range = Range { lo: -reach, hi: reach };
+    if let Some(held) = held.as_mut().filter(|h| h.key == key) {
+        held.range = range;
+        return;
+    }
+    let painted = &found.surface;
+    let surface =
+        (Arc::new(painted.mesh.clone()), painted.values.as_slice().into(), found.grasp_from_object.to_affine());
+    memory.revision += 1;
+    *held = Some(LayerColors {
+        key,
+        revision: memory.revision,
+        range,
+        fingers: found.points.as_ref().map(|points| points.map(|d| PointColors::Scalar(d.as_slice().into()))),
+        surface: Some(surface),
+    });
+}
+
+/// Paints the model with its distances to the contact points, where it stands at the pose that they are of.
+pub(super) fn paint_model(memory: &Memory, source: ImprintSource, world_from_mesh: DAffine3, item: &mut MeshItem) {
+    let Some(colors) = &memory.layer_colors[source as usize] else { return };
+    let Some((mesh, values, _)) = colors.surface.as_ref().filter(|(_, _, pose)| *pose == world_from_mesh) else {
+        return;
+    };
+    item.mesh = mesh.clone();
+    item.values = values.clone();
+    item.revision = colors.revision;
+    item.style.map = DISTANCE_MAP;
+    item.style.range = colors.range;
+    // The edges of its many small triangles are no edges of the model; they would be found anew for each pose.
+    item.style.edges = None;
 }
 
 /// Colors the contact points of one finger, if the layer is of this very cloud.
@@ -71,10 +126,21 @@ pub(super) fn paint(memory: &Memory, source: ImprintSource, finger: PadId, item:
     let Some(own) = colors.fingers.get(finger) else { return };
     item.colors = own.clone();
     item.revision = colors.revision;
-    item.style.map = RESIDUAL_MAP;
+    item.style.map = if colors.surface.is_some() { DISTANCE_MAP } else { RESIDUAL_MAP };
     item.style.range = colors.range;
     // Larger than uncolored ones: a color has to be told from the next.
-    item.style.size = PointSize::Meters(0.000_6);
+    if let PointSize::Meters(m) = &mut item.style.size {
+        *m = m.max(0.000_6);
+    }
+}
+
+/// The look of a model that another one is compared with: its outline alone.
+pub(super) fn outline(world_from_mesh: DAffine3, color: Color32, look: LayerLook) -> MeshStyle {
+    let width_px = match look.size {
+        LayerSize::Px(px) | LayerSize::Mm(px) => px,
+    };
+    let edges = EdgeStyle { color: rgb(color), opacity: look.opacity, width_px, creases: true };
+    MeshStyle { world_from_mesh, color: rgb(color), look: Look::Outline, edges: Some(edges), ..MeshStyle::default() }
 }
 
 /// How well the registered pose of a side is determined.

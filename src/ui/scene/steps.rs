@@ -6,15 +6,15 @@ use eframe::egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 use glam::{DAffine3, DVec3};
 
 use super::Memory;
-use super::rgb;
 use crate::app::inspect::{Inspected, Inspection};
 use crate::app::keys::ImprintSource;
+use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
 use crate::domain::colormap::ColorMap;
 use crate::domain::frames::PlanarPose;
 use crate::domain::units;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
-use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
+use crate::gpu::mesh::{MeshItem, Shading};
 use crate::gpu::scene::SceneData;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{DARK, Palette};
@@ -94,18 +94,15 @@ pub(super) fn add(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &m
         });
     }
     let Some(mesh) = &memory.mesh else { return };
-    for (i, pin) in pins(cx, source) {
+    let look = cx.state.settings.scene.layer(SceneLayer::Pins);
+    for (i, pin) in pins(cx, source).filter(|_| look.shown) {
         scene.meshes.push(MeshItem {
             name: format!("CAD at pin {i}"),
             revision: mesh.revision,
             mesh: mesh.mesh.clone(),
             shading: Shading::Smooth,
-            style: MeshStyle {
-                world_from_mesh: pin.to_affine(),
-                color: rgb(cx.p.pins[i]),
-                opacity: 0.8,
-                look: Look::XRay,
-            },
+            values: Arc::default(),
+            style: super::layers::outline(pin.to_affine(), cx.p.pins[i], look),
         });
     }
 }
@@ -137,8 +134,8 @@ pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: Imprint
     let Some(lines) = lines(cx, memory, source) else { return };
     let painter = ui.painter_at(rect);
     let font = FontId::proportional(11.0);
-    let (width, left) = (110.0, rect.left() + 122.0);
-    let beside = if cx.state.workbench.layer != Layer::None { 390.0 } else { 260.0 };
+    let (width, left) = (110.0, rect.left() + 176.0);
+    let beside = if cx.state.workbench.layer != Layer::None { 440.0 } else { 310.0 };
     if rect.width() < width + beside {
         return;
     }

@@ -26,13 +26,15 @@ pub const PAINT: &[(&str, &str)] = &[
 pub const SCENE: &[(&str, &str)] = &[
     ("Left drag", "orbit"),
     ("Right or middle drag", "move"),
-    ("Wheel", "zoom"),
-    ("Double-click", "fit"),
+    ("Wheel", "zoom at the pointer"),
+    ("Double-click", "center the point; beside all points, or 0: fit"),
     ("Ctrl + Alt + 1 … 4", "from left, right, front, top"),
     ("Hover", "cross-hair in the images"),
     ("Click a point", "read it, or measure with Y (mm) and Shift + Y (angle)"),
     ("Z", "pose tool: arrows or handles; Enter accepts, Esc reverts"),
     ("V", "next layer"),
+    ("X, W, I", "cut open, GelSlim's window only, parallel lines"),
+    ("Click in the list", "show or hide; the dots: color, size, opacity"),
 ];
 
 /// Controls of the time machine.

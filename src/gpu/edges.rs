@@ -1,0 +1,171 @@
+//! The edges of a mesh that a pencil would draw: creases, borders, and where the surface turns away from the eye.
+
+use std::collections::HashMap;
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+use super::buffer::{Elements, Uniform};
+use super::pipelines::Pipelines;
+use super::vertex::CREASE_RAD;
+use super::{Gpu, GpuError, view, wgpu};
+use crate::domain::mesh::TriMesh;
+
+/// How the edges of a mesh are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EdgeStyle {
+    /// sRGB, 0..1.
+    pub color: [f32; 3],
+    /// 0..1.
+    pub opacity: f32,
+    /// Physical pixels.
+    pub width_px: f32,
+    /// Whether creases are drawn, or the silhouette and borders alone.
+    pub creases: bool,
+}
+
+/// Twin of the struct in `shaders/edges.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(super) struct EdgeVertex {
+    pub(super) a: [f32; 3],
+    pub(super) always: u32,
+    pub(super) b: [f32; 3],
+    pub(super) unused: u32,
+    pub(super) normal_a: [f32; 4],
+    pub(super) normal_b: [f32; 4],
+}
+
+/// Twin of the struct in `shaders/edges.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub(super) struct EdgesUniform {
+    pub(super) world_from_mesh: [f32; 16],
+    pub(super) color: [f32; 4],
+    pub(super) width_px: f32,
+    pub(super) creases: u32,
+    pub(super) unused_0: u32,
+    pub(super) unused_1: u32,
+}
+
+/// The edges of one mesh on the device.
+#[derive(Debug)]
+pub(super) struct EdgeData {
+    uploaded: u64,
+    list: Elements,
+    uniform: Uniform<EdgesUniform>,
+    bindings: wgpu::BindGroup,
+}
+
+impl EdgeData {
+    /// Uploads what changed since `old`. Returns whether edges were uploaded, and whether numbers were.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`].
+    pub(super) fn update(
+        gpu: &Gpu,
+        pipelines: &Pipelines,
+        old: Option<Self>,
+        (name, revision, mesh): (&str, u64, &TriMesh),
+        (world_from_mesh, style): ([f32; 16], &EdgeStyle),
+    ) -> Result<(Self, [bool; 2]), GpuError> {
+        let (mut data, uploaded) = match old {
+            Some(data) if data.uploaded == revision => (data, false),
+            old => {
+                let label = format!("Edges::{name}");
+                let (buffer, uniform) = old.map_or((None, None), |d| (Some(d.list.buffer), Some(d.uniform)));
+                let list = Elements::upload(gpu, &label, &edges(mesh), wgpu::BufferUsages::STORAGE, buffer)?;
+                let uniform = uniform.unwrap_or_else(|| Uniform::new(gpu, &label));
+                let bindings = pipelines.bind(gpu, &label, &uniform.buffer, Some(&list.buffer));
+                (Self { uploaded: revision, list, uniform, bindings }, true)
+            }
+        };
+        let [r, g, b] = style.color;
+        let written = data.uniform.set(
+            gpu,
+            EdgesUniform {
+                world_from_mesh,
+                color: [r, g, b, style.opacity.clamp(0.0, 1.0)],
+                width_px: if style.width_px.is_finite() { style.width_px.max(0.5) } else { 1.0 },
+                creases: u32::from(style.creases),
+                unused_0: 0,
+                unused_1: 0,
+            },
+        );
+        Ok((data, [uploaded, written]))
+    }
+
+    /// Draws with the view bound to group 0.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_bind_group(1, &self.bindings, &[]);
+        pass.draw(0..6, 0..self.list.count);
+    }
+}
+
+/// Every edge once, with the normals of its faces. Faces with a corner that is not finite are left out.
+fn edges(mesh: &TriMesh) -> Vec<EdgeVertex> {
+    const SMOOTH: u32 = 0;
+    const CREASE: u32 = 1;
+    const BORDER: u32 = 2;
+    let corner = |i: &u32| mesh.vertices.get(*i as usize).copied().filter(|p| p.is_finite());
+    // By position, not by index: the corners of an STL file are not shared.
+    let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
+    let mut found: HashMap<[[u64; 3]; 2], usize> = HashMap::new();
+    let mut list: Vec<([DVec3; 2], Vec<DVec3>)> = Vec::new();
+    for t in &mesh.triangles {
+        let [Some(a), Some(b), Some(c)] = t.map(|i| corner(&i)) else { continue };
+        let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            let (p, q) = if key(p) <= key(q) { (p, q) } else { (q, p) };
+            let at = *found.entry([key(p), key(q)]).or_insert_with(|| {
+                list.push(([p, q], Vec::new()));
+                list.len() - 1
+            });
+            list[at].1.push(normal);
+        }
+    }
+    let vertex = |([a, b], normals): ([DVec3; 2], Vec<DVec3>)| {
+        let first = normals[0];
+        let second = normals.get(1).copied().unwrap_or(-first);
+        let kind = match normals.len() {
+            2 if first.dot(second) > CREASE_RAD.cos() => SMOOTH,
+            2 => CREASE,
+            _ => BORDER,
+        };
+        EdgeVertex {
+            a: view::position(a),
+            always: kind,
+            b: view::position(b),
+            unused: 0,
+            normal_a: first.extend(0.0).as_vec4().to_array(),
+            normal_b: second.extend(0.0).as_vec4().to_array(),
+        }
+    };
+    list.into_iter().map(vertex).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_are_found_once_and_told_apart() {
+        // Two triangles that meet flat, a third at a right angle.
+        let mesh = TriMesh {
+            vertices: [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.0, 1.0]]
+                .map(DVec3::from_array)
+                .to_vec(),
+            triangles: vec![[0, 1, 2], [0, 2, 3], [1, 0, 4], [0, 1, 77]],
+        };
+        let kinds = |kind: u32| edges(&mesh).iter().filter(|e| e.always == kind).count();
+        assert_eq!([kinds(0), kinds(1), kinds(2)], [1, 1, 5]);
+        let broken = TriMesh { vertices: vec![DVec3::NAN; 3], triangles: vec![[0, 1, 2]] };
+        assert!(edges(&broken).is_empty());
+        // The corners of the same triangles, not shared.
+        let split = TriMesh {
+            vertices: mesh.triangles[..3].iter().flatten().map(|&i| mesh.vertices[i as usize]).collect(),
+            triangles: vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]],
+        };
+        assert_eq!(edges(&split).len(), 7);
+    }
+}

@@ -1,0 +1,43 @@
+//! How far the contact points lie from the registered model: [`deviation`].
+
+use super::cloud::Clouds;
+use crate::domain::deviation::{Painted, of_points, on_surface};
+use crate::domain::frames::PlanarPose;
+use crate::domain::pose::ToolModel;
+use crate::domain::rig::PerPad;
+
+/// Contact points within this distance of the model's surface are painted on it, meters.
+const REACH_M: f64 = 0.004;
+
+/// Signed distances between contact points and a model at a pose, both ways.
+#[derive(Clone, Debug)]
+pub struct Deviation {
+    /// The pose that they are of, `grasp_from_object`.
+    pub grasp_from_object: PlanarPose,
+    /// Of each contact point, in the order of the cloud, meters; positive outside the model.
+    pub points: PerPad<Vec<f32>>,
+    /// The model's surface in its own frame.
+    pub surface: Painted,
+}
+
+impl Deviation {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let points: usize = self.points.iter().flatten().map(Vec::len).sum();
+        4 * points + 28 * self.surface.mesh.vertices.len() + 12 * self.surface.mesh.triangles.len()
+    }
+}
+
+/// Measures the contact points of both fingers against the model at a pose.
+pub fn deviation(clouds: &Clouds, tool: &ToolModel, grasp_from_object: PlanarPose) -> Deviation {
+    let object_from_grasp = grasp_from_object.to_affine().inverse();
+    let points = clouds.fingers.as_ref().map(|cloud| {
+        cloud.map(|cloud| {
+            let contact = cloud.points.iter().zip(&cloud.contact).filter(|(_, contact)| **contact);
+            let contact: Vec<_> = contact.map(|(p, _)| *p).collect();
+            of_points(&contact, &object_from_grasp, &tool.distance)
+        })
+    });
+    let in_object: Vec<_> = clouds.contact_points().iter().map(|p| object_from_grasp.transform_point3(*p)).collect();
+    Deviation { grasp_from_object, points, surface: on_surface(&tool.mesh, &in_object, REACH_M) }
+}
