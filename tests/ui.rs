@@ -14,5 +14,6 @@ mod generate;
 mod inspect;
 mod job;
 mod results;
+mod scene;
 mod seeds;
 mod workbench;

@@ -45,7 +45,7 @@ impl Rig {
         self.harness.step();
     }
 
-    fn click_at(&mut self, at: Pos2) {
+    pub(super) fn click_at(&mut self, at: Pos2) {
         self.move_to(at);
         self.harness.drag_at(at);
         self.harness.step();
@@ -72,7 +72,7 @@ impl Rig {
     }
 
     /// The studio on the Align workspace with true masks, the pointer in the measured view, seen from the right.
-    fn aligned() -> Option<Self> {
+    pub(super) fn aligned() -> Option<Self> {
         let mut rig = Self::new(SIZE, 2)?;
         rig.send(SettingsCommand::DismissHint);
         rig.send(TasksCommand::LogSeen(u64::MAX));
@@ -266,7 +266,7 @@ fn a_clicked_point_says_all_about_itself() {
 #[test]
 fn layers_go_round_and_their_numbers_add_up() {
     let Some(mut rig) = Rig::aligned() else { return };
-    for layer in [Layer::Residuals, Layer::Reasons, Layer::Correspondences, Layer::None] {
+    for layer in [Layer::Residuals, Layer::Reasons, Layer::Distance, Layer::Correspondences, Layer::None] {
         rig.press(Modifiers::NONE, Key::V);
         assert_eq!(rig.model().workbench.layer, layer);
         rig.shoot(&format!("test-layer-{}", layer.name()).to_lowercase());

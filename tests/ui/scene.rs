@@ -1,0 +1,139 @@
+//! The 3D views: distances, what is drawn, the plane that cuts, cameras.
+
+use eframe::egui::{Event, Key, Modifiers, Pos2, vec2};
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::action::Action;
+use touch2touch::app::command::{SettingsCommand, WorkbenchCommand};
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::{LayerLook, SceneLayer};
+use touch2touch::app::state::State;
+use touch2touch::app::workbench::{Layer, SectionAxis};
+use touch2touch::domain::rig::lab;
+
+use super::rig::Rig;
+
+const MEASURED: ImprintSource = ImprintSource::Measured;
+
+fn state(rig: &Rig) -> &State {
+    rig.harness.state().state()
+}
+
+fn press(rig: &mut Rig, key: Key) {
+    rig.harness.key_press_modifiers(Modifiers::NONE, key);
+    rig.harness.step();
+    rig.settle();
+}
+
+fn view_center(rig: &Rig) -> Pos2 {
+    let rect = rig.harness.get_by_label("3D view, measured").rect();
+    rect.min + vec2(0.5, 0.45) * rect.size()
+}
+
+/// Colors of the measured view, as a set.
+fn colors(rig: &mut Rig) -> std::collections::BTreeSet<[u8; 4]> {
+    let rect = rig.harness.get_by_label("3D view, measured").rect();
+    let image = rig.harness.render().unwrap();
+    let inside = |x: u32, y: u32| rect.contains(Pos2::new(x as f32, y as f32));
+    image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y)).map(|(_, _, p)| p.0).collect()
+}
+
+#[test]
+fn distances_are_those_of_the_contact_points_and_colors_show_them() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    assert!(state(&rig).deviation(MEASURED).ready().is_none(), "nothing is computed that no view shows");
+    let before = colors(&mut rig);
+    rig.send(WorkbenchCommand::SetLayer(Layer::Distance));
+    rig.settle();
+    let found = state(&rig).deviation(MEASURED).ready().expect("the view shows it");
+    let clouds = state(&rig).cloud(MEASURED).ready().unwrap();
+    let tool = &state(&rig).tool().ready().unwrap().model;
+    let pose = state(&rig).pose(MEASURED).ready().unwrap().grasp_from_object;
+    assert_eq!(found.grasp_from_object, pose);
+    let cloud = clouds.finger(lab::RIGHT).unwrap();
+    let contact: Vec<_> = (0..cloud.points.len()).filter(|i| cloud.contact[*i]).collect();
+    let distances = found.points[lab::RIGHT].as_ref().unwrap();
+    assert_eq!(distances.len(), contact.len());
+    for (at, d) in contact.iter().zip(distances).step_by(97) {
+        let in_object = pose.to_affine().inverse().transform_point3(cloud.points[*at]);
+        assert!((tool.distance.signed(in_object) - f64::from(*d)).abs() < 1e-7);
+    }
+    let painted = found.surface.values.iter().filter(|v| v.is_finite()).count();
+    assert!(painted > 1000 && painted < found.surface.values.len(), "{painted}");
+    let with = colors(&mut rig);
+    // Whites, blues and reds of the map that no picture has without it.
+    assert!(with.difference(&before).count() > 200);
+    rig.shoot("test-distances");
+}
+
+#[test]
+fn the_list_of_what_is_drawn_switches_it_and_it_stays_so() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    let before = colors(&mut rig);
+    let at = rig.harness.get_by_label("Show membrane, points, measured").rect().center();
+    rig.click_at(at);
+    assert!(!state(&rig).settings.scene.layer(SceneLayer::Membrane).shown);
+    assert!(colors(&mut rig).len() < before.len());
+    rig.click_at(at);
+    assert!(state(&rig).settings.scene.layers.is_empty(), "as at first is not stored");
+    let surface = Action::MembraneSurface.command(state(&rig)).unwrap();
+    rig.send(surface);
+    let look = &state(&rig).settings.scene;
+    assert!(look.layer(SceneLayer::Surface).shown && !look.layer(SceneLayer::Membrane).shown);
+    assert!(colors(&mut rig).len() > 100);
+    rig.shoot("test-surface");
+    // Every row has its menu.
+    let dots = rig.harness.get_by_label("Look of contact points, measured").rect().center();
+    rig.click_at(dots);
+    rig.shoot("test-layer-menu");
+    let red = LayerLook { color: Some([250, 10, 10]), ..SceneLayer::Contact.preset() };
+    let scene = state(&rig).settings.scene.clone().with(SceneLayer::Contact, red);
+    rig.send(SettingsCommand::SetScene(scene));
+    assert!(colors(&mut rig).contains(&[250, 10, 10, 255]) || colors(&mut rig).len() > 100);
+}
+
+#[test]
+fn a_plane_cuts_by_key_and_bar_and_says_where() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    let whole = colors(&mut rig);
+    rig.harness.hover_at(view_center(&rig));
+    press(&mut rig, Key::X);
+    let section = state(&rig).workbench.section.expect("a plane");
+    assert_eq!((section.axis, section.at_m), (SectionAxis::Closing, 0.0));
+    assert_ne!(colors(&mut rig), whole);
+    let across = rig.harness.get_by_label("Cut across z, along the tool, measured").rect().center();
+    rig.click_at(across);
+    assert_eq!(state(&rig).workbench.section.unwrap().axis, SectionAxis::Tool);
+    rig.shoot("test-section");
+    let close = rig.harness.query_all_by_label("Cut no longer").next().unwrap().rect().center();
+    rig.click_at(close);
+    assert_eq!(state(&rig).workbench.section, None);
+    press(&mut rig, Key::W);
+    assert!(state(&rig).settings.scene.only_window);
+    assert_ne!(colors(&mut rig), whole);
+}
+
+#[test]
+fn a_camera_is_pasted_and_a_foreign_text_is_not() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    rig.harness.hover_at(view_center(&rig));
+    rig.harness.step();
+    let point = [0.003, 0.004, 0.002];
+    let before = rig.harness.state().on_screen(MEASURED, point).unwrap();
+    rig.harness.event(Event::Paste("{\"distance\": -1}".into()));
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(
+        rig.harness.state().on_screen(MEASURED, point).unwrap(),
+        before,
+        "not a camera that can be looked through"
+    );
+    rig.harness.event(Event::Paste(
+        "{\"target\": [0,0,0], \"distance\": 0.2, \"yaw_rad\": 0, \"pitch_rad\": 0.1, \"orthographic\": true}".into(),
+    ));
+    rig.harness.step();
+    rig.settle();
+    assert!(state(&rig).settings.scene.orthographic);
+    assert!((rig.harness.state().on_screen(MEASURED, point).unwrap() - before).length() > 3.0);
+    press(&mut rig, Key::I);
+    assert!(!state(&rig).settings.scene.orthographic);
+}
