@@ -1,11 +1,13 @@
 //! Writes one shard of training data for the Python package in `training/`.
 //!
-//! `cargo run --release --no-default-features --example training_data -- OUT N SEED [train|unseen|seen]
+//! `cargo run --release --no-default-features --example training_data -- OUT N SEED [train|depths|unseen|seen]
 //! [plain|ambiguous|misaligned]`
 //! writes `N` grasps, both fingers each, to the new folder `OUT`: `gelslim.npy`, `imprint.npy`, `clean.npy`,
 //! `contact.npy`, `meta.npy` (described in `training/data.py`) and, last of all, `done.json`.
 //! `train`: 60 % the nine seen tools, 40 % random tools, 60 % of it with randomised sensors and stretched tools. `seen` and `unseen`:
 //! those tools with the nominal sensors, for validation. The three unseen tools are never in `train`.
+//! `depths`: as `train`, with bubbles of any size pressed 2 to 15 mm deep, for contact masks only: a GelSlim image does not
+//! tell how deep the bubble is pressed, so a generator would learn from them to draw the mean of all depths.
 //! `ambiguous`: the GelSlims close on the bare shaft of the tool, so that they see nothing of its pattern.
 //! `misaligned`: the bubbles grasp up to 8 mm from where the GelSlims did. For a mixture, write shards of both.
 
@@ -21,7 +23,7 @@ use touch2touch::domain::catalog::{self, ToolSpec};
 use touch2touch::domain::grid::DepthMap;
 use touch2touch::domain::resample;
 use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim::{self, Condition, Grasp, MISALIGNMENT_M, SimConfig};
+use touch2touch::domain::sim::{self, BubbleConfig, Condition, Grasp, MISALIGNMENT_M, SimConfig};
 
 /// Side of the resized GelSlim image, pixels.
 const SIDE: usize = 128;
@@ -36,8 +38,16 @@ const META: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Mix {
     Train,
+    Depths,
     Seen,
     Unseen,
+}
+
+impl Mix {
+    /// Whether it trains a network: with invented tools, and never with the unseen ones.
+    fn trains(self) -> bool {
+        matches!(self, Self::Train | Self::Depths)
+    }
 }
 
 /// One finger's part of a grasp, as it is stored.
@@ -81,9 +91,10 @@ fn micrometers(depth: &DepthMap) -> Vec<i16> {
         .collect()
 }
 
-/// The tool with longer bars to the sides and towards the wrist and shorter ones at the tip, as the real tools have.
+/// The tool with longer bars to the sides and towards the wrist and shorter ones at the tip, as the real tools have: most of
+/// their bars that lie across run out of the picture.
 fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
-    let side = rng.random_range(1.0..1.6);
+    let side = rng.random_range(1.0..2.4);
     let wrist = rng.random_range(0.95..1.3);
     let tip = rng.random_range(0.15..0.7);
     for p in tool.bars.iter_mut().flat_map(|bar| &mut bar.core) {
@@ -93,6 +104,25 @@ fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
     tool
 }
 
+/// The bubble in another size, pressed on as lightly or as hard as any gripper does; slower distortions weigh more where the
+/// imprint is shallow.
+fn of_any_depth(bubble: BubbleConfig, rng: &mut ChaCha8Rng) -> BubbleConfig {
+    let press_m = 0.002 * 7.5_f64.powf(rng.random_range(0.0..1.0));
+    let size = rng.random_range(0.55..1.0);
+    BubbleConfig {
+        press_m,
+        dome_rise_m: bubble.dome_rise_m * rng.random_range(0.5..1.1),
+        rim_semi_axes_m: bubble.rim_semi_axes_m.map(|a| a * size),
+        rim_center_z_m: bubble.rim_center_z_m * rng.random_range(-0.3..1.0),
+        air_kept: bubble.air_kept * rng.random_range(0.0..1.0),
+        noise_m: bubble.noise_m * rng.random_range(0.2..1.0),
+        texture_m: bubble.texture_m * rng.random_range(0.0..1.0),
+        speckle_density: bubble.speckle_density * rng.random_range(0.0..1.0),
+        dropped_share: if rng.random_bool(0.5) { bubble.dropped_share } else { rng.random_range(0.0..0.006) },
+        ..bubble
+    }
+}
+
 /// Simulates grasp `index` of the shard; both fingers.
 fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Record>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(index));
@@ -100,10 +130,10 @@ fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Re
         let tools: Vec<usize> = (0..catalog::tools().len()).filter(|&i| catalog::tools()[i].seen == seen).collect();
         tools[rng.random_range(0..tools.len())]
     };
-    let random = mix == Mix::Train && rng.random_bool(0.4);
+    let random = mix.trains() && rng.random_bool(0.4);
     let number = if random { None } else { Some(pick(&mut rng, mix != Mix::Unseen)) };
     let invented;
-    let nominal = mix != Mix::Train || rng.random_bool(0.4);
+    let nominal = !mix.trains() || rng.random_bool(if mix == Mix::Depths { 0.0 } else { 0.4 });
     let tool = match number {
         Some(i) if nominal => &catalog::tools()[i],
         Some(i) => {
@@ -116,7 +146,10 @@ fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Re
             &invented
         }
     };
-    let config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
+    let mut config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
+    if mix == Mix::Depths {
+        config.bubble = of_any_depth(config.bubble, &mut rng);
+    }
     let grasp = sim::random_grasp(rng.random());
     let on_shaft = if condition == Condition::Ambiguous { Some(catalog::on_a_shaft(tool.clone())) } else { None };
     let tool = on_shaft.as_ref().unwrap_or(tool);
@@ -154,7 +187,7 @@ fn grasp(index: u64, seed: u64, mix: Mix, condition: Condition) -> Result<Vec<Re
                     grasp.x_m as f32,
                     grasp.y_m as f32,
                     tool_number,
-                    f32::from(u8::from(nominal)),
+                    if mix == Mix::Depths { 2.0 } else { f32::from(u8::from(nominal)) },
                     f32::from(u8::from(mix == Mix::Unseen)),
                 ],
             })
@@ -166,7 +199,7 @@ fn main() -> Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     ensure!(
         (3..=5).contains(&arguments.len()),
-        "usage: training_data OUT N SEED [train|seen|unseen] [plain|ambiguous|misaligned]"
+        "usage: training_data OUT N SEED [train|depths|seen|unseen] [plain|ambiguous|misaligned]"
     );
     let folder = Path::new(&arguments[0]);
     let grasps: usize = arguments[1].parse().context("N must be a whole number")?;
@@ -174,9 +207,10 @@ fn main() -> Result<()> {
     let mix_name = arguments.get(3).map_or("train", String::as_str);
     let mix = match mix_name {
         "train" => Mix::Train,
+        "depths" => Mix::Depths,
         "seen" => Mix::Seen,
         "unseen" => Mix::Unseen,
-        other => anyhow::bail!("unknown mix {other:?}: use train, seen or unseen"),
+        other => anyhow::bail!("unknown mix {other:?}: use train, depths, seen or unseen"),
     };
     let condition_name = arguments.get(4).map_or("plain", String::as_str);
     let condition = match condition_name {

@@ -83,7 +83,7 @@ class Run:
 
 def options(args):
     """The switches that make one run differ from another, for the checkpoint and the provenance."""
-    keys = ("turned", "rotation", "flip", "geometry", "condition_noise")
+    keys = ("turned", "rotation", "flip", "geometry", "frame", "condition_noise")
     return {k: getattr(args, k) for k in keys} | {"begun_from_a_bundle": bool(args.start)}
 
 
@@ -117,9 +117,14 @@ def condition(shards, batch, k, args, rng):
     return gelslim.contiguous(memory_format=torch.channels_last)
 
 
+def offsets(shards, batch, args):
+    """How far the imprints are moved into the frame of the generator's picture; `None` where they stay."""
+    return shards.offsets(batch) if args.frame == "window" else None
+
+
 def target(shards, key, batch, k, args):
     """Imprints (N,1,128,128) in [-1,1], turned by `k`."""
-    image = data.to_model(shards.metres(key, batch))
+    image = data.to_model(shards.metres(key, batch), offsets(shards, batch, args))
     if args.geometry == "cropping":
         image = data.cropped(image)
     return data.each_dihedral(image, k).contiguous(memory_format=torch.channels_last)

@@ -21,7 +21,7 @@ pub use record::{Against, Histogram, Orientation, Stage, StageRecord, Stats};
 pub use refit::{BundleTag, RefitShift, ShiftFit};
 
 use super::grid::{DepthMap, Grid};
-use super::resample::Resampling;
+use super::resample::{self, Resampling};
 use super::units::{fixed, mm};
 
 /// Weights of red, green and blue in the lab's gray value (torchvision's `rgb_to_grayscale`; their sum is 0.9999).
@@ -200,6 +200,11 @@ pub struct DepthChain {
     pub resampling: Resampling,
     /// Rotation to the raw orientation: 0 or 180 degrees.
     pub rotation_deg: u32,
+    /// Where the model draws the color sensor's window, whichever pad it is on: its center, shares of the result's width and
+    /// height. `None` of a model that draws each pad's where it lies.
+    pub window: Option<[f64; 2]>,
+    /// How far the result is moved, as shares of its width and height; see [`DepthChain::placed`].
+    pub moved: [f64; 2],
 }
 
 /// Is told of each stage: which, what it does, the image after it, and a note.
@@ -219,6 +224,18 @@ impl DepthChain {
             ShiftMode::Refit(refit) => Shift::PaperMeanStd(refit.stats()),
         };
         Ok(self)
+    }
+
+    /// The chain of a pad that has the center of its color window at these shares of the picture ([`Rig::window_share`]):
+    /// moved from where the model draws it. Unchanged where either side does not say.
+    ///
+    /// [`Rig::window_share`]: super::rig::Rig::window_share
+    #[must_use]
+    pub fn placed(mut self, window: Option<[f64; 2]>) -> Self {
+        if let Some((to, from)) = window.zip(self.window) {
+            self.moved = [to[0] - from[0], to[1] - from[1]];
+        }
+        self
     }
 
     /// Runs the chain. NaN pixels stay NaN and spread by the resizing.
@@ -306,7 +323,19 @@ impl DepthChain {
         let how = || format!("{from_width} x {from_height} to {width} x {height}, {}", self.resampling);
         record(Stage::Resized, &how, &resized, None);
 
-        let turned = if self.rotation_deg == 180 { resized.rotated_180() } else { resized };
+        let placed = if self.moved == [0.0; 2] {
+            resized
+        } else {
+            // Before the rotation, which ends the chain.
+            let sign = if self.rotation_deg == 180 { -1.0 } else { 1.0 };
+            let [x, y] = [self.moved[0] * width as f64, self.moved[1] * height as f64];
+            let placed = resample::moved(&resized, [sign * x, sign * y]);
+            let how = || format!("by {} and {} pixels: the window of this pad", fixed(x, 2), fixed(y, 2));
+            record(Stage::Placed, &how, &placed, None);
+            placed
+        };
+
+        let turned = if self.rotation_deg == 180 { placed.rotated_180() } else { placed };
         record(Stage::Turned, &|| format!("by {}°, to the raw orientation", self.rotation_deg), &turned, None);
         Ok(turned)
     }

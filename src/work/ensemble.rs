@@ -25,7 +25,7 @@ impl Ensemble {
     }
 }
 
-/// Mean and spreads of several predictions, `imprints` being the same in meters.
+/// Mean and spreads of several predictions, `imprints` being the same in meters; `window` as in [`super::imprint::imprint`].
 ///
 /// # Errors
 /// If there is none, or their sizes differ.
@@ -33,13 +33,14 @@ pub fn ensemble(
     predictions: &[Arc<Prediction>],
     imprints: &[Arc<DepthMap>],
     shift: ShiftMode,
+    window: Option<[f64; 2]>,
 ) -> Result<Ensemble, TaskError> {
     const WHAT: &str = "Spread of the seeds";
     let spread = Spread::of(&imprints.iter().map(|i| &**i).collect::<Vec<_>>())
         .ok_or_else(|| TaskError::new(WHAT, "the predictions differ in size"))?;
     let mut apart = Vec::new();
     for prediction in predictions {
-        let chain = DepthChain { size: spread.mean.size(), ..chain(prediction, shift)? };
+        let chain = DepthChain { size: spread.mean.size(), ..chain(prediction, shift)?.placed(window) };
         let found = channel_spread(&prediction.raw, &chain).map_err(|err| TaskError::from_error(WHAT, &err))?;
         apart.extend(found);
     }

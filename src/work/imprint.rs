@@ -11,13 +11,19 @@ use crate::domain::sample::{PadTouch, Sample};
 /// Longest side of a thumbnail, pixels.
 const THUMBNAIL_PX: usize = 44;
 
-/// A prediction in meters, as large as the bubble image `size` (`[width, height]`).
+/// A prediction in meters, as large as the bubble image `size` (`[width, height]`), for a pad whose color window lies at
+/// `window` ([`crate::domain::rig::Rig::window_share`]).
 ///
 /// # Errors
 /// If the bundle has no such range mapping, or its steps do not fit its output.
-pub fn imprint(prediction: &Prediction, shift: ShiftMode, size: [usize; 2]) -> Result<DepthMap, TaskError> {
+pub fn imprint(
+    prediction: &Prediction,
+    shift: ShiftMode,
+    size: [usize; 2],
+    window: Option<[f64; 2]>,
+) -> Result<DepthMap, TaskError> {
     let what = format!("Range mapping \"{}\"", shift.label());
-    let chain = chain(prediction, shift)?;
+    let chain = chain(prediction, shift)?.placed(window);
     in_meters(&chain, &prediction.raw, size).map_err(|err| TaskError::from_error(&what, &err))
 }
 
@@ -33,7 +39,7 @@ pub fn imprint_of(
     finger: PadId,
 ) -> Result<DepthMap, TaskError> {
     let bubble = sample.pad(finger).and_then(|t| t.depth());
-    imprint(prediction, shift, bubble.map_or([0, 0], |b| b.imprint.size()))
+    imprint(prediction, shift, bubble.map_or([0, 0], |b| b.imprint.size()), sample.rig.window_share(finger))
 }
 
 /// The measured imprints of a pair.

@@ -23,7 +23,8 @@ fn reading_chains(shift: ShiftMode, chain: impl Fn(ShiftMode) -> Option<DepthCha
 }
 
 /// Every stage of a prediction with `shift`, the result against the measured imprint, and what is implausible.
-/// `correct` reads the decoder's range as it is meant instead of twice, which leaves no shift to be done.
+/// `window` as in [`super::imprint::imprint`]. `correct` reads the decoder's range as it is meant instead of twice, which
+/// leaves no shift to be done.
 ///
 /// # Errors
 /// If the bundle has no such range mapping, or its steps do not fit its output.
@@ -32,14 +33,16 @@ pub fn of_prediction(
     shift: ShiftMode,
     correct: bool,
     measured: Option<&DepthMap>,
+    window: Option<[f64; 2]>,
 ) -> Result<LedgerResult, TaskError> {
     let raw = &prediction.raw;
-    let mut own = chain(prediction, shift)?;
+    let placed = |mode| chain(prediction, mode).map(|chain| chain.placed(window));
+    let mut own = placed(shift)?;
     if correct {
         (own.mapping, own.shift) = (Mapping::Correct, Shift::None);
     }
     let found = ledger(&own, raw, measured).map_err(|err| TaskError::from_error("Depth chain", &err))?;
-    let modes = reading_chains(shift, |mode| chain(prediction, mode).ok());
+    let modes = reading_chains(shift, |mode| placed(mode).ok());
     let readings = readings(&own, &modes, raw, measured, LAB_PEAK_M);
     Ok(LedgerResult { ledger: found, readings })
 }

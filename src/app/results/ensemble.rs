@@ -25,7 +25,9 @@ impl Computes for EnsembleKey {
         let predictions: Option<Vec<_>> = self.recipes.iter().map(|r| results.predictions.get(r).cloned()).collect();
         let imprints: Option<Vec<_>> = self.recipes.iter().map(meters).collect();
         let (predictions, imprints) = (predictions?, imprints?);
-        Some(Job::new(Lane::Compute, "Spread of the seeds", move |_| ensemble(&predictions, &imprints, shift)))
+        let finger = self.recipes.first()?.touch.finger;
+        let window = state.rig().window_share(finger);
+        Some(Job::new(Lane::Compute, "Spread of the seeds", move |_| ensemble(&predictions, &imprints, shift, window)))
     }
 
     fn bytes(found: &Ensemble) -> usize {

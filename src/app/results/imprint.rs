@@ -21,12 +21,11 @@ impl Computes for MetersKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
         let Self(recipe, shift) = self;
         let prediction = state.results.predictions.get(recipe)?.clone();
-        let sample = state.results.samples.get(&recipe.touch.pair)?;
-        let bubble = sample.pad(recipe.touch.finger).and_then(|t| t.depth());
-        // Without a measurement the bundle's own size is kept.
-        let size = bubble.map_or([0, 0], |b| b.imprint.size());
-        let shift = *shift;
-        Some(Job::new(Lane::Compute, "Prediction in meters", move |_| imprint::imprint(&prediction, shift, size)))
+        let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
+        let (shift, finger) = (*shift, recipe.touch.finger);
+        Some(Job::new(Lane::Compute, "Prediction in meters", move |_| {
+            imprint::imprint_of(&prediction, shift, &sample, finger)
+        }))
     }
 
     fn bytes(imprint: &DepthMap) -> usize {

@@ -19,7 +19,7 @@ impl Computes for LedgerKey {
         let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
         Some(Job::new(Lane::Compute, "Depth chain", move |_| {
             let measured = sample.pad(recipe.touch.finger).and_then(|t| t.depth()).map(|b| &b.imprint);
-            of_prediction(&prediction, shift, false, measured)
+            of_prediction(&prediction, shift, false, measured, sample.rig.window_share(recipe.touch.finger))
         }))
     }
 

@@ -21,6 +21,8 @@ pub enum Stage {
     Shifted,
     /// At the imprint's size.
     Resized,
+    /// Moved to where the pad's window lies; only of models that draw all pads' windows in one place.
+    Placed,
     /// In the raw orientation of the lab's files: the result.
     Turned,
 }
@@ -34,6 +36,7 @@ impl Stage {
             Stage::Meters => "De-normalized".into(),
             Stage::Shifted => "Shift".into(),
             Stage::Resized => "Resized".into(),
+            Stage::Placed => "Placed".into(),
             Stage::Turned => "Rotated".into(),
         }
     }
