@@ -101,6 +101,10 @@ fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
         p.x *= side;
         p.y *= if p.y > 0.0 { tip } else { wrist };
     }
+    // Real bars have sharper rims than the catalog's.
+    let bevel = rng.random_range(0.4..1.0);
+    tool.bevel_width_m *= bevel;
+    tool.bevel_depth_m *= bevel;
     tool
 }
 

@@ -134,7 +134,8 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let made = predictor.predict_one(&picture)?;
     let correct = matches!(args.mapping, Some(MappingArg::Correct));
     let shift_name = if correct { "Correct mapping" } else { shift.label() };
-    let LedgerResult { ledger: found, readings } = of_prediction(&made, shift, correct, truth, sample.rig.window_share(finger))?;
+    let LedgerResult { ledger: found, readings } =
+        of_prediction(&made, shift, correct, truth, sample.rig.window_share(finger))?;
     if let Some(out) = &args.out {
         std::fs::create_dir_all(out)
             .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;

@@ -87,8 +87,7 @@ fn a_picture_is_moved_in_the_raw_orientation_whichever_way_it_is_turned() {
         assert_eq!(still.clone().placed(Some([0.4, 0.1])), still, "no window, nothing to move");
         // One pixel of six to the right, one of four up.
         let moving = DepthChain { window: Some([0.5, 0.5]), ..still.clone() }.placed(Some([0.5 + 1.0 / 6.0, 0.25]));
-        let (still, (moving, ledger)) =
-            (still.run(&picture()).unwrap(), moving.run_with_ledger(&picture()).unwrap());
+        let (still, (moving, ledger)) = (still.run(&picture()).unwrap(), moving.run_with_ledger(&picture()).unwrap());
         for y in 0..4 {
             for x in 0..6usize {
                 assert_eq!(moving[(x, y)], still[(x.saturating_sub(1), (y + 1).min(3))], "{rotation_deg} {x} {y}");
