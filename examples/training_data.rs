@@ -91,8 +91,8 @@ fn micrometers(depth: &DepthMap) -> Vec<i16> {
         .collect()
 }
 
-/// The tool with longer bars to the sides and towards the wrist and shorter ones at the tip, as the real tools have: most of
-/// their bars that lie across run out of the picture.
+/// The tool with narrower bars, longer ones to the sides and towards the wrist and shorter ones at the tip, as the real tools
+/// have: most of their bars that lie across run out of the picture.
 fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
     let side = rng.random_range(1.0..2.4);
     let wrist = rng.random_range(0.95..1.3);
@@ -101,9 +101,11 @@ fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
         p.x *= side;
         p.y *= if p.y > 0.0 { tip } else { wrist };
     }
-    // Real bars have sharper rims than the catalog's.
+    // Real bars are narrower than the catalog's, with sharper rims.
+    let width = rng.random_range(0.5..1.0);
+    tool.bars.iter_mut().for_each(|bar| bar.half_width_m *= width);
     let bevel = rng.random_range(0.4..1.0);
-    tool.bevel_width_m *= bevel;
+    tool.bevel_width_m *= bevel * width;
     tool.bevel_depth_m *= bevel;
     tool
 }
