@@ -96,7 +96,7 @@ fn micrometers(depth: &DepthMap) -> Vec<i16> {
 fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
     let side = rng.random_range(1.0..2.4);
     let wrist = rng.random_range(0.95..1.3);
-    let tip = rng.random_range(0.15..0.7);
+    let tip = rng.random_range(0.15..0.9);
     for p in tool.bars.iter_mut().flat_map(|bar| &mut bar.core) {
         p.x *= side;
         p.y *= if p.y > 0.0 { tip } else { wrist };

@@ -177,17 +177,17 @@ impl SimConfig {
         // tip side: a longer dome than the nominal one, pressed deeper, whose middle lies nearer the wrist and whose rim
         // nearer the tool. Its range is narrow, because a GelSlim image does not tell which bubble belongs to it: a wide
         // range would only blur what is learnt.
-        let rim_center_z_m = noise.uniform(-0.028, -0.021);
-        let rim_semi_axes_m = [noise.uniform(0.047, 0.053), noise.uniform(0.077, 0.083)];
+        let rim_center_z_m = noise.uniform(-0.026, -0.021);
+        let rim_semi_axes_m = [noise.uniform(0.051, 0.056), noise.uniform(0.084, 0.09)];
         let lean_rad = noise.uniform(-0.015, 0.065);
         let decay_m = noise.uniform(0.000_5, 0.001_6);
         let mut around = |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
         let bubble = BubbleConfig {
-            press_m: around(0.0148, 0.05),
-            dome_rise_m: around(0.015, 0.07),
+            press_m: around(0.0144, 0.05),
+            dome_rise_m: around(0.0155, 0.07),
             rim_semi_axes_m,
             rim_center_z_m,
-            air_kept: around(0.6, 0.12),
+            air_kept: around(0.63, 0.1),
             noise_m: around(b.noise_m, 0.4),
             drift_m: around(b.drift_m, 0.6),
             texture_m: around(b.texture_m, 0.4),
