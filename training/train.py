@@ -39,6 +39,8 @@ def main():
     parser.add_argument("--no-flip", dest="flip", action="store_false", help="ablation: never mirror a pair")
     parser.add_argument("--geometry", choices=("full", "padding", "cropping"), default="full",
                         help="ablation: the GelSlim image padded to the bubble's view, or the imprint cropped to the GelSlim's")
+    parser.add_argument("--frame", choices=("window", "bubble"), default="window",
+                        help="pictures drawn so that both fingers' GelSlim windows coincide, or where each bubble's camera has them")
     parser.add_argument("--condition-noise", type=float, default=0.0,
                         help="white noise on the GelSlim image, in its standard deviations")
     parser.add_argument("--predicted-by", help="mask: generator bundle on whose predictions to learn as well")

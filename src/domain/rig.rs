@@ -131,6 +131,11 @@ impl Sensor {
     }
 }
 
+/// The center of a pixel as shares of the picture's width and height.
+pub fn share(pixel: [f64; 2], size: [usize; 2]) -> [f64; 2] {
+    std::array::from_fn(|i| (pixel[i] + 0.5) / size[i].max(1) as f64)
+}
+
 impl Window {
     /// `[center x, center y, width, height]`.
     pub fn rectangle(&self) -> [f64; 4] {
@@ -240,6 +245,11 @@ impl Rig {
     /// Where the first color sensor looks in the picture of the first depth sensor.
     pub fn color_window(&self, pad: PadId) -> Option<&Window> {
         self.window(pad, self.first(SensorKind::Color)?, self.first(SensorKind::Depth)?)
+    }
+
+    /// The center of [`Rig::color_window`], as shares of the depth picture's width and height.
+    pub fn window_share(&self, pad: PadId) -> Option<[f64; 2]> {
+        Some(share(self.color_window(pad)?.center_px, self.depth()?.size()))
     }
 
     /// Whether the pictures of the first color and the first depth sensor lie turned by 180 degrees to each other.

@@ -14,7 +14,7 @@ use crate::domain::postprocess::{
     ColorChain, DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
 };
 use crate::domain::resample::Resampling;
-use crate::domain::rig::{Sensor, SensorKind, lab};
+use crate::domain::rig::{Sensor, SensorKind, lab, share};
 
 const FORMAT: &str = "touch2touch-bundle";
 /// The newest version; the first declares no sensors, and means the lab's.
@@ -105,6 +105,8 @@ impl GeneratorSpec {
             size: self.output.imprint_size,
             resampling: self.output.resampling,
             rotation_deg: self.output.rotation_deg,
+            window: self.output.window_px.map(|center| share(center, self.output.imprint_size)),
+            offset: [0.0; 2],
         };
         chain.with_mode(mode, self.shift)
     }
@@ -261,6 +263,10 @@ pub struct OutputSpec {
     /// How the picture is brought to that size.
     #[serde(default = "bilinear")]
     pub resampling: Resampling,
+    /// Where the picture has the center of the color sensor's window, pixels of the imprint in its raw orientation: of a model
+    /// that draws it in the same place for every pad. Without it, pictures stay where they are drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub window_px: Option<[f64; 2]>,
 }
 
 fn bilinear() -> Resampling {
@@ -518,6 +524,9 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
     if let Some(output) = &output {
         check(sides(&output.size), "output.size: out of range", SIDES);
         check(sides(&output.imprint_size), "output.imprint_size: out of range", SIDES);
+        let inside = |center: [f64; 2]| (0..2).all(|i| (0.0..output.imprint_size[i] as f64).contains(&center[i]));
+        let place = "give the window's center, pixels of the imprint in its raw orientation";
+        check(output.window_px.is_none_or(inside), "output.window_px: outside the imprint", place);
         check(sides(&output.sensor.size), "output.sensor.size: out of range", SIDES);
         match output.sensor.kind {
             SensorKind::Depth => {
@@ -654,4 +663,45 @@ fn sides(sides: &[usize]) -> bool {
 
 fn turn(degrees: u32) -> bool {
     matches!(degrees, 0 | 180)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::rig::Rig;
+
+    fn generator(window_px: Option<[f64; 2]>) -> Result<GeneratorSpec, String> {
+        let text = include_bytes!("../../../tests/data/bundles/generator/manifest.json");
+        let mut manifest: Value = serde_json::from_slice(text).unwrap();
+        if let Some(center) = window_px {
+            manifest["output"]["window_px"] = serde_json::json!(center);
+        }
+        let mut problems = Problems { file: "manifest.json".into(), list: Vec::new() };
+        let parsed = parse(manifest.to_string().as_bytes(), &mut problems);
+        if let Some(problem) = problems.list.first() {
+            return Err(problem.what.clone());
+        }
+        match parsed.unwrap().spec {
+            Some(BundleSpec::Generator(spec)) => Ok(*spec),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_picture_with_one_window_for_all_pads_is_moved_to_each_pads_own() {
+        let rig = Rig::lab();
+        let moved = |spec: &GeneratorSpec, pad| {
+            let chain = spec.depth_chain(ShiftMode::ExactInverse).unwrap().placed(rig.window_share(pad));
+            // The bundle's pictures lie turned by 180 degrees.
+            std::array::from_fn(|i| -chain.offset[i] * rig.depth().unwrap().size()[i] as f64)
+        };
+        let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9;
+        let mut framed = generator(Some([10.0, 10.0])).unwrap();
+        framed.output.imprint_size = rig.depth().unwrap().size();
+        framed.output.window_px = Some([74.5, 74.0]);
+        assert!(near(moved(&framed, lab::RIGHT), [4.0, 0.0]), "{:?}", moved(&framed, lab::RIGHT));
+        assert!(near(moved(&framed, lab::LEFT), [-5.0, -1.0]), "{:?}", moved(&framed, lab::LEFT));
+        assert!(near(moved(&generator(None).unwrap(), lab::LEFT), [0.0, 0.0]), "without the key nothing moves");
+        assert!(generator(Some([-1.0, 10.0])).unwrap_err().contains("output.window_px"));
+    }
 }
