@@ -215,7 +215,7 @@ mod tests {
         let image = Grid::from_fn(5, 4, |x, y| if (x, y) == (4, 3) { f32::NAN } else { (10 * y + x) as f32 });
         let whole = moved(&image, [2.0, -1.0]);
         for y in 0..4 {
-            for x in 0..5 {
+            for x in 0..5usize {
                 let from = image[(x.saturating_sub(2), (y + 1).min(3))];
                 assert_eq!(whole[(x, y)].to_bits(), from.to_bits(), "{x} {y}");
             }

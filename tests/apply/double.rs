@@ -340,7 +340,7 @@ impl Double {
             resampling: Resampling::Bilinear,
             rotation_deg: 0,
             window: None,
-            moved: [0.0; 2],
+            offset: [0.0; 2],
         };
         let chains = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse]
             .map(|mode| (mode, chain.clone().with_mode(mode, None).map_err(|err| err.to_string())));

@@ -23,7 +23,7 @@ fn chain() -> DepthChain {
         resampling: Resampling::Bilinear,
         rotation_deg: 0,
         window: None,
-        moved: [0.0; 2],
+        offset: [0.0; 2],
     }
 }
 

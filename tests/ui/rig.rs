@@ -123,7 +123,7 @@ impl Services for QuickGenerator {
             resampling: Resampling::Bilinear,
             rotation_deg: 180,
             window: None,
-            moved: [0.0; 2],
+            offset: [0.0; 2],
         };
         let stats = ShiftStats { pred_mean: 0.0115, pred_std: 0.0021, gt_mean: 0.0052, gt_std: 0.0043 };
         let chains: BTreeMap<ShiftMode, Result<DepthChain, String>> = ShiftMode::ALL
