@@ -30,3 +30,4 @@ pub mod prediction;
 pub mod statistics;
 pub mod tool;
 pub mod training_data;
+mod usable;

@@ -12,7 +12,6 @@ use super::output::says;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::PairId;
-use crate::domain::pose::ToolModel;
 use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::io::export_unet::{ExportConfig, PARTS};
@@ -20,7 +19,7 @@ use crate::work::error::TaskError;
 use crate::work::export::{Automatic, ExportSetup, HandMasks, export_masks};
 use crate::work::labels::Labels;
 use crate::work::mask::MaskInputs;
-use crate::work::tool::load_tool;
+use crate::work::tool::Tools;
 
 /// What can be done with masks.
 #[derive(Debug, Subcommand)]
@@ -96,14 +95,10 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         split: ExportConfig { seed: args.split_seed, rig: dataset.rig.clone(), ..ExportConfig::default() },
     };
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
+    let mut tools = Tools::new(&dataset);
     let mut automatic = |sample: &Sample, finger: PadId, tool: Option<&str>| {
         const WHAT: &str = "Contact mask";
-        let tool = tool.and_then(|name| {
-            let model =
-                tools.entry(name.to_owned()).or_insert_with(|| load_tool(&dataset, name).ok().map(|(tool, _)| tool));
-            model.as_ref()
-        });
+        let tool = tool.and_then(|name| tools.get(name));
         let touch = sample.pad(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;
         let bubble = touch.depth().ok_or_else(|| TaskError::new(WHAT, "it has no such imprint"))?;
         let inputs = MaskInputs { sample, tool, labels: None };

@@ -11,7 +11,7 @@ use super::widget::{curves, empty, progress};
 use crate::app::action::Action;
 use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
 use crate::app::command::{AdaptCommand, Pane, TasksCommand};
-use crate::domain::units::{fixed, mm, text_mm};
+use crate::domain::units::{fixed, mm};
 use crate::work::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
 
 /// Between pictures, points.
@@ -98,14 +98,7 @@ fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
         let recipe = (held.pair, held.pad, fit);
         thumbnail::depth(cx, ui.painter(), rect, ("held back", i), recipe, (picture, map, range));
-        if let Some(pos) = response.hover_pos() {
-            let share = (pos - rect.min) / rect.size();
-            let [w, h] = picture.size();
-            let (x, y) = ((share.x * w as f32) as usize, (share.y * h as f32) as usize);
-            if let Some(value) = picture.get(x, y).filter(|v| v.is_finite()) {
-                cx.shared.readout = Some(format!("{name} ({x}, {y})   {}", text_mm(f64::from(*value))));
-            }
-        }
+        thumbnail::readout(cx, &response, name, picture);
     }
     let pad = state.rig().pad_key(held.pad).into_owned();
     let text = format!("{} {pad}, in the colors of the imprints; choose a pair in the list to see its own", held.name);

@@ -181,14 +181,7 @@ fn maps(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], ensemble: &Ense
         let range = range.unwrap_or_else(|| of(map));
         thumbnail::depth(cx, &painter, rect, ("ensemble", i), (&key, ensemble.spread.count), (map, colors, range));
         bar(cx, ui.painter(), pos2(left, rect.bottom() + 3.0), size.x, colors, range);
-        if let Some(pos) = response.hover_pos() {
-            let share = (pos - rect.min) / rect.size();
-            let [w, h] = map.size();
-            let (x, y) = ((share.x * w as f32) as usize, (share.y * h as f32) as usize);
-            if let Some(value) = map.get(x, y).filter(|v| v.is_finite()) {
-                cx.shared.readout = Some(format!("{name} ({x}, {y})   {}", units::text_mm(f64::from(*value))));
-            }
-        }
+        thumbnail::readout(cx, &response, name, map);
     }
     let spread = &ensemble.spread;
     if spread.count > 1 {

@@ -21,6 +21,7 @@ use super::error::TaskError;
 use super::job::{Curve, JobCx};
 use super::mask::MaskChoice;
 use super::models::Models;
+use super::tool::Tools;
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::fit::{FitError, FitSource, Fitted, PadFit, closed_form, doubts, folds, left_out};
@@ -124,7 +125,7 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         unseen = self::left_out(&cases, pads, &parts).map_err(fail)?;
         cx.check(WHAT)?;
     }
-    let mut tools = BTreeMap::new();
+    let mut tools = Tools::new(dataset);
     let mut scored = |pictures: &[Option<&Grid<f32>>]| -> Result<Option<Scored>, TaskError> {
         let mut scored = score::scored(&touches, pictures, &dataset.rig)?;
         if let Some(scored) = &mut scored {

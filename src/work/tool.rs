@@ -1,4 +1,6 @@
-//! A tool's CAD model, read from its data set and made ready for registration: [`load_tool`].
+//! A tool's CAD model, read from its data set and made ready for registration: [`load_tool`], [`Tools`].
+
+use std::collections::BTreeMap;
 
 use super::error::{TaskError, says};
 use crate::domain::dataset::Problem;
@@ -45,4 +47,32 @@ pub fn named_tool(name: &str, mesh: TriMesh) -> Result<NamedTool, TaskError> {
 pub fn load_tool(dataset: &Dataset, name: &str) -> Result<(ToolModel, Vec<Problem>), TaskError> {
     let ToolFile { mesh, notes } = tool_file(dataset, name)?;
     Ok((named_tool(name, mesh)?.model, notes))
+}
+
+/// The CAD models of a data set, each read once. One that is not there, or cannot be used, is not looked for again.
+#[derive(Debug)]
+pub struct Tools<'a> {
+    dataset: &'a Dataset,
+    models: BTreeMap<String, Option<ToolModel>>,
+}
+
+impl<'a> Tools<'a> {
+    /// Nothing is read yet.
+    pub fn new(dataset: &'a Dataset) -> Self {
+        Self { dataset, models: BTreeMap::new() }
+    }
+
+    /// The model of a tool, read when it is first asked for.
+    pub fn get(&mut self, name: &str) -> Option<&ToolModel> {
+        if !self.models.contains_key(name) {
+            let model = load_tool(self.dataset, name).ok().map(|(model, _)| model);
+            self.models.insert(name.to_owned(), model);
+        }
+        self.known(name)
+    }
+
+    /// The model of a tool that was asked for before.
+    pub fn known(&self, name: &str) -> Option<&ToolModel> {
+        self.models.get(name)?.as_ref()
+    }
 }

@@ -1,6 +1,5 @@
 //! Training data for the networks: a data set or the simulator as shards that the trainer reads.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -11,7 +10,8 @@ use super::error::{Remark, TaskError};
 use super::job::JobCx;
 use super::labels::{Labels, PairLabels, Review};
 use super::mask::{MaskChoice, MaskInputs, MaskRecipe, without_model};
-use super::tool::load_tool;
+use super::tool::Tools;
+use super::usable::unusable;
 use crate::domain::catalog;
 use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
@@ -29,8 +29,6 @@ use crate::io::shards::{self, GELSLIM_SIDE, Origin, Record, ShardWriter};
 const WHAT: &str = "Write training data";
 /// Pairs in memory at a time.
 const CHUNK: usize = 64;
-/// Least share of an imprint that must have been measured.
-const MEASURED: f64 = 0.5;
 
 /// Where touches come from.
 #[derive(Clone, Copy, Debug)]
@@ -214,13 +212,13 @@ struct Reader<'a> {
     source: TouchSource<'a>,
     /// Without those marked *skip*.
     pairs: Vec<PairId>,
-    /// The CAD models that are there, by tool.
-    tools: BTreeMap<String, ToolModel>,
+    /// The CAD models of the pairs, read.
+    tools: Option<Tools<'a>>,
 }
 
 impl<'a> Reader<'a> {
     fn open(source: TouchSource<'a>, done: &mut WrittenShards) -> Result<Self, TaskError> {
-        let (mut pairs, mut tools) = (Vec::new(), BTreeMap::new());
+        let (mut pairs, mut tools) = (Vec::new(), None);
         if let TouchSource::Dataset(dataset, labels, wanted) = source {
             if *dataset.rig != *Rig::lab() {
                 return Err(TaskError::new(
@@ -229,6 +227,7 @@ impl<'a> Reader<'a> {
                 ));
             }
             let (reviews, _) = labels.reviews();
+            let mut models = Tools::new(dataset);
             for &id in wanted {
                 let Some(entry) = dataset.index.get(id) else { continue };
                 if reviews.get(&entry.name) == Some(&Review::Skip) {
@@ -236,11 +235,11 @@ impl<'a> Reader<'a> {
                     continue;
                 }
                 pairs.push(id);
-                let Some(tool) = entry.tool.as_ref().filter(|tool| !tools.contains_key(*tool)) else { continue };
-                if let Ok((model, _)) = load_tool(dataset, tool) {
-                    tools.insert(tool.clone(), model);
+                if let Some(tool) = &entry.tool {
+                    models.get(tool);
                 }
             }
+            tools = Some(models);
         }
         Ok(Self { source, pairs, tools })
     }
@@ -319,16 +318,12 @@ impl<'a> Reader<'a> {
         let labels = labels.load(&name).map_err(|err| fail(err.why))?;
         let tool_name = entry.and_then(|entry| entry.tool.as_deref());
         let number = tool_name.and_then(|name| catalog::tools().iter().position(|tool| tool.name == name));
-        let tool = tool_name.and_then(|name| self.tools.get(name));
+        let tool = tool_name.and_then(|name| self.tools.as_ref()?.known(name));
         let mut touches = Vec::new();
         for pad in sample.rig.pads() {
             let Some(mut touch) = touch(&sample, pad, at, number) else { continue };
-            let measured = touch.record.imprint.as_slice().iter().filter(|v| v.is_finite()).count();
-            if (measured as f64) < MEASURED * touch.record.imprint.len() as f64 {
-                return Err(fail(format!("only {measured} of {} pixels were measured", touch.record.imprint.len())));
-            }
-            if touch.record.gelslim.as_slice().iter().flatten().any(|v| !v.is_finite()) {
-                return Err(fail("its GelSlim image has values that are not numbers".into()));
+            if let Some(why) = unusable(&touch.record.gelslim, &touch.record.imprint) {
+                return Err(fail(why));
             }
             touch.record.unseen = number.is_some_and(|at| !catalog::tools()[at].seen);
             if let Some((mask, known)) = contact(&sample, pad, tool, &labels) {

@@ -15,9 +15,8 @@ use crate::work::error::TaskError;
 use crate::work::imprint::chain;
 use crate::work::job::JobCx;
 use crate::work::models::{Models, Wanted};
+use crate::work::usable::unusable;
 
-/// Least share of an imprint that must have been measured.
-const MEASURED: f64 = 0.5;
 /// Touches that are predicted together.
 const BATCH: usize = 16;
 
@@ -133,12 +132,8 @@ fn read(
 ) -> Result<Option<Touch>, String> {
     let Some(touch) = sample.pad(pad) else { return Ok(None) };
     let (Some(picture), Some(bubble)) = (touch.picture(input), touch.depth()) else { return Ok(None) };
-    if picture.as_slice().iter().flatten().any(|v| !v.is_finite()) {
-        return Err("its GelSlim image has values that are not numbers".into());
-    }
-    let finite = bubble.imprint.as_slice().iter().filter(|v| v.is_finite()).count();
-    if (finite as f64) < MEASURED * bubble.imprint.len() as f64 {
-        return Err(format!("only {finite} of {} pixels of its imprint were measured", bubble.imprint.len()));
+    if let Some(why) = unusable(&picture, &bubble.imprint) {
+        return Err(why);
     }
     let lattice = (sample.scale == Scale::Assumed).then(|| signature(&picture)).flatten();
     let touch = Touch {

@@ -11,6 +11,7 @@ use sha2::{Digest as _, Sha256};
 
 use super::AdaptSetup;
 use super::gather::Touch;
+use crate::infer::recipe::input_digest;
 use crate::io::digest::hex;
 use crate::io::{atomic, files};
 
@@ -69,7 +70,7 @@ fn key(setup: &AdaptSetup, touches: &[Touch]) -> String {
     for touch in touches {
         all.update(touch.name.as_bytes());
         all.update([touch.pad.index() as u8]);
-        touch.picture.as_slice().iter().flatten().for_each(|v| all.update(v.to_le_bytes()));
+        all.update(input_digest(&touch.picture));
         touch.target.as_slice().iter().for_each(|v| all.update(v.to_le_bytes()));
     }
     hex(&all.finalize())

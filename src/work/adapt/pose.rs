@@ -1,13 +1,11 @@
 //! The in-hand angle that pictures lead to, where the data have poses.
 
-use std::collections::BTreeMap;
-
 use super::gather::Touch;
 use super::{AdaptSetup, WHAT};
 use crate::domain::align::Ask;
 use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::{Registration, ToolModel};
+use crate::domain::pose::Registration;
 use crate::domain::rig::PerPad;
 use crate::domain::sample::Scale;
 use crate::io::dataset::Dataset;
@@ -16,18 +14,18 @@ use crate::work::job::JobCx;
 use crate::work::mask::MaskInputs;
 use crate::work::models::{Masking, Models};
 use crate::work::pose::pose;
-use crate::work::tool::load_tool;
+use crate::work::tool::Tools;
 
 /// Most grasps that are posed: enough for a mean, and a matter of seconds.
 const MOST_GRASPS: usize = 100;
 
 /// The errors of the angle over grasps whose every touch has a picture; `None` where no truth, camera or CAD model is
-/// known. A grasp without a pose counts as a failure. `tools` are the models that were read already.
+/// known. A grasp without a pose counts as a failure. `tools` are those of the data set.
 pub(super) fn angles(
     dataset: &Dataset,
     setup: &AdaptSetup,
     models: &Models,
-    tools: &mut BTreeMap<String, Option<ToolModel>>,
+    tools: &mut Tools<'_>,
     touches: &[Touch],
     pictures: &[Option<&Grid<f32>>],
     cx: &JobCx,
@@ -48,8 +46,7 @@ pub(super) fn angles(
         if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             continue;
         }
-        let tool = tools.entry(tool.clone()).or_insert_with(|| load_tool(dataset, tool).ok().map(|(model, _)| model));
-        let Some(tool) = tool else { continue };
+        let Some(tool) = tools.get(tool) else { continue };
         let mut imprints = PerPad::<DepthMap>::default();
         for (touch, picture) in grasp.iter().zip(own) {
             imprints[touch.pad] = picture.map(|picture| touch.imprint(picture));
