@@ -89,7 +89,7 @@ def figures(what, folder, options, tests):
 def train(what, args, folder, options, shards):
     run = argparse.Namespace(data=str(shards), out=str(folder), minutes=0, steps=args.steps, seed=args.seed, bf16=False,
                              start=args.start if what == "generator" else None, turned=0.5, rotation=True, flip=True,
-                             geometry="full", frame="window", condition_noise=0.0)
+                             geometry="full", frame="window", condition_noise=0.0, rate=None)
     vars(run).update(options)
     torch.manual_seed(args.seed)
     if what == "generator":

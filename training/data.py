@@ -29,7 +29,7 @@ MASK_RANGE_M = (-0.0116, 0.0225)
 WINDOWS_PX = ((78.5, 74.0), (69.5, 73.0))
 # Where a generator's picture has the window of either finger: nothing in a GelSlim image of an unknown sensor says which
 # finger it is of, so a network that drew each at its own place would have to draw the mean of both. Whole pixels from both.
-FRAME_PX = (74.5, 74.0)
+FRAME_PX = (68.5, 69.0)
 
 
 class Shards:
@@ -142,7 +142,7 @@ def each_dihedral(images, k):
 
 
 # The GelSlim's window in the generator's image (128 x 128, rotated bubble), both fingers' in the frame: rows, then columns.
-WINDOW = (slice(46, 75), slice(57, 88))
+WINDOW = (slice(50, 79), slice(62, 93))
 
 
 def padded(gelslim):

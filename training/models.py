@@ -104,7 +104,7 @@ class ConditionEncoder(nn.Module):
             nn.Conv2d(96, dim, 3, stride=2, padding=1), ResBlock(dim, dim), norm(dim))
         # Both rasters in pixels of the rotated bubble image (175 x 140); the GelSlim's window lies there (data.FRAME_PX).
         # Learnt from this start, so that a cell first reads from what lies under it.
-        self.place = nn.Parameter(sinusoids(*raster(8, 78.5, 121.0, 49.5, 81.5), dim))
+        self.place = nn.Parameter(sinusoids(*raster(8, 84.5, 127.0, 54.0, 86.0), dim))
         self.query = nn.Parameter(sinusoids(*raster(16, 0.0, 175.0, 0.0, 140.0), dim))
         self.mix = nn.ModuleList(Transformer(dim, 5) for _ in range(depth))
         self.read = Transformer(dim, 5)

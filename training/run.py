@@ -15,7 +15,7 @@ class Run:
     """Progress, learning rate, log and checkpoints of one training run."""
 
     def __init__(self, args, kind, nets, rate):
-        self.args, self.kind, self.nets, self.rate = args, kind, nets, rate
+        self.args, self.kind, self.nets, self.rate = args, kind, nets, getattr(args, "rate", None) or rate
         self.out = Path(args.out)
         self.out.mkdir(parents=True, exist_ok=True)
         self.optimiser = torch.optim.AdamW([p for n in nets.values() for p in n.parameters() if p.requires_grad],
@@ -83,7 +83,7 @@ class Run:
 
 def options(args):
     """The switches that make one run differ from another, for the checkpoint and the provenance."""
-    keys = ("turned", "rotation", "flip", "geometry", "frame", "condition_noise")
+    keys = ("turned", "rotation", "flip", "geometry", "frame", "condition_noise", "rate")
     return {k: getattr(args, k) for k in keys} | {"begun_from_a_bundle": bool(args.start)}
 
 

@@ -252,6 +252,12 @@ impl Rig {
         Some(share(self.color_window(pad)?.center_px, self.depth()?.size()))
     }
 
+    /// The mean of [`Rig::window_share`] over the pads that have one: for a touch that does not say of which it is.
+    pub fn mean_window_share(&self) -> Option<[f64; 2]> {
+        let all: Vec<[f64; 2]> = self.pads().filter_map(|pad| self.window_share(pad)).collect();
+        (!all.is_empty()).then(|| [0, 1].map(|i| all.iter().map(|at| at[i]).sum::<f64>() / all.len() as f64))
+    }
+
     /// Whether the pictures of the first color and the first depth sensor lie turned by 180 degrees to each other.
     pub fn turned(&self) -> bool {
         let turn = |sensor: Option<&Sensor>| sensor.map(|sensor| sensor.rotation_deg);

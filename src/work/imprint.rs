@@ -113,10 +113,12 @@ pub fn chain_of_pad(
     let with = |fit: &Arc<Correction>| {
         if parts == CorrectionParts::ALL { fit.clone() } else { Arc::new(Correction { parts, ..(**fit).clone() }) }
     };
-    let chain = chain(prediction, shift)?;
-    // Picture pairs do not say of which finger they are.
-    let chain = if sample.scale == Scale::Measured { chain.placed(sample.rig.window_share(finger)) } else { chain };
-    Ok(DepthChain { correction: correction.map(with), ..chain })
+    let window = match sample.scale {
+        Scale::Measured => sample.rig.window_share(finger),
+        // Picture pairs do not say of which finger they are.
+        Scale::Assumed => sample.rig.mean_window_share(),
+    };
+    Ok(DepthChain { correction: correction.map(with), ..chain(prediction, shift)?.placed(window) })
 }
 
 /// The steps from a prediction to meters as the model draws them.
