@@ -113,12 +113,16 @@ pub fn chain_of_pad(
     let with = |fit: &Arc<Correction>| {
         if parts == CorrectionParts::ALL { fit.clone() } else { Arc::new(Correction { parts, ..(**fit).clone() }) }
     };
-    let window = match sample.scale {
+    Ok(DepthChain { correction: correction.map(with), ..chain(prediction, shift)?.placed(window(sample, finger)) })
+}
+
+/// Where the color sensor's window lies in the imprint of a finger: its center, shares of width and height. Picture pairs do
+/// not say of which finger they are: the middle of the windows stands for it.
+pub fn window(sample: &Sample, finger: PadId) -> Option<[f64; 2]> {
+    match sample.scale {
         Scale::Measured => sample.rig.window_share(finger),
-        // Picture pairs do not say of which finger they are.
         Scale::Assumed => sample.rig.mean_window_share(),
-    };
-    Ok(DepthChain { correction: correction.map(with), ..chain(prediction, shift)?.placed(window) })
+    }
 }
 
 /// The steps from a prediction to meters as the model draws them.
