@@ -92,6 +92,7 @@ fn a_refusal_lists_everything_that_is_wrong() {
         m["input"]["std"] = serde_json::json!([0.07, 0.0, 0.06]);
         m["schedule"]["beta_end"] = serde_json::json!(1.5);
         m["output"]["range_m"] = serde_json::json!([0.02, 0.01]);
+        m["output"]["window_px"] = serde_json::json!([-1.0, 20.0]);
         m["prediction"] = serde_json::json!("velocity");
         m["surprise"] = serde_json::json!(1);
         m["defaults"]["eta"] = serde_json::json!(2.0);
@@ -104,6 +105,7 @@ fn a_refusal_lists_everything_that_is_wrong() {
         "input.std: not positive",
         "schedule: the betas run from 0.0015 to 1.5",
         "output.range_m: empty",
+        "output.window_px: outside the imprint",
         "prediction: unknown variant `velocity`",
         "surprise: unknown key",
         "condition: missing",

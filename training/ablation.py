@@ -71,7 +71,7 @@ def figures(what, folder, options, tests):
     found = {}
     for name, shards in tests.items():
         every = np.arange(len(shards))
-        gelslim, truth = shards.gelslim(every), data.to_model(shards.metres("clean", every))
+        gelslim, truth = shards.gelslim(every), data.to_model(shards.metres("clean", every), shards.offsets(every))
         noise = options.get("condition_noise", 0.0)
         noisy = gelslim + noise * torch.from_numpy(np.random.default_rng(5).standard_normal(gelslim.shape, dtype=np.float32))
         images = drawn(what, folder, noisy, geometry)
@@ -89,7 +89,7 @@ def figures(what, folder, options, tests):
 def train(what, args, folder, options, shards):
     run = argparse.Namespace(data=str(shards), out=str(folder), minutes=0, steps=args.steps, seed=args.seed, bf16=False,
                              start=args.start if what == "generator" else None, turned=0.5, rotation=True, flip=True,
-                             geometry="full", condition_noise=0.0)
+                             geometry="full", frame="window", condition_noise=0.0, rate=None)
     vars(run).update(options)
     torch.manual_seed(args.seed)
     if what == "generator":

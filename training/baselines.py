@@ -215,7 +215,7 @@ def classifier(args):
             break
         batch = batch[shards.meta[batch, 5] >= 0]
         tool = torch.from_numpy(shards.meta[batch, 5]).long()
-        image = target(shards, "imprint" if rng.random() < 0.5 else "clean", batch, np.zeros(len(batch), int), args)
+        image = data.to_model(shards.metres("imprint" if rng.random() < 0.5 else "clean", batch))
         loss = F.cross_entropy(net(image), tool)
         run.descend(loss, len(batch), {"cross": loss})
     run.save()

@@ -5,7 +5,7 @@ imprint.npy  (M,140,175)   i16  measured imprint in micrometres, raw orientation
 clean.npy    (M,140,175)   i16  the same without camera noise; of real touches the measured one with its holes filled
 contact.npy  (M,140,175)   u8   1 where the membrane lies on the tool; 255 everywhere where that is not known
 meta.npy     (M,8)         f32  grasp, finger, angle, y, z (NaN = not known), tool (-1 = not in the catalog), sensors (0 drawn,
-                                1 the simulator's nominal ones, 3 real), unseen tool
+                                1 the simulator's nominal ones, 2 drawn and of any depth, 3 real), unseen tool
 """
 
 import hashlib
@@ -23,6 +23,13 @@ STD = (0.0687, 0.0428, 0.0576)
 RANGE_M = (-0.0188, 0.0264)
 # Range of the mask UNet's 8-bit input.
 MASK_RANGE_M = (-0.0116, 0.0225)
+
+
+# Centers of what the GelSlims see in the raw bubble image, pixels: right, left finger (`src/domain/rig/lab.rs`).
+WINDOWS_PX = ((78.5, 74.0), (69.5, 73.0))
+# Where a generator's picture has the window of either finger: nothing in a GelSlim image of an unknown sensor says which
+# finger it is of, so a network that drew each at its own place would have to draw the mean of both. Whole pixels from both.
+FRAME_PX = (68.5, 69.0)
 
 
 class Shards:
@@ -68,6 +75,11 @@ class Shards:
                 raw = torch.where(missing, self.take("clean", indices), raw)
         return raw.float()[:, None] * 1e-6
 
+    def offsets(self, indices):
+        """How far each sample's window lies from the frame's, raw bubble pixels (N,2), along x and y."""
+        windows = torch.tensor(WINDOWS_PX)[torch.from_numpy(self.meta[indices, 1]).long()]
+        return windows - torch.tensor(FRAME_PX)
+
     def contact(self, indices):
         return self.take("contact", indices).long()
 
@@ -80,16 +92,36 @@ class Shards:
         return [json.loads((self.folder / n / "done.json").read_text()) for n in self.names]
 
 
-def to_model(metres):
-    """Imprint in metres, raw orientation, to the generator's image: rotated by 180 degrees, 128 x 128, [-1,1]."""
-    image = F.interpolate(torch.flip(metres, dims=(2, 3)), size=(128, 128), mode="bilinear", align_corners=False)
+def sampled(image, x, y):
+    """Bilinear values of images (N,1,H,W) at columns x (N,w) and rows y (N,h); beyond the border the border's value."""
+    height, width = image.shape[2:]
+    x, y = (2 * x + 1) / width - 1, (2 * y + 1) / height - 1
+    at = torch.stack([x[:, None, :].expand(-1, y.shape[1], -1), y[:, :, None].expand(-1, -1, x.shape[1])], dim=3)
+    return F.grid_sample(image, at, mode="bilinear", padding_mode="border", align_corners=False)
+
+
+def to_model(metres, offsets=None):
+    """Imprint in metres, raw orientation, to the generator's image: rotated by 180 degrees, 128 x 128, [-1,1].
+
+    With `offsets` (N,2) moved so that the windows come to lie where the frame has them.
+    """
+    height, width = metres.shape[2:]
+    offsets = torch.zeros(len(metres), 2) if offsets is None else offsets
+    at = (torch.arange(128) + 0.5)[None] / 128
+    x = width - 0.5 - at * width + offsets[:, :1]
+    y = height - 0.5 - at * height + offsets[:, 1:]
+    image = sampled(metres, x, y)
     return ((image - RANGE_M[0]) / (RANGE_M[1] - RANGE_M[0]) * 2 - 1).clamp(-1, 1)
 
 
-def from_model(image):
+def from_model(image, offsets=None):
     """The inverse of `to_model`, up to resampling: (N,1,140,175) metres in the raw orientation."""
     metres = (image.clamp(-1, 1) + 1) / 2 * (RANGE_M[1] - RANGE_M[0]) + RANGE_M[0]
-    return torch.flip(F.interpolate(metres, size=(140, 175), mode="bilinear", align_corners=False), dims=(2, 3))
+    metres = torch.flip(F.interpolate(metres, size=(140, 175), mode="bilinear", align_corners=False), dims=(2, 3))
+    if offsets is None:
+        return metres
+    x, y = torch.arange(175.0)[None] - offsets[:, :1], torch.arange(140.0)[None] - offsets[:, 1:]
+    return sampled(metres, x, y)
 
 
 def to_mask_input(metres):
@@ -109,8 +141,8 @@ def each_dihedral(images, k):
     return torch.stack([dihedral(image, int(i)) for image, i in zip(images, k)])
 
 
-# The GelSlim's window in the generator's image (128 x 128, rotated bubble): rows, then columns, of both fingers' mean.
-WINDOW = (slice(50, 79), slice(63, 94))
+# The GelSlim's window in the generator's image (128 x 128, rotated bubble), both fingers' in the frame: rows, then columns.
+WINDOW = (slice(50, 79), slice(62, 93))
 
 
 def padded(gelslim):

@@ -48,6 +48,11 @@ class Bundle:
                                 steps or self.manifest["defaults"]["steps"], seed, self.manifest["latent"]["shape"])
         return self.run("decoder", latent)
 
+    def metres(self, gelslim, offsets, **options):
+        """The same in metres, each picture where its finger's camera has it (`offsets` of `Shards.offsets`)."""
+        framed = "window_px" in self.manifest["output"]
+        return data.from_model(self.predict(gelslim, **options), offsets if framed else None)
+
     def mask(self, metres):
         logits = self.run("mask_unet", data.to_mask_input(metres))
         return logits[:, 1] > logits[:, 0]
@@ -110,7 +115,9 @@ def shards_figures(name, bundle, masker, shards, count, out):
     chosen = np.linspace(0, len(shards) - 1, min(count, len(shards))).astype(int)
     gelslim = shards.gelslim(chosen)
     clean, measured = shards.metres("clean", chosen), shards.metres("imprint", chosen)
-    predicted = torch.cat([data.from_model(bundle.predict(gelslim[i:i + 16])) for i in range(0, len(chosen), 16)])
+    offsets = shards.offsets(chosen)
+    parts = [slice(i, i + 16) for i in range(0, len(chosen), 16)]
+    predicted = torch.cat([bundle.metres(gelslim[part], offsets[part]) for part in parts])
     figures = {"samples": len(chosen)}
     for label, truth in (("clean", clean), ("measured", measured)):
         figures[label] = {

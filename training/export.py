@@ -91,11 +91,11 @@ def load_generator(run):
     return encoder.eval(), denoiser.eval(), decoder.eval(), ae, state
 
 
-def predict(nets, gelslim, steps=10, seed=42, shape=(4, 16, 16)):
+def predict(nets, gelslim, offsets, steps=10, seed=42, shape=(4, 16, 16)):
     """Imprints in metres, raw orientation, for standardised GelSlim images."""
     encoder, denoiser, decoder = nets
     with torch.no_grad():
-        return data.from_model(decoder(diffusion.ddim(denoiser, encoder(gelslim), steps, seed, shape)))
+        return data.from_model(decoder(diffusion.ddim(denoiser, encoder(gelslim), steps, seed, shape)), offsets)
 
 
 # Largest allowed difference to torch, for standard normal inputs: rounding, or weights stored in 16 bits.
@@ -178,8 +178,10 @@ def generator_bundle(args, out, name, nets, shapes, steps, states):
     # any, else the simulator's nominal ones.
     usual = next(found for kind in (3, 1, 0) if len(found := np.flatnonzero(shards.meta[:, 6] == kind)))
     chosen = np.sort(np.random.default_rng(args.seed).choice(usual, min(256, len(usual)), replace=False))
-    predicted = torch.cat([predict(nets, shards.gelslim(chosen[i:i + 32]), steps, shape=shapes[1])
-                           for i in range(0, len(chosen), 32)]).double()
+    framed = all(state["options"].get("frame") == "window" for state in states.values())
+    parts = [chosen[i:i + 32] for i in range(0, len(chosen), 32)]
+    predicted = torch.cat([predict(nets, shards.gelslim(part), shards.offsets(part) if framed else None, steps, shape=shapes[1])
+                           for part in parts]).double()
     measured = shards.metres("imprint", chosen).double()
     return {
         "format": "touch2touch-bundle", "format_version": 1, "kind": "generator", "name": titled(name, shards), "files": files,
@@ -191,7 +193,8 @@ def generator_bundle(args, out, name, nets, shapes, steps, states):
                      "beta_end": diffusion.BETA_END},
         "prediction": "v",
         "output": {"size": [128, 128], "channels": 1, "range_m": list(data.RANGE_M), "reduction": "mean",
-                   "rotation_deg": 180, "imprint_size": [175, 140], "resampling": "bilinear"},
+                   "rotation_deg": 180, "imprint_size": [175, 140], "resampling": "bilinear",
+                   **({"window_px": list(data.FRAME_PX)} if framed else {})},
         "shift": {"pred_mean": (predicted.mean().item() + data.RANGE_M[1]) / 2,
                   "pred_std": predicted.std(correction=0).item() / 2,
                   "gt_mean": measured.mean().item(), "gt_std": measured.std(correction=0).item()},

@@ -102,9 +102,9 @@ class ConditionEncoder(nn.Module):
             nn.Conv2d(3, 48, 8, stride=4, padding=2), ResBlock(48, 48),
             nn.Conv2d(48, 96, 3, stride=2, padding=1), ResBlock(96, 96),
             nn.Conv2d(96, dim, 3, stride=2, padding=1), ResBlock(dim, dim), norm(dim))
-        # Both rasters in pixels of the rotated bubble image (175 x 140); the GelSlim's window lies there on average.
+        # Both rasters in pixels of the rotated bubble image (175 x 140); the GelSlim's window lies there (data.FRAME_PX).
         # Learnt from this start, so that a cell first reads from what lies under it.
-        self.place = nn.Parameter(sinusoids(*raster(8, 85.0, 127.5, 54.5, 86.3), dim))
+        self.place = nn.Parameter(sinusoids(*raster(8, 84.5, 127.0, 54.0, 86.0), dim))
         self.query = nn.Parameter(sinusoids(*raster(16, 0.0, 175.0, 0.0, 140.0), dim))
         self.mix = nn.ModuleList(Transformer(dim, 5) for _ in range(depth))
         self.read = Transformer(dim, 5)

@@ -34,11 +34,14 @@ def main():
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--bf16", action="store_true", help="bfloat16 autocast: faster where the CPU has AMX, else slower")
     parser.add_argument("--from", dest="start", help="bundle whose weights to begin with (default: from scratch)")
+    parser.add_argument("--rate", type=float, help="peak learning rate (default: each network's own); lower for a start from good weights")
     parser.add_argument("--turned", type=float, default=0.6, help="share of pairs turned or mirrored")
     parser.add_argument("--no-rotation", dest="rotation", action="store_false", help="ablation: never turn a pair")
     parser.add_argument("--no-flip", dest="flip", action="store_false", help="ablation: never mirror a pair")
     parser.add_argument("--geometry", choices=("full", "padding", "cropping"), default="full",
                         help="ablation: the GelSlim image padded to the bubble's view, or the imprint cropped to the GelSlim's")
+    parser.add_argument("--frame", choices=("window", "bubble"), default="window",
+                        help="pictures drawn so that both fingers' GelSlim windows coincide, or where each bubble's camera has them")
     parser.add_argument("--condition-noise", type=float, default=0.0,
                         help="white noise on the GelSlim image, in its standard deviations")
     parser.add_argument("--predicted-by", help="mask: generator bundle on whose predictions to learn as well")

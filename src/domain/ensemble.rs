@@ -204,6 +204,8 @@ mod tests {
             size: [2, 2],
             resampling: Resampling::Bilinear,
             rotation_deg: 180,
+            window: None,
+            offset: [0.0; 2],
         };
         // 5, 10 and 15 mm.
         let raw = RawPrediction { channels: [-0.5, 0.0, 0.5].map(|v| Grid::filled(2, 2, v)).to_vec() };

@@ -19,14 +19,14 @@ mod record;
 mod refit;
 
 pub use color::{ColorChain, Picture};
-pub use correction::{Correction, CorrectionPart, CorrectionParts, Response, moved};
+pub use correction::{Correction, CorrectionPart, CorrectionParts, Response};
 pub use flags::{Flag, FlagKind, Severity};
 pub use ledger::{ChainReading, Ledger, correlation, ledger, readings};
 pub use record::{Against, Histogram, Orientation, Stage, StageRecord, Stats};
 pub use refit::{BundleTag, RefitShift, ShiftFit};
 
 use super::grid::{DepthMap, Grid};
-use super::resample::Resampling;
+use super::resample::{self, Resampling};
 use super::units::{fixed, mm};
 
 /// Weights of red, green and blue in the lab's gray value (torchvision's `rgb_to_grayscale`; their sum is 0.9999).
@@ -216,6 +216,12 @@ pub struct DepthChain {
     pub resampling: Resampling,
     /// Rotation to the raw orientation: 0 or 180 degrees.
     pub rotation_deg: u32,
+    /// Where the model draws the color sensor's window, whichever pad it is on: its center, shares of the result's width and
+    /// height. `None` of a model that draws each pad's where it lies.
+    pub window: Option<[f64; 2]>,
+    /// How far the decoder's picture is moved to the right and down, shares of its width and height; see
+    /// [`DepthChain::placed`]. A correction with an offset of its own takes the place of this one.
+    pub offset: [f64; 2],
 }
 
 /// A correction with its parts as stages.
@@ -258,6 +264,24 @@ impl DepthChain {
             ShiftMode::Refit(refit) => Shift::PaperMeanStd(refit.stats()),
         };
         Ok(self)
+    }
+
+    /// The chain of a pad that has the center of its color window at these shares of the picture ([`Rig::window_share`]):
+    /// moved from where the model draws it. Unchanged where either side does not say.
+    ///
+    /// [`Rig::window_share`]: super::rig::Rig::window_share
+    #[must_use]
+    pub fn placed(mut self, window: Option<[f64; 2]>) -> Self {
+        if let Some((to, from)) = window.zip(self.window) {
+            let sign = if self.rotation_deg == 180 { -1.0 } else { 1.0 };
+            self.offset = [0, 1].map(|i| sign * (to[i] - from[i]));
+        }
+        self
+    }
+
+    /// Whether the picture is moved to the rig's window: a fit counts its own offset from where the model draws.
+    fn moved(&self) -> bool {
+        self.offset != [0.0; 2] && !self.correction.as_ref().is_some_and(|fit| fit.has(CorrectionPart::Offset))
     }
 
     /// Runs the chain. NaN pixels stay NaN and spread by the resizing.
@@ -339,14 +363,25 @@ impl DepthChain {
         let (shifted, note) = self.shift.apply(meters, max_m);
         record(Stage::Shifted, &|| self.shift_text(), &shifted, note);
 
-        let shifted = match &self.correction {
-            Some(correction) => corrected(correction, &shifted, record)?,
-            None => shifted,
+        let placed = if self.moved() {
+            let [width, height] = shifted.size();
+            let [right, down] = [self.offset[0] * width as f64, self.offset[1] * height as f64];
+            let placed = resample::moved(&shifted, [right, down]);
+            let how = || format!("by {} px right, {} px down: the window of this pad", fixed(right, 2), fixed(down, 2));
+            record(Stage::Placed, &how, &placed, None);
+            placed
+        } else {
+            shifted
+        };
+
+        let corrected = match &self.correction {
+            Some(correction) => corrected(correction, &placed, record)?,
+            None => placed,
         };
 
         let [width, height] = self.size;
-        let [from_width, from_height] = shifted.size();
-        let resized = self.resampling.resize(&shifted, width, height);
+        let [from_width, from_height] = corrected.size();
+        let resized = self.resampling.resize(&corrected, width, height);
         let how = || format!("{from_width} x {from_height} to {width} x {height}, {}", self.resampling);
         record(Stage::Resized, &how, &resized, None);
 

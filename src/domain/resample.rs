@@ -51,6 +51,36 @@ pub fn area(image: &Grid<f32>, width: usize, height: usize) -> Grid<f32> {
     resize(image, width, height, Resampling::Area)
 }
 
+/// The image moved by `[x, y]` pixels (to the right, down), with two taps per axis; the border is repeated where nothing
+/// comes in. NaN pixels as in [`bilinear`]; an offset that is not a number moves nothing.
+pub fn moved(image: &Grid<f32>, by: [f64; 2]) -> Grid<f32> {
+    // Per axis and target pixel: two source pixels and the weight of the second.
+    let taps = |by: f64, length: usize| -> Vec<(usize, usize, f64)> {
+        let by = if !by.is_finite() {
+            0.0
+        } else if (by - by.round()).abs() < 1e-9 {
+            by.round()
+        } else {
+            by
+        };
+        let last = length.saturating_sub(1);
+        let tap = |i: usize| {
+            let at = (i as f64 - by).clamp(0.0, last as f64);
+            let first = at as usize;
+            (first, (first + 1).min(last), at - first as f64)
+        };
+        (0..length).map(tap).collect()
+    };
+    let (columns, rows) = (taps(by[0], image.width()), taps(by[1], image.height()));
+    // A pixel without weight is not looked at: NaN beside a whole move stays where it is.
+    let mix = |a: f64, b: f64, t: f64| if t == 0.0 { a } else { a + (b - a) * t };
+    Grid::from_fn(image.width(), image.height(), |x, y| {
+        let ((x0, x1, tx), (y0, y1, ty)) = (columns[x], rows[y]);
+        let row = |y: usize| mix(f64::from(image[(x0, y)]), f64::from(image[(x1, y)]), tx);
+        mix(row(y0), if ty == 0.0 { 0.0 } else { row(y1) }, ty) as f32
+    })
+}
+
 /// [`bilinear`] for color images.
 pub fn bilinear_rgb(image: &RgbGrid, width: usize, height: usize) -> RgbGrid {
     resize(image, width, height, Resampling::Bilinear)
@@ -176,8 +206,27 @@ fn resize<P: Pixel>(image: &Grid<P>, width: usize, height: usize, kind: Resampli
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use serde_json::Value;
+
+    use super::*;
+
+    #[test]
+    fn whole_moves_copy_pixels_and_broken_ones_mix_them() {
+        let image = Grid::from_fn(5, 4, |x, y| if (x, y) == (4, 3) { f32::NAN } else { (10 * y + x) as f32 });
+        let whole = moved(&image, [2.0, -1.0]);
+        for y in 0..4 {
+            for x in 0..5usize {
+                let from = image[(x.saturating_sub(2), (y + 1).min(3))];
+                assert_eq!(whole[(x, y)].to_bits(), from.to_bits(), "{x} {y}");
+            }
+        }
+        assert_eq!(moved(&image, [0.25, 0.0])[(2, 1)], 11.75);
+        assert_eq!(moved(&image, [0.0, 0.5])[(2, 2)], 17.0);
+        // Far out, only the border is left.
+        assert_eq!(moved(&image, [100.0, 0.0])[(3, 2)], 20.0);
+        assert_eq!(moved(&image, [f64::NAN, 0.0])[(3, 2)], 23.0);
+        assert!(moved(&Grid::filled(0, 0, 0.0), [1.5, 1.0]).is_empty());
+    }
 
     fn grid(value: &Value) -> Grid<f32> {
         let rows = value.as_array().unwrap();

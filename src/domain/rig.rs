@@ -131,6 +131,11 @@ impl Sensor {
     }
 }
 
+/// The center of a pixel as shares of the picture's width and height.
+pub fn share(pixel: [f64; 2], size: [usize; 2]) -> [f64; 2] {
+    std::array::from_fn(|i| (pixel[i] + 0.5) / size[i].max(1) as f64)
+}
+
 impl Window {
     /// `[center x, center y, width, height]`.
     pub fn rectangle(&self) -> [f64; 4] {
@@ -240,6 +245,17 @@ impl Rig {
     /// Where the first color sensor looks in the picture of the first depth sensor.
     pub fn color_window(&self, pad: PadId) -> Option<&Window> {
         self.window(pad, self.first(SensorKind::Color)?, self.first(SensorKind::Depth)?)
+    }
+
+    /// The center of [`Rig::color_window`], as shares of the depth picture's width and height.
+    pub fn window_share(&self, pad: PadId) -> Option<[f64; 2]> {
+        Some(share(self.color_window(pad)?.center_px, self.depth()?.size()))
+    }
+
+    /// The mean of [`Rig::window_share`] over the pads that have one: for a touch that does not say of which it is.
+    pub fn mean_window_share(&self) -> Option<[f64; 2]> {
+        let all: Vec<[f64; 2]> = self.pads().filter_map(|pad| self.window_share(pad)).collect();
+        (!all.is_empty()).then(|| [0, 1].map(|i| all.iter().map(|at| at[i]).sum::<f64>() / all.len() as f64))
     }
 
     /// Whether the pictures of the first color and the first depth sensor lie turned by 180 degrees to each other.

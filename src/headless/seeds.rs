@@ -65,7 +65,7 @@ pub(super) fn predict(
     let shift = predictor.shift();
     let imprint = |made: &Arc<Prediction>| imprint_of(made, shift, sample, finger).map(Arc::new);
     let imprints = made.iter().map(imprint).collect::<Result<Vec<_>, _>>()?;
-    let Ensemble { spread, channels } = ensemble(&made, &imprints, shift)?;
+    let Ensemble { spread, channels } = ensemble(&made, &imprints, shift, (sample, finger))?;
     Ok(FingerSeeds { imprints, spread, channels })
 }
 

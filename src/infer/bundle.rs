@@ -70,6 +70,10 @@
 //! }
 //! ```
 //!
+//! `"window_px": [74.5, 74.0]` in a generator's `output` says that its picture has the center of the color sensor's window
+//! there, pixels of the raw imprint, for every pad: each picture is then moved to where the rig has the pad's window. Without
+//! it, or in a rig without windows, pictures stay where they are.
+//!
 //! `sensor` declares a sensor as the rig of the data does ([`SensorSpec`]); a bundle is used only where they agree. A
 //! generator that starts from a depth sensor has `"scale": "m"` and one number in `mean` and `std`; one that predicts a
 //! color sensor has, in place of `range_m`, the `range` of the difference on the 0..255 scale, three channels and no

@@ -55,6 +55,8 @@ pub enum Origin {
     Drawn,
     /// The simulator's nominal sensors.
     Nominal,
+    /// Sensors that were drawn, their bubbles pressed to any depth: for contact masks only.
+    AnyDepth,
     /// Real ones.
     Measured,
 }
@@ -108,6 +110,7 @@ impl ShardWriter {
         let origin = match record.origin {
             Origin::Drawn => 0.0,
             Origin::Nominal => 1.0,
+            Origin::AnyDepth => 2.0,
             Origin::Measured => 3.0,
         };
         let tool = record.tool.map_or(-1.0, |tool| tool as f32);

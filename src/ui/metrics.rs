@@ -223,8 +223,8 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     if let Some(recipe) = cx.state.chosen(finger).cloned() {
         if let Some(found) = cx.state.ledger(finger).shown() {
             // The channels are of the pane "Depth chain"; here it is the way to meters.
-            for record in found.ledger.stages.iter().filter(|r| !matches!(r.stage, Stage::Channel(_) | Stage::Resized))
-            {
+            let way = |stage| !matches!(stage, Stage::Channel(_) | Stage::Resized | Stage::Placed);
+            for record in found.ledger.stages.iter().filter(|r| way(r.stage)) {
                 let name = match record.stage {
                     Stage::Reduced => "Decoder",
                     Stage::Meters => "Meters",

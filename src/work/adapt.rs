@@ -133,7 +133,7 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         }
         Ok(scored)
     };
-    let plain: Vec<Option<&Grid<f32>>> = touches.iter().map(|t| Some(&t.prediction)).collect();
+    let plain: Vec<Option<&Grid<f32>>> = touches.iter().map(|t| Some(&t.unfitted)).collect();
     let before =
         scored(&plain)?.ok_or_else(|| TaskError::new(WHAT, "no picture could be compared with its measurement"))?;
     let closed = scored(&references(&unseen))?;
@@ -195,7 +195,7 @@ fn shown(touch: &Touch, after: &DepthMap) -> HeldBack {
         name: touch.name.clone(),
         pad: touch.pad,
         measured: touch.measured.clone(),
-        before: touch.imprint(&touch.prediction),
+        before: touch.imprint(&touch.unfitted),
         after: touch.imprint(after),
     }
 }

@@ -3,11 +3,13 @@
 use std::sync::Arc;
 
 use super::error::TaskError;
-use super::imprint::chain;
+use super::imprint::chain_of_pad;
 use super::prediction::Prediction;
 use crate::domain::ensemble::{Spread, channel_spread};
 use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::postprocess::{DepthChain, ShiftMode};
+use crate::domain::rig::PadId;
+use crate::domain::sample::Sample;
 
 /// Several predictions of one touch against each other.
 #[derive(Clone, Debug)]
@@ -25,7 +27,7 @@ impl Ensemble {
     }
 }
 
-/// Mean and spreads of several predictions, `imprints` being the same in meters.
+/// Mean and spreads of several predictions, `imprints` being the same in meters; all of one pad of a sample.
 ///
 /// # Errors
 /// If there is none, or their sizes differ.
@@ -33,13 +35,14 @@ pub fn ensemble(
     predictions: &[Arc<Prediction>],
     imprints: &[Arc<DepthMap>],
     shift: ShiftMode,
+    (sample, pad): (&Sample, PadId),
 ) -> Result<Ensemble, TaskError> {
     const WHAT: &str = "Spread of the seeds";
     let spread = Spread::of(&imprints.iter().map(|i| &**i).collect::<Vec<_>>())
         .ok_or_else(|| TaskError::new(WHAT, "the predictions differ in size"))?;
     let mut apart = Vec::new();
     for prediction in predictions {
-        let chain = DepthChain { size: spread.mean.size(), ..chain(prediction, shift)? };
+        let chain = DepthChain { size: spread.mean.size(), ..chain_of_pad(prediction, shift, sample, pad)? };
         let found = channel_spread(&prediction.raw, &chain).map_err(|err| TaskError::from_error(WHAT, &err))?;
         apart.extend(found);
     }

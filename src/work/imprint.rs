@@ -8,7 +8,7 @@ use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{Correction, CorrectionParts, DepthChain, PostprocessError, RawPrediction, ShiftMode};
 use crate::domain::resample::{bilinear, bilinear_rgb};
 use crate::domain::rig::{PadId, PerPad};
-use crate::domain::sample::{PadTouch, Sample};
+use crate::domain::sample::{PadTouch, Sample, Scale};
 
 /// Longest side of a thumbnail, pixels.
 const THUMBNAIL_PX: usize = 44;
@@ -32,7 +32,7 @@ fn through(
 }
 
 /// The prediction of one finger of a sample in meters, as large as its bubble image; without one, the bundle's own size
-/// is kept. What the bundle's fit knows of the finger is applied.
+/// is kept. It lies where the finger's window does, and what the bundle's fit knows of the finger is applied.
 ///
 /// # Errors
 /// As [`imprint`].
@@ -92,8 +92,8 @@ pub fn in_meters(chain: &DepthChain, raw: &RawPrediction, size: [usize; 2]) -> R
     if depth.size() == size || size.contains(&0) { Ok(depth) } else { Ok(bilinear(&depth, size[0], size[1])) }
 }
 
-/// The steps from the prediction of a finger to meters, with what the bundle's fit knows of it: the exact reading is
-/// corrected, those that show what was released are not.
+/// The steps from the prediction of a finger to meters, with the place of its window and what the bundle's fit knows of
+/// it: the exact reading is corrected, those that show what was released are not.
 ///
 /// # Errors
 /// As [`chain`].
@@ -113,7 +113,16 @@ pub fn chain_of_pad(
     let with = |fit: &Arc<Correction>| {
         if parts == CorrectionParts::ALL { fit.clone() } else { Arc::new(Correction { parts, ..(**fit).clone() }) }
     };
-    Ok(DepthChain { correction: correction.map(with), ..chain(prediction, shift)? })
+    Ok(DepthChain { correction: correction.map(with), ..chain(prediction, shift)?.placed(window(sample, finger)) })
+}
+
+/// Where the color sensor's window lies in the imprint of a finger: its center, shares of width and height. Picture pairs do
+/// not say of which finger they are: the middle of the windows stands for it.
+pub fn window(sample: &Sample, finger: PadId) -> Option<[f64; 2]> {
+    match sample.scale {
+        Scale::Measured => sample.rig.window_share(finger),
+        Scale::Assumed => sample.rig.mean_window_share(),
+    }
 }
 
 /// The steps from a prediction to meters as the model draws them.

@@ -290,7 +290,11 @@ impl<'a> Reader<'a> {
             TouchSource::Dataset(dataset, labels, _) => self.measured(dataset, labels, at),
             TouchSource::Simulator { mix, condition, seed, .. } => {
                 let drawn = training_touch(seed, at as u64, mix, condition);
-                let origin = if drawn.nominal { Origin::Nominal } else { Origin::Drawn };
+                let origin = match (mix, drawn.nominal) {
+                    (Mix::Depths, _) => Origin::AnyDepth,
+                    (_, true) => Origin::Nominal,
+                    (_, false) => Origin::Drawn,
+                };
                 let touches = drawn.sample.rig.pads().filter_map(|pad| {
                     let truth = drawn.sample.pad(pad)?.depth()?.truth.as_ref()?;
                     let mut touch = touch(&drawn.sample, pad, at, drawn.tool)?;

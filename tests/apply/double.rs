@@ -339,6 +339,8 @@ impl Double {
             size: IMPRINT_SIZE,
             resampling: Resampling::Bilinear,
             rotation_deg: 0,
+            window: None,
+            offset: [0.0; 2],
         };
         let chains = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse]
             .map(|mode| (mode, chain.clone().with_mode(mode, None).map_err(|err| err.to_string())));

@@ -22,6 +22,8 @@ fn chain() -> DepthChain {
         size: [32, 24],
         resampling: Resampling::Bilinear,
         rotation_deg: 0,
+        window: None,
+        offset: [0.0; 2],
     }
 }
 

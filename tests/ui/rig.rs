@@ -122,6 +122,8 @@ impl Services for QuickGenerator {
             size: [lab::BUBBLE.width, lab::BUBBLE.height],
             resampling: Resampling::Bilinear,
             rotation_deg: 180,
+            window: None,
+            offset: [0.0; 2],
         };
         let stats = ShiftStats { pred_mean: 0.0115, pred_std: 0.0021, gt_mean: 0.0052, gt_std: 0.0043 };
         let chains: BTreeMap<ShiftMode, Result<DepthChain, String>> = ShiftMode::ALL

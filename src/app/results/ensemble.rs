@@ -25,7 +25,11 @@ impl Computes for EnsembleKey {
         let predictions: Option<Vec<_>> = self.recipes.iter().map(|r| results.predictions.get(r).cloned()).collect();
         let imprints: Option<Vec<_>> = self.recipes.iter().map(meters).collect();
         let (predictions, imprints) = (predictions?, imprints?);
-        Some(Job::new(Lane::Compute, "Spread of the seeds", move |_| ensemble(&predictions, &imprints, shift)))
+        let touch = self.recipes.first()?.touch;
+        let sample = results.samples.get(&touch.pair)?.clone();
+        Some(Job::new(Lane::Compute, "Spread of the seeds", move |_| {
+            ensemble(&predictions, &imprints, shift, (&sample, touch.finger))
+        }))
     }
 
     fn bytes(found: &Ensemble) -> usize {

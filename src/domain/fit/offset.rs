@@ -3,8 +3,8 @@
 use super::{Case, GRAIN_PX};
 use crate::domain::blur::gaussian;
 use crate::domain::grid::{DepthMap, Grid};
-use crate::domain::postprocess::moved;
 use crate::domain::resample;
+use crate::domain::resample::moved;
 
 /// Farthest offset of all pads together, share of the picture's side: three times what the rigs seen so far have.
 const REACH: f64 = 24.0 / 128.0;

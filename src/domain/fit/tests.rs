@@ -1,5 +1,5 @@
 use super::*;
-use crate::domain::postprocess::moved;
+use crate::domain::resample::moved;
 
 const SIDE: usize = 64;
 

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use crate::domain::grid::{DepthMap, Grid};
+use crate::domain::resample::moved;
 
 /// A part of a correction that can be switched off.
 #[derive(
@@ -203,28 +204,6 @@ impl Correction {
     }
 }
 
-/// The image moved right and down by parts of pixels, bilinear; the border repeats.
-pub fn moved(image: &DepthMap, [right, down]: [f64; 2]) -> DepthMap {
-    let [width, height] = image.size();
-    if image.is_empty() {
-        return image.clone();
-    }
-    let taps = |n: usize, by: f64| -> Vec<(usize, usize, f64)> {
-        let tap = |i: usize| {
-            let at = (i as f64 - by).clamp(0.0, (n - 1) as f64);
-            let low = (at.floor() as usize).min(n - 1);
-            (low, (low + 1).min(n - 1), at - at.floor())
-        };
-        (0..n).map(tap).collect()
-    };
-    let (columns, rows) = (taps(width, right), taps(height, down));
-    Grid::from_fn(width, height, |x, y| {
-        let ((x0, x1, u), (y0, y1, v)) = (columns[x], rows[y]);
-        let row = |y: usize| f64::from(image[(x0, y)]) * (1.0 - u) + f64::from(image[(x1, y)]) * u;
-        (row(y0) * (1.0 - v) + row(y1) * v) as f32
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -263,15 +242,5 @@ mod tests {
         assert!(fit.fits([8, 6]) && !fit.fits([6, 8]));
         fit.gain[(0, 0)] = f32::NAN;
         assert!(!fit.fits([8, 6]));
-    }
-
-    #[test]
-    fn a_picture_moves_by_parts_of_pixels_and_repeats_its_border() {
-        let ramp = Grid::from_fn(9, 4, |x, _| x as f32);
-        let there = moved(&ramp, [2.5, 0.0]);
-        assert_eq!([there[(0, 0)], there[(2, 3)], there[(3, 1)], there[(8, 2)]], [0.0, 0.0, 0.5, 5.5]);
-        assert_eq!(moved(&ramp, [0.0, -3.25]), ramp);
-        assert_eq!(moved(&ramp, [100.0, 0.0]), Grid::filled(9, 4, 0.0));
-        assert!(moved(&Grid::filled(0, 0, 0.0), [1.0, 1.0]).is_empty());
     }
 }

@@ -19,6 +19,8 @@ pub enum Stage {
     Meters,
     /// After the shift.
     Shifted,
+    /// Moved to where the rig has the pad's window; only of models that draw all pads' windows in one place.
+    Placed,
     /// After a part of the fit to a rig.
     Corrected(CorrectionPart),
     /// At the imprint's size.
@@ -35,6 +37,7 @@ impl Stage {
             Stage::Reduced => "Channels to one".into(),
             Stage::Meters => "De-normalized".into(),
             Stage::Shifted => "Shift".into(),
+            Stage::Placed => "Placed".into(),
             Stage::Corrected(part) => format!("Fit: {}", part.label().to_lowercase()),
             Stage::Resized => "Resized".into(),
             Stage::Turned => "Rotated".into(),

@@ -13,6 +13,8 @@ fn chain() -> DepthChain {
         size: [6, 4],
         resampling: Resampling::Bilinear,
         rotation_deg: 0,
+        window: None,
+        offset: [0.0; 2],
     }
 }
 
@@ -77,6 +79,25 @@ fn the_last_step_turns_and_resizes() {
     assert_eq!(turned.size(), [3, 2]);
     assert_eq!(turned, straight.rotated_180());
     assert_eq!(DepthChain { rotation_deg: 90, ..chain }.run(&picture()), Err(PostprocessError::Rotation(90)));
+}
+
+#[test]
+fn a_picture_is_moved_in_the_raw_orientation_whichever_way_it_is_turned() {
+    for rotation_deg in [0, 180] {
+        let still = DepthChain { rotation_deg, ..chain() };
+        assert_eq!(still.clone().placed(Some([0.4, 0.1])), still, "no window, nothing to move");
+        // One pixel of six to the right, one of four up.
+        let moving = DepthChain { window: Some([0.5, 0.5]), ..still.clone() }.placed(Some([0.5 + 1.0 / 6.0, 0.25]));
+        let (still, (moving, ledger)) = (still.run(&picture()).unwrap(), moving.run_with_ledger(&picture()).unwrap());
+        for y in 0..4 {
+            for x in 0..6usize {
+                assert_eq!(moving[(x, y)], still[(x.saturating_sub(1), (y + 1).min(3))], "{rotation_deg} {x} {y}");
+            }
+        }
+        let stages: Vec<Stage> = ledger.iter().map(|record| record.stage).collect();
+        assert_eq!(stages[stages.len() - 4..], [Stage::Shifted, Stage::Placed, Stage::Resized, Stage::Turned]);
+        assert_eq!(ledger.last().unwrap().image, moving);
+    }
 }
 
 #[test]

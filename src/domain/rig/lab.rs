@@ -1,7 +1,7 @@
 //! The lab's rig: a GelSlim and a Soft Bubble on the right and on the left finger.
 //!
 //! Source of the numbers: the Touch2Touch paper (px/mm), the lab's `point_cloud_utils.py` lines 5-10 (crop), the lab's
-//! CTTP repository, `utils/dataset_management.py` lines 11-50 (windows).
+//! CTTP repository, `utils/dataset_management.py` lines 11-50 (size of the windows); their places were measured.
 
 use std::borrow::Cow;
 
@@ -48,8 +48,9 @@ pub static BUBBLE: Sensor = Sensor {
     rotation_deg: 180,
 };
 
-/// Centers of what the GelSlims see, in raw bubble pixels: right, left.
-const WINDOW_CENTERS_PX: [[f64; 2]; 2] = [[73.3, 67.0], [62.6, 70.3]];
+/// Centers of what the GelSlims see, in raw bubble pixels: right, left. Measured on published pairs of both images, good to a
+/// pixel; those that CTTP draws its rectangles with lie 5 to 8 px nearer the tip and up to 7 px higher.
+const WINDOW_CENTERS_PX: [[f64; 2]; 2] = [[78.5, 74.0], [69.5, 73.0]];
 
 /// The whole rig; the windows are as large as the GelSlim's view (18.0 x 13.5 mm) at the bubble's scale.
 pub(super) fn rig() -> Rig {

@@ -173,26 +173,27 @@ impl SimConfig {
     pub fn randomised(seed: u64) -> Self {
         let mut noise = Noise::new(seed, Stream::Config, 0);
         let (b, g) = (BubbleConfig::default(), GelSlimConfig::default());
-        // Published imprints stay pushed in up to the wrist's edge of the picture and bulge beyond the tip: a larger,
-        // steeper dome whose middle lies nearer the wrist than the nominal one's. Its range is narrow, because a GelSlim
-        // image does not tell which bubble belongs to it: a wide range would only blur what is learnt.
-        let rim_center_z_m = noise.uniform(-0.02, -0.012);
-        let rim_semi_axes_m = [noise.uniform(0.053, 0.059), noise.uniform(0.073, 0.081)];
+        // Published imprints stay pushed in up to the wrist's edge of the picture and fall off in a sharp step at the tool's
+        // tip side: a longer dome than the nominal one, pressed deeper, whose middle lies nearer the wrist and whose rim
+        // nearer the tool. Its range is narrow, because a GelSlim image does not tell which bubble belongs to it: a wide
+        // range would only blur what is learnt.
+        let rim_center_z_m = noise.uniform(-0.026, -0.021);
+        let rim_semi_axes_m = [noise.uniform(0.051, 0.056), noise.uniform(0.084, 0.09)];
         let lean_rad = noise.uniform(-0.015, 0.065);
         let decay_m = noise.uniform(0.000_5, 0.001_6);
         let mut around = |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
         let bubble = BubbleConfig {
-            press_m: around(0.0145, 0.06),
-            dome_rise_m: around(0.02, 0.08),
+            press_m: around(0.0144, 0.05),
+            dome_rise_m: around(0.0155, 0.07),
             rim_semi_axes_m,
             rim_center_z_m,
-            air_kept: around(0.58, 0.15),
+            air_kept: around(0.63, 0.1),
             noise_m: around(b.noise_m, 0.4),
             drift_m: around(b.drift_m, 0.6),
             texture_m: around(b.texture_m, 0.4),
             speckle_m: around(b.speckle_m, 0.4),
             speckle_density: around(b.speckle_density, 0.5),
-            blur: around(f64::from(b.blur), 0.4) as f32,
+            blur: around(0.12, 0.5) as f32,
             flying_share: around(b.flying_share, 0.8),
             dropped_share: around(b.dropped_share, 1.0),
             calibration_m: b.calibration_m,

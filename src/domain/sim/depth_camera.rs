@@ -12,8 +12,8 @@ use crate::domain::sensor::Intrinsics;
 /// Membrane points up to this far from the tool count as contact, meters: the lab labels its masks so.
 pub const CONTACT_DISTANCE_M: f64 = 0.001;
 
-/// Steepest slope of a membrane: that of the tools' bevels.
-const MAX_SLOPE: f64 = 1.8;
+/// Slopes of a membrane are hardly ever steeper: tools' bevels are not, nor does it fall off beside a bar.
+const MAX_SLOPE: f64 = 2.5;
 
 /// The rays of one camera in the coordinates of its membrane (n, y, z).
 pub(super) struct Rays {
@@ -68,8 +68,8 @@ pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap,
             let p = origin + d * z;
             p.x - membrane.height(DVec2::new(p.y, p.z))
         };
-        // The first crossing counts: behind a bar the wall hides the membrane. The tool's bevels are the steepest
-        // slopes, so a step of the remaining height over that rate cannot jump over the surface.
+        // The first crossing counts: behind a bar the wall hides the membrane. With the steepest slope
+        // known, a step of the remaining height over that rate cannot jump over the surface.
         let rate = d.x.abs() + MAX_SLOPE * DVec2::new(d.y, d.z).length();
         let mut low = dome_hit(origin, d, &lowest) - 1e-4;
         let mut f_low = above(low);

@@ -57,7 +57,8 @@ impl Gel {
         }
         let free = vec![true; columns * rows];
         let stiffness = (config.decay_m * config.decay_m).recip() as f32;
-        let problem = Problem { obstacle: &obstacle, free: &free, load: 0.0, stiffness, step: STEP_M as f32 };
+        let problem =
+            Problem { obstacle: &obstacle, free: &free, load: 0.0, more: None, stiffness, step: STEP_M as f32 };
         Self { pushed: problem.solve(3, 14) }
     }
 

@@ -30,6 +30,18 @@ impl Field {
         top + (bottom - top) * ty
     }
 
+    /// Every second node.
+    fn thinned(&self) -> Field {
+        let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
+        let mut out = Field::filled(columns, rows, 0.0);
+        for y in 0..rows {
+            for x in 0..columns {
+                out.values[y * columns + x] = self.values[2 * y * self.columns + 2 * x];
+            }
+        }
+        out
+    }
+
     /// Every second node, with the largest value within `reach` nodes of it.
     fn coarser(&self, reach: usize) -> Field {
         let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
@@ -57,6 +69,8 @@ pub(super) struct Problem<'a> {
     pub(super) free: &'a [bool],
     /// Load divided by tension, 1/m (per square meter of the grid: the right hand side).
     pub(super) load: f32,
+    /// More of it, node by node.
+    pub(super) more: Option<&'a Field>,
     /// Foundation stiffness divided by tension, 1/m².
     pub(super) stiffness: f32,
     /// Grid spacing, meters.
@@ -75,7 +89,9 @@ impl Problem<'_> {
     fn solve_from(&self, levels: usize, sweeps: usize, reach: usize) -> Field {
         let mut start = if levels > 1 && self.obstacle.columns > 8 && self.obstacle.rows > 8 {
             let (obstacle, free) = self.coarser(reach);
-            let coarse = Problem { obstacle: &obstacle, free: &free, step: 2.0 * self.step, ..*self };
+            let more = self.more.map(Field::thinned);
+            let coarse =
+                Problem { obstacle: &obstacle, free: &free, more: more.as_ref(), step: 2.0 * self.step, ..*self };
             let w = coarse.solve_from(levels - 1, 2 * sweeps, 1);
             let mut fine = Field::filled(self.obstacle.columns, self.obstacle.rows, 0.0);
             for y in 0..fine.rows {
@@ -110,6 +126,7 @@ impl Problem<'_> {
         let h2 = self.step * self.step;
         let inverse = 1.0 / (4.0 + self.stiffness * h2);
         let source = self.load * h2;
+        let none = vec![0.0; columns];
         for sweep in 0..sweeps {
             // over-relaxation from the second sweep on; a last plain one smooths
             let omega = if sweep == 0 || sweep + 1 == sweeps { 1.0 } else { 1.75 };
@@ -122,11 +139,12 @@ impl Problem<'_> {
                     let below = &below[..columns];
                     let obstacle = &self.obstacle.values[row..row + columns];
                     let free = &self.free[row..row + columns];
+                    let more = self.more.map_or(&none[..], |more| &more.values[row..row + columns]);
                     let mut x = first;
                     while x + 1 < columns {
                         if free[x] {
                             let sum = here[x - 1] + here[x + 1] + above[x] + below[x];
-                            let target = (sum + source) * inverse;
+                            let target = (sum + source + more[x] * h2) * inverse;
                             here[x] = (here[x] + omega * (target - here[x])).max(obstacle[x]);
                         }
                         x += 2;
@@ -151,7 +169,7 @@ mod tests {
             obstacle.values[y * n + x] = 5e-3;
         }
         let free = vec![true; n * n];
-        let problem = Problem { obstacle: &obstacle, free: &free, load: -3.0, stiffness: 0.0, step };
+        let problem = Problem { obstacle: &obstacle, free: &free, load: -3.0, more: None, stiffness: 0.0, step };
         let w = problem.solve(4, 400);
         for y in 1..n - 1 {
             for x in 1..n - 1 {
@@ -175,7 +193,8 @@ mod tests {
             obstacle.values[100 * n + x] = 1e-3;
         }
         let free = vec![true; n * n];
-        let problem = Problem { obstacle: &obstacle, free: &free, load: 0.0, stiffness: 1.0 / (length * length), step };
+        let stiffness = 1.0 / (length * length);
+        let problem = Problem { obstacle: &obstacle, free: &free, load: 0.0, more: None, stiffness, step };
         let w = problem.solve(3, 200);
         for d in [5, 10, 20] {
             let expected = 1e-3 * (-(d as f32) * step / length).exp();

@@ -14,7 +14,7 @@ use crate::domain::postprocess::{
     ColorChain, DepthChain, DepthRange, Mapping, PostprocessError, Reduction, Shift, ShiftMode, ShiftStats,
 };
 use crate::domain::resample::Resampling;
-use crate::domain::rig::{Sensor, SensorKind, lab};
+use crate::domain::rig::{Sensor, SensorKind, lab, share};
 
 const FORMAT: &str = "touch2touch-bundle";
 /// The newest version; the first declares no sensors, and means the lab's.
@@ -105,6 +105,8 @@ impl GeneratorSpec {
             size: self.output.imprint_size,
             resampling: self.output.resampling,
             rotation_deg: self.output.rotation_deg,
+            window: self.output.window_px.map(|center| share(center, self.output.imprint_size)),
+            offset: [0.0; 2],
         };
         chain.with_mode(mode, self.shift)
     }
@@ -261,6 +263,10 @@ pub struct OutputSpec {
     /// How the picture is brought to that size.
     #[serde(default = "bilinear")]
     pub resampling: Resampling,
+    /// Where the picture has the center of the color sensor's window, pixels of the imprint in its raw orientation: of a model
+    /// that draws it in the same place for every pad. Without it, pictures stay where they are drawn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub window_px: Option<[f64; 2]>,
 }
 
 fn bilinear() -> Resampling {
@@ -518,6 +524,9 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
     if let Some(output) = &output {
         check(sides(&output.size), "output.size: out of range", SIDES);
         check(sides(&output.imprint_size), "output.imprint_size: out of range", SIDES);
+        let inside = |center: [f64; 2]| (0..2).all(|i| (0.0..output.imprint_size[i] as f64).contains(&center[i]));
+        let place = "give the window's center, pixels of the imprint in its raw orientation";
+        check(output.window_px.is_none_or(inside), "output.window_px: outside the imprint", place);
         check(sides(&output.sensor.size), "output.sensor.size: out of range", SIDES);
         match output.sensor.kind {
             SensorKind::Depth => {
@@ -655,3 +664,6 @@ fn sides(sides: &[usize]) -> bool {
 fn turn(degrees: u32) -> bool {
     matches!(degrees, 0 | 180)
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,7 +12,7 @@ use crate::domain::sample::{Sample, Scale};
 use crate::io::dataset::Dataset;
 use crate::work::compare::tile_of;
 use crate::work::error::TaskError;
-use crate::work::imprint::chain;
+use crate::work::imprint::{chain, window};
 use crate::work::job::JobCx;
 use crate::work::models::{Models, Wanted};
 use crate::work::usable::unusable;
@@ -29,6 +29,10 @@ pub(super) struct Touch {
     pub(super) scale: Scale,
     /// Meters, at the decoder's size and in its orientation.
     pub(super) prediction: DepthMap,
+    /// The same where the rig has the pad's window, as a prediction is shown without a fit.
+    pub(super) unfitted: DepthMap,
+    /// That window, see [`window`].
+    pub(super) window: Option<[f64; 2]>,
     /// What was measured, likewise.
     pub(super) target: DepthMap,
     /// What was measured as it is: raw orientation.
@@ -143,6 +147,8 @@ fn read(
         pad,
         scale: sample.scale,
         prediction: Grid::filled(0, 0, 0.0),
+        unfitted: Grid::filled(0, 0, 0.0),
+        window: window(sample, pad),
         target: Grid::filled(0, 0, 0.0),
         measured: bubble.imprint.clone(),
         tile: tile_of(dataset, id, sample).map_err(|err| err.why)?,
@@ -167,17 +173,19 @@ fn predict(
         .collect();
     let made = models.predict(&setup.bundle, setup.engine, &setup.config, &wanted, &cx.quiet())?;
     for (touch, made) in waiting.into_iter().zip(made) {
-        let chain = chain(&made, ShiftMode::ExactInverse)?;
+        let chain = chain(&made, ShiftMode::ExactInverse)?.placed(touch.window);
         let size = made.raw.channels.first().map_or([0, 0], Grid::size);
         let turned = chain.rotation_deg == 180;
-        let plain = DepthChain { size, rotation_deg: 0, ..chain };
-        let prediction = plain.run(&made.raw).map_err(|err| TaskError::from_error(WHAT, &err))?;
+        let placed = DepthChain { size, rotation_deg: 0, ..chain };
+        let plain = DepthChain { offset: [0.0; 2], ..placed.clone() };
+        let run = |chain: &DepthChain| chain.run(&made.raw).map_err(|err| TaskError::from_error(WHAT, &err));
+        let (prediction, unfitted) = (run(&plain)?, run(&placed)?);
         if prediction.as_slice().iter().any(|v| !v.is_finite()) {
             left_out.push(Remark { name: touch.name, why: "its prediction has values that are not numbers".into() });
             continue;
         }
         let target = on_grid(&touch.measured, touch.tile.as_ref(), turned, size);
-        touches.push(Touch { prediction, target, turned, ..touch });
+        touches.push(Touch { prediction, unfitted, target, turned, ..touch });
     }
     Ok(())
 }

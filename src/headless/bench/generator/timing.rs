@@ -9,7 +9,7 @@ use super::cases::Case;
 use crate::domain::diffusion::{GaussianNoise, GenerateConfig, Progress, Tensor};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::postprocess::{RawPrediction, ShiftMode};
-use crate::domain::rig::lab;
+use crate::domain::rig::{PadId, Rig, lab};
 use crate::headless::bench::figures::quantile;
 use crate::infer::bundle::{Bundle, TimestepType};
 use crate::infer::engine::{EngineChoice, EngineKind, Input};
@@ -82,8 +82,10 @@ fn run_observed(
     let begin = Instant::now();
     let items = [0, 1].map(|image| Item { image, seed: config.seed });
     let raw = generator.run(&images, &items, config, observer)?;
-    let depth = |raw: &RawPrediction| generator.depth(raw, ShiftMode::ExactInverse);
-    let imprints = [depth(&raw[0])?, depth(&raw[1])?];
+    let chain = generator.spec().depth_chain(ShiftMode::ExactInverse)?;
+    let rig = Rig::lab();
+    let depth = |finger: PadId| chain.clone().placed(rig.window_share(finger)).run(&raw[finger.index()]);
+    let imprints = [depth(lab::RIGHT)?, depth(lab::LEFT)?];
     Ok((ms_since(begin), imprints))
 }
 
