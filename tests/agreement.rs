@@ -74,7 +74,7 @@ fn how(action: Action) -> How {
         A::NextLayer | A::AnimateWeakest => Options(&["pose", "demo", "--trace", "--json"]),
         A::CancelJobs | A::Undo | A::Redo => Shell,
         A::PreviousSample | A::NextSample | A::TenBack | A::TenForward | A::FirstSample | A::LastSample => Window,
-        A::NextUnfinished | A::OtherFinger | A::BothFingers | A::FindSample => Window,
+        A::NextUnfinished | A::NextWorst | A::OtherFinger | A::BothFingers | A::FindSample => Window,
         // A stroke is drawn by a hand.
         A::Brush | A::Eraser | A::PanTool | A::LastTool | A::BrushSmaller | A::BrushLarger => Window,
         A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger => Window,

@@ -242,6 +242,7 @@ actions! {
     FirstSample, Navigate, "First sample", "Shows the first pair of the list", [plain(K::Home)];
     LastSample, Navigate, "Last sample", "Shows the last pair of the list", [plain(K::End)];
     NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift(K::N)];
+    NextWorst, Navigate, "Next worst", "Shows the pair that comes out worst in the results table, then the next worse one", [plain(K::N)];
     OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)];
     BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)];
     FindSample, Navigate, "Filter samples", "Moves the keyboard to the filter of the list", [ctrl(K::F)];
@@ -406,6 +407,7 @@ impl Action {
             Self::FirstSample => when(listed, LibraryCommand::First),
             Self::LastSample => when(listed, LibraryCommand::Last),
             Self::NextUnfinished => when(listed, LibraryCommand::NextUnfinished),
+            Self::NextWorst => when(listed && state.table.worst_by().is_some(), LibraryCommand::NextWorst),
             Self::OtherFinger => does(ViewCommand::SelectFinger(state.other_finger())),
             Self::BothFingers => does(ViewCommand::ShowBothFingers(!state.selection.both_fingers)),
             Self::FindSample => {

@@ -70,5 +70,6 @@ pub(super) fn arrived(state: &mut State, ticket: Ticket, evaluation: Arc<Evaluat
         let why = format!("the first: {}: {}", first.what, first.why);
         state.log.push(Level::Warning, text, Some(why), None);
     }
-    state.table.result = Some(evaluation);
+    state.table.set_result(Some(evaluation));
+    state.reorder();
 }

@@ -47,6 +47,8 @@ pub enum LibraryCommand {
     Last,
     /// Shows the next of the list whose review is not finished, going round.
     NextUnfinished,
+    /// Selects the next worst pair of the results table; the list is then in that order.
+    NextWorst,
     /// Marks the selected pair as done and shows the next unfinished one.
     DoneAndNext,
 }
@@ -81,6 +83,7 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::First => select_row(state, 0, effects),
         LibraryCommand::Last => select_row(state, usize::MAX, effects),
         LibraryCommand::NextUnfinished => select_next_unfinished(state, effects),
+        LibraryCommand::NextWorst => select_next_worst(state, effects),
         LibraryCommand::DoneAndNext => {
             labels::set_review(state, Review::Done, effects);
             // Before the list is sorted anew, so that "next" is what the person sees as next.
@@ -145,6 +148,16 @@ fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
     }
 }
 
+fn select_next_worst(state: &mut State, effects: &mut Vec<Effect>) {
+    if state.library.sort.figure().is_some() {
+        return step_by(state, 1, effects);
+    }
+    let Some(figure) = state.table.worst_by() else { return };
+    state.library.sort = Sort::worst(figure);
+    state.reorder();
+    select_row(state, 0, effects);
+}
+
 pub(super) fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>) {
     if state.library.entry(pair).is_none() || state.selection.pair == Some(pair) {
         return;
@@ -194,7 +207,7 @@ pub(super) fn show(
     let before = state.entry().map(|entry| entry.name.clone());
     let same_place = state.library.open.as_ref().is_some_and(|open| open.place == place);
     state.results = Results::default();
-    state.table.result = None;
+    state.table.set_result(None);
     state.table.running = None;
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.history.clear();

@@ -391,6 +391,15 @@ impl AlignReport {
         self.grasp_from_object.inverse().theta_rad
     }
 
+    /// The cheapest place that was found and refused, because the gripper cannot hold the tool there while a dearer place
+    /// is possible. `None` where the answer is the cheapest.
+    pub fn refused(&self) -> Option<&Run> {
+        let won = self.runs.get(self.winner)?.cost_m2;
+        let outside = |run: &&Run| run.cost_m2 < won && !Prior::default().allows(run.end);
+        let cheapest = |a: &&Run, b: &&Run| a.cost_m2.total_cmp(&b.cost_m2);
+        self.runs.iter().filter(|_| self.within_prior).filter(outside).min_by(cheapest)
+    }
+
     /// Whether the points leave a direction of the pose open (a straight rod slides, a disc turns).
     pub fn is_degenerate(&self) -> bool {
         self.observability.is_some_and(|o| o.degenerate)

@@ -141,6 +141,43 @@ pub struct GraspScore {
     pub seconds: Option<f64>,
 }
 
+/// A figure of a grasp that grasps are ordered by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
+pub enum Figure {
+    /// Error of the in-hand angle, radians.
+    Angle,
+    /// Of the imprints against the measured ones, pooled over the fingers, dB.
+    Psnr,
+    /// Mean over the fingers.
+    Ssim,
+}
+
+impl Figure {
+    /// Whether `a` is worse than `b`. A figure that is not a number (no pose was found) is the worst.
+    pub fn worse(self, a: f64, b: f64) -> std::cmp::Ordering {
+        let badness = |v: f64| match (v.is_nan(), self) {
+            (true, _) => f64::INFINITY,
+            (false, Self::Angle) => v,
+            (false, Self::Psnr | Self::Ssim) => -v,
+        };
+        badness(b).total_cmp(&badness(a))
+    }
+}
+
+impl GraspScore {
+    /// One of its figures; `None` where it cannot be there, NaN where it failed.
+    pub fn figure(&self, figure: Figure) -> Option<f64> {
+        match figure {
+            Figure::Angle => self.angle_error_rad,
+            Figure::Psnr => psnr(&[self], |image| Some(image.error)),
+            Figure::Ssim => {
+                let found: Vec<f64> = self.images.iter().filter_map(|image| image.ssim).collect();
+                (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)
+            }
+        }
+    }
+}
+
 /// A method with its grasps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Scores {
@@ -393,6 +430,24 @@ mod tests {
             angle_error_rad: Some(angle_deg.to_radians()),
             seconds: Some(0.1),
         }
+    }
+
+    #[test]
+    fn grasps_are_ordered_by_their_worst_figure_and_a_failure_is_the_worst() {
+        let grasps = [("a", 0.002, 1.0), ("b", 0.001, 12.0), ("c", 0.009, f64::NAN), ("d", 0.003, 3.0)];
+        let grasps = grasps.map(|(tool, rms_m, deg)| grasp(tool, Group::SeenTools, rms_m, deg));
+        let order = |figure: Figure| {
+            let mut all: Vec<&GraspScore> = grasps.iter().collect();
+            all.sort_by(|a, b| figure.worse(a.figure(figure).unwrap(), b.figure(figure).unwrap()));
+            all.iter().map(|g| g.tool.clone().unwrap()).collect::<String>()
+        };
+        assert_eq!(order(Figure::Angle), "cbda");
+        assert_eq!(order(Figure::Psnr), "cdab");
+        // 20 log10(22.5 / 2).
+        assert!((grasps[0].figure(Figure::Psnr).unwrap() - 21.023).abs() < 1e-3);
+        assert_eq!(grasps[0].figure(Figure::Ssim), Some(0.5));
+        let bare = GraspScore { images: Vec::new(), angle_error_rad: None, ..grasps[0].clone() };
+        assert!([Figure::Angle, Figure::Psnr, Figure::Ssim].iter().all(|f| bare.figure(*f).is_none()));
     }
 
     #[test]

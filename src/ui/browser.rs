@@ -8,6 +8,7 @@ use strum::IntoEnumIterator as _;
 
 use super::cx::Cx;
 use super::dialogs::Purpose;
+use super::scene::error_color;
 use super::theme::{Palette, SMALL, caption};
 use super::widget::empty;
 use super::widget::texture::depth_image;
@@ -16,6 +17,8 @@ use crate::app::command::{Command, LibraryCommand, Pane};
 use crate::app::labels::Review;
 use crate::app::library::{Place, Sort};
 use crate::domain::dataset::PairId;
+use crate::domain::evaluation::Figure;
+use crate::domain::units;
 
 /// Height of a row, points.
 const ROW: f32 = 40.0;
@@ -270,7 +273,12 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         } else {
             painter.circle_filled(dot, 4.0, color);
         }
-        let clip = Rect::from_min_max(pos2(left, rect.top()), pos2(rect.right() - 18.0, rect.bottom()));
+        let mut right = rect.right() - 18.0;
+        if let Some((text, color)) = figure_text(cx, &entry.name) {
+            let at = pos2(right, rect.bottom() - 5.0);
+            right = painter.text(at, Align2::RIGHT_BOTTOM, text, FontId::proportional(SMALL), color).left() - 4.0;
+        }
+        let clip = Rect::from_min_max(pos2(left, rect.top()), pos2(right, rect.bottom()));
         let text = ui.painter_at(clip);
         let name = entry.name.rsplit('/').next().unwrap_or(&entry.name);
         text.text(
@@ -288,6 +296,19 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
     if response.on_hover_text(tip).clicked() {
         cx.push(LibraryCommand::Select(id));
     }
+}
+
+/// The figure of a pair in the results table that the list is ordered by, else the one that counts most.
+fn figure_text(cx: &Cx<'_>, pair: &str) -> Option<(String, Color32)> {
+    let table = &cx.state.table;
+    let figure = cx.state.library.sort.figure().or_else(|| table.worst_by())?;
+    let value = table.figure(pair, figure)?;
+    Some(match figure {
+        Figure::Angle if value.is_nan() => ("no pose".to_owned(), cx.p.wrong),
+        Figure::Angle => (units::text_deg(value), error_color(cx.p, value)),
+        Figure::Psnr => (format!("{value:.1} dB"), cx.p.text),
+        Figure::Ssim => (format!("{value:.3}"), cx.p.text),
+    })
 }
 
 /// The picture of a pair's measured imprint, if it is there.

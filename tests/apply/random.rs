@@ -239,6 +239,7 @@ draws! {
         1 First,
         1 Last,
         1 NextUnfinished,
+        1 NextWorst,
         1 DoneAndNext,
     }
     follow: FollowCommand {

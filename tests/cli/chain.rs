@@ -18,7 +18,10 @@ fn the_ledger_of_a_pair_has_every_stage_and_its_pictures() {
     let stages = report["stages"].as_array().unwrap();
     let names: Vec<&str> = stages.iter().map(|s| s["name"].as_str().unwrap()).collect();
     assert!(names.starts_with(&["Decoder channel 1"]), "{names:?}");
-    assert!(names.ends_with(&["Channels to one", "De-normalized", "Shift", "Resized", "Rotated"]), "{names:?}");
+    assert!(
+        names.ends_with(&["Channels to one", "De-normalized", "Shift", "Placed", "Resized", "Rotated"]),
+        "{names:?}"
+    );
     for stage in stages {
         let pixels: u64 = stage["size"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).product();
         let counted: u64 = stage["histogram"]["counts"].as_array().unwrap().iter().map(|n| n.as_u64().unwrap()).sum();

@@ -1,10 +1,12 @@
 //! The results table of the Evaluate workspace, with the shipped models on a few simulated grasps.
 
+use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
 use touch2touch::app::evaluate::EvaluateCommand;
-use touch2touch::app::library::Place;
+use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::Workspace;
+use touch2touch::domain::evaluation::Figure;
 
 use super::rig::{Rig, write_dataset};
 
@@ -42,6 +44,23 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     let json: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("evaluation.json")).unwrap()).unwrap();
     assert_eq!(json["pairs"].as_array().unwrap().len(), table.rows.len());
     assert!(out.join("evaluation.md").is_file());
+
+    // The worst first: by key, and the list says the figure.
+    let scored: Vec<f64> = {
+        let found = &rig.harness.state().state().table;
+        found.scored().iter().map(|grasp| grasp.angle_error_rad.unwrap()).collect()
+    };
+    let mut errors = scored.clone();
+    errors.sort_by(|a, b| b.total_cmp(a));
+    for wanted in &errors[..2] {
+        rig.harness.key_press_modifiers(Modifiers::NONE, Key::N);
+        rig.harness.step();
+        rig.settle();
+        let state = rig.harness.state().state();
+        assert_eq!(state.library.sort, Sort::WorstAngle);
+        assert_eq!(state.table.figure(state.pair_name(), Figure::Angle), Some(*wanted));
+    }
+    rig.shoot("results-worst");
 
     // A table is of one data set.
     rig.send(LibraryCommand::Open(Place::Demo));

@@ -1,11 +1,13 @@
 //! What the Evaluate workspace asks for, and its last answer.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+
+use strum::IntoEnumIterator as _;
 
 use super::super::state::State;
 use super::super::tasks::state::{Task, Ticket};
-use crate::domain::evaluation::{Row, paper_rows};
+use crate::domain::evaluation::{Figure, GraspScore, Row, paper_rows};
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::evaluate::{Evaluation, Setup};
 
@@ -25,11 +27,45 @@ pub struct TableState {
     pub running: Option<Ticket>,
     /// The last table of the open data set.
     pub result: Option<Arc<Evaluation>>,
+    /// The place of each pair in [`TableState::scored`], by name.
+    places: BTreeMap<String, usize>,
 }
 
 impl Default for TableState {
     fn default() -> Self {
-        Self { left_out: BTreeSet::new(), grasps_per_tool: Some(4), published: false, running: None, result: None }
+        Self {
+            left_out: BTreeSet::new(),
+            grasps_per_tool: Some(4),
+            published: false,
+            running: None,
+            result: None,
+            places: BTreeMap::new(),
+        }
+    }
+}
+
+impl TableState {
+    /// Takes a table over, or gives the last one up.
+    pub(in crate::app) fn set_result(&mut self, result: Option<Arc<Evaluation>>) {
+        self.result = result;
+        let names = self.scored().iter().enumerate().map(|(at, grasp)| (grasp.pair.clone(), at));
+        self.places = names.collect();
+    }
+
+    /// The figures of every grasp by the first generator of the table.
+    pub fn scored(&self) -> &[GraspScore] {
+        let first = self.result.as_ref().and_then(|found| found.scores.iter().find(|scores| !scores.upper_bound));
+        first.map_or(&[], |scores| &scores.grasps)
+    }
+
+    /// A figure of a pair, by its name; `None` where it was not scored.
+    pub fn figure(&self, pair: &str, figure: Figure) -> Option<f64> {
+        self.scored().get(*self.places.get(pair)?)?.figure(figure)
+    }
+
+    /// The figure that pairs are called worst by where nobody chose one: the angle, if any is known.
+    pub fn worst_by(&self) -> Option<Figure> {
+        Figure::iter().find(|figure| self.scored().iter().any(|grasp| grasp.figure(*figure).is_some()))
     }
 }
 

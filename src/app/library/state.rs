@@ -1,5 +1,6 @@
 //! The open data set, and the list of pairs as the browser shows it.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -8,11 +9,13 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
+use super::super::evaluate::state::TableState;
 use super::super::keys::{DatasetSeq, PairKey};
 use super::super::labels::state::Review;
 use super::super::services::DataSource;
 use super::super::state::State;
 use crate::domain::dataset::{Index, PairEntry, PairId};
+use crate::domain::evaluation::Figure;
 use crate::domain::rig::Rig;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
@@ -49,6 +52,12 @@ pub enum Sort {
     Tool,
     /// Unfinished first, then position.
     Review,
+    /// Largest error of the angle in the results table first; what was not scored last.
+    WorstAngle,
+    /// Smallest PSNR first.
+    WorstPsnr,
+    /// Smallest SSIM first.
+    WorstSsim,
 }
 
 impl Sort {
@@ -59,6 +68,28 @@ impl Sort {
             Self::Name => "Name",
             Self::Tool => "Tool",
             Self::Review => "Review state",
+            Self::WorstAngle => "Worst angle",
+            Self::WorstPsnr => "Worst PSNR",
+            Self::WorstSsim => "Worst SSIM",
+        }
+    }
+
+    /// The figure that pairs are ordered by.
+    pub fn figure(self) -> Option<Figure> {
+        match self {
+            Self::Natural | Self::Name | Self::Tool | Self::Review => None,
+            Self::WorstAngle => Some(Figure::Angle),
+            Self::WorstPsnr => Some(Figure::Psnr),
+            Self::WorstSsim => Some(Figure::Ssim),
+        }
+    }
+
+    /// The order with the worst by a figure first.
+    pub fn worst(figure: Figure) -> Self {
+        match figure {
+            Figure::Angle => Self::WorstAngle,
+            Figure::Psnr => Self::WorstPsnr,
+            Figure::Ssim => Self::WorstSsim,
         }
     }
 }
@@ -167,7 +198,7 @@ impl Library {
     }
 
     /// Recomputes `order` from filter, tool and sort. `reviews` holds the states that are not "todo", by name.
-    pub(in crate::app) fn reorder(&mut self, reviews: &BTreeMap<String, Review>) {
+    pub(in crate::app) fn reorder(&mut self, reviews: &BTreeMap<String, Review>, table: &TableState) {
         let words: Vec<String> = self.filter.split_whitespace().map(str::to_lowercase).collect();
         let review = |entry: &PairEntry| reviews.get(&entry.name).copied().unwrap_or_default();
         let passes = |entry: &PairEntry| {
@@ -193,14 +224,45 @@ impl Library {
             Sort::Name => order.sort_by(|a, b| entry(a).name.cmp(&entry(b).name)),
             Sort::Tool => order.sort_by(|a, b| entry(a).tool.cmp(&entry(b).tool)),
             Sort::Review => order.sort_by_key(|id| review(entry(id))),
+            Sort::WorstAngle | Sort::WorstPsnr | Sort::WorstSsim => {
+                let found = self.sort.figure();
+                let figure = |id: &PairId| found.and_then(|figure| table.figure(&entry(id).name, figure));
+                order.sort_by_cached_key(|id| Worst(found, figure(id)));
+            }
         }
         self.order = order;
     }
 }
 
+/// A figure as a key to sort by: the worst first, what was not scored last.
+struct Worst(Option<Figure>, Option<f64>);
+
+impl Ord for Worst {
+    fn cmp(&self, other: &Self) -> Ordering {
+        match (self.0, self.1, other.1) {
+            (Some(figure), Some(a), Some(b)) => figure.worse(a, b),
+            (_, a, b) => b.is_some().cmp(&a.is_some()),
+        }
+    }
+}
+
+impl PartialOrd for Worst {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Worst {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Worst {}
+
 impl State {
     /// Recomputes the order of the list.
     pub(in crate::app) fn reorder(&mut self) {
-        self.library.reorder(&self.document.reviews);
+        self.library.reorder(&self.document.reviews, &self.table);
     }
 }

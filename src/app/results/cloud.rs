@@ -109,7 +109,9 @@ impl State {
     /// The surface points of an imprint, both fingers.
     pub fn cloud(&self, source: ImprintSource) -> Lookup<'_, Clouds> {
         let before = || self.results.clouds.get(self.latest(source)?.cloud.as_ref()?);
-        self.look_or(self.cloud_key(source), before).value()
+        // A pair that cannot be read says so, in place of the scene before.
+        let unread = self.pair_key().and_then(|pair| self.failure(pair));
+        self.look_or(self.cloud_key(source), before).or_failed(unread).value()
     }
 
     /// What was shown last of an imprint of the selected pair.

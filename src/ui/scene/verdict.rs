@@ -63,6 +63,9 @@ pub(super) fn findings(state: &State, pose: &PoseResult) -> Vec<(Grade, String)>
     if pose.report.is_degenerate() {
         found.push((Grade::Caution, "not determined by the contact".into()));
     }
+    if pose.report.refused().is_some() {
+        found.push((Grade::Caution, "a cheaper place was refused: the gripper cannot hold it so".into()));
+    }
     found.sort_by_key(|(grade, _)| std::cmp::Reverse(*grade));
     found
 }
