@@ -238,6 +238,6 @@ fn real_pairs_are_fitted_in_closed_form_as_well_as_the_recipe_says() {
     let found = json(&run(&["adapt", "--input", real.to_str().unwrap(), "--json"], dir.path()));
     let closed = |key: &str| found["closed_form"][key].as_f64().unwrap();
     assert_eq!((&found["pairs"], found["pads"].as_array().unwrap().len()), (&36.into(), 2), "{found:#}");
-    assert!(closed("psnr_db") > 24.2 && closed("psnr_line_db") > 25.7, "{found:#}");
+    assert!(closed("psnr_db") > 24.1 && closed("psnr_line_db") > 25.7, "{found:#}");
     assert_eq!(found["doubtful"].as_array().unwrap().len(), 0, "{found:#}");
 }

@@ -85,6 +85,7 @@ fn how(action: Action) -> How {
         A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop | A::SwitchTheme => Window,
         A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace => Window,
         A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
+        A::SavePane | A::CopyPane => Window,
         A::Palette | A::ShortcutSheet | A::ResetSettings => Window,
     }
 }

@@ -334,7 +334,9 @@ actions! {
     ResetWorkspace, View, "Reset workspace", "Puts the panes back where they were", [];
     MaximizePane, View, "Maximize pane", "Lets one pane fill the window", [plain(K::Backtick)];
     Fullscreen, View, "Full screen", "Fills the screen", [plain(K::F11)];
-    Screenshot, View, "Screenshot", "Saves a picture of the window", [plain(K::F12)];
+    Screenshot, View, "Screenshot", "Saves a picture of the window with the user's pictures", [plain(K::F12)];
+    SavePane, View, "Save this pane", "Saves a picture of the pane under the pointer, with its bar and unit", [shift(K::F12)];
+    CopyPane, View, "Copy this pane", "Copies a picture of the pane under the pointer", [ctrl(K::F12)];
     CopyHovered, View, "Copy the hovered value", "Copies the number under the pointer", [ctrl(K::C)];
 
     Palette, Help, "Command palette", "Finds anything that can be done", [ctrl(K::P), ctrl(K::K)];
@@ -566,6 +568,8 @@ impl Action {
             Self::MaximizePane => ui(UiRequest::ToggleMaximized),
             Self::Fullscreen => ui(UiRequest::ToggleFullscreen),
             Self::Screenshot => ui(UiRequest::Screenshot),
+            Self::SavePane => ui(UiRequest::PanePicture { copied: false }),
+            Self::CopyPane => ui(UiRequest::PanePicture { copied: true }),
             Self::CopyHovered => when(state.selection.hover.is_some(), ViewCommand::Ui(UiRequest::CopyHovered)),
 
             Self::Palette => does(ViewCommand::SetPalette(!state.selection.palette)),

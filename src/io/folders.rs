@@ -27,6 +27,12 @@ pub fn program_cache() -> Option<PathBuf> {
     named.or_else(cache)
 }
 
+/// The user's pictures; made if it is not there. `None` without a home folder, or where it cannot be made.
+pub fn pictures() -> Option<PathBuf> {
+    let folder = dirs::picture_dir().or_else(|| Some(dirs::home_dir()?.join(NAME)))?;
+    std::fs::create_dir_all(&folder).ok().map(|()| folder)
+}
+
 fn local_data() -> Option<PathBuf> {
     Some(dirs::data_local_dir()?.join(NAME))
 }

@@ -14,6 +14,7 @@ use super::cx::{Cx, Shared};
 use super::dialogs::Purpose;
 use super::pane::{Docking, Panes};
 use super::scene_view::Device;
+use super::screenshot::Shot;
 use super::theme::{DARK, LIGHT};
 use super::{bars, layout, log as log_pane, palette, pane, shortcuts, theme};
 use crate::app::action::Action;
@@ -44,7 +45,7 @@ pub struct Options {
     pub native_dialogs: bool,
     /// Whether all preferences and layouts start from their defaults.
     pub reset: bool,
-    /// Where screenshots are written; `None` = the working directory.
+    /// Where pictures are written; `None` = the user's folder for pictures.
     pub screenshots: Option<PathBuf>,
 }
 
@@ -73,8 +74,8 @@ pub struct StudioApp {
     applied_zoom: f32,
     folder: Option<PathBuf>,
     services: SharedServices,
-    shot_sender: Sender<Arc<egui::ColorImage>>,
-    shots: Receiver<Arc<egui::ColorImage>>,
+    shot_sender: Sender<(Shot, Arc<egui::ColorImage>)>,
+    shots: Receiver<(Shot, Arc<egui::ColorImage>)>,
 }
 
 impl StudioApp {
@@ -268,14 +269,10 @@ impl StudioApp {
                 }
             }
             UiRequest::ShowPane(pane) => self.show_pane(pane),
-            UiRequest::Screenshot => {
-                let (sender, wake) = (self.shot_sender.clone(), ctx.clone());
-                ctx.request_screenshot(move |image| {
-                    // The window may be gone by now: then nobody waits for the picture.
-                    if sender.send(image).is_ok() {
-                        wake.request_repaint();
-                    }
-                });
+            UiRequest::Screenshot => self.shoot(ctx, None, false),
+            UiRequest::PanePicture { copied } => {
+                let part = self.panes.hovered.and_then(|pane| self.panes.places.get(&pane).copied());
+                self.shoot(ctx, part, copied);
             }
             UiRequest::ToggleFullscreen => {
                 let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
@@ -335,9 +332,21 @@ impl StudioApp {
         if let Some(path) = dropped.into_iter().next() {
             self.inbox.push(Command::Library(LibraryCommand::Open(Place::Path(path))));
         }
-        while let Ok(image) = self.shots.try_recv() {
-            self.inbox.push(super::screenshot::save(self.folder.as_deref(), &image));
+        while let Ok((shot, image)) = self.shots.try_recv() {
+            self.inbox.push(shot.take(ctx, self.folder.as_deref(), &image));
         }
+    }
+
+    /// Asks for a picture of the window, or of a part of it (points).
+    fn shoot(&self, ctx: &egui::Context, part: Option<egui::Rect>, copied: bool) {
+        let shot = Shot { part, copied, scale: ctx.pixels_per_point() };
+        let (sender, wake) = (self.shot_sender.clone(), ctx.clone());
+        ctx.request_screenshot(move |image| {
+            // The window may be gone by now: then nobody waits for the picture.
+            if sender.send((shot, image)).is_ok() {
+                wake.request_repaint();
+            }
+        });
     }
 }
 

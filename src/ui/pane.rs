@@ -1,6 +1,6 @@
 //! The docked panes: their memories, title bars, and how they behave in their tree.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetText, vec2};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles, UiResponse};
@@ -39,11 +39,14 @@ pub(super) struct Panes {
     pub hovered: Option<Pane>,
     /// The panes drawn in this frame, so far.
     pub drawn: BTreeSet<Pane>,
+    /// Where each pane was drawn last, points.
+    pub places: BTreeMap<Pane, egui::Rect>,
 }
 
 /// Draws a pane.
 fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
     panes.drawn.insert(pane);
+    panes.places.insert(pane, ui.max_rect());
     if ui.rect_contains_pointer(ui.max_rect()) {
         panes.hovered = Some(pane);
     }

@@ -1,24 +1,57 @@
-//! A picture of the window as a file.
+//! A picture of the window or of a pane, as a file or on the clipboard.
 
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use eframe::egui::ColorImage;
+use eframe::egui::{self, ColorImage, Rect};
 
 use crate::app::command::{Command, TasksCommand};
+use crate::io::folders;
 use crate::work::error::TaskError;
 
-/// Writes `image` as a PNG into `folder` (or the working directory), and reports where, or why not.
-pub(super) fn save(folder: Option<&Path>, image: &ColorImage) -> Command {
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let path = folder.unwrap_or(Path::new(".")).join(format!("touch2touch-{seconds}.png"));
+/// What becomes of a picture of the window.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shot {
+    /// The part that is wanted, points; `None` = all of it.
+    pub part: Option<Rect>,
+    /// To the clipboard instead of a file.
+    pub copied: bool,
+    /// Physical pixels per point.
+    pub scale: f32,
+}
+
+impl Shot {
+    /// Does with the picture of the window what was asked for, and reports it. Files go to `folder`, else to the user's
+    /// pictures.
+    pub(super) fn take(self, ctx: &egui::Context, folder: Option<&Path>, window: &ColorImage) -> Command {
+        let image = match self.part {
+            // Rounded inwards: the frame around a pane is not the pane's.
+            Some(part) => window.region(&part.shrink(0.5), Some(self.scale)),
+            None => window.clone(),
+        };
+        if self.copied {
+            let [width, height] = image.size;
+            ctx.copy_image(image);
+            return Command::Tasks(TasksCommand::Notice(format!("Copied a picture of {width} x {height} pixels")));
+        }
+        save(folder, &image)
+    }
+}
+
+/// Writes `image` as a PNG, and reports where, or why not.
+fn save(folder: Option<&Path>, image: &ColorImage) -> Command {
+    const WHAT: &str = "Picture";
+    let millis = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_millis());
+    let Some(folder) = folder.map(Path::to_owned).or_else(folders::pictures) else {
+        let err = TaskError::new(WHAT, "there is no folder for pictures");
+        return Command::Tasks(TasksCommand::Report(err.with_hint("Copy the picture instead.")));
+    };
+    let path = folder.join(format!("touch2touch-{millis}.png"));
     let [width, height] = image.size.map(|s| u32::try_from(s).unwrap_or(0));
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| p.to_array()).collect();
-    let result = image::save_buffer(&path, &bytes, width, height, image::ExtendedColorType::Rgba8);
-    match result {
+    let written = image::save_buffer(&path, &bytes, width, height, image::ExtendedColorType::Rgba8);
+    match written {
         Ok(()) => Command::Tasks(TasksCommand::Notice(format!("Saved {}", path.display()))),
-        Err(err) => {
-            Command::Tasks(TasksCommand::Report(TaskError::new("Screenshot", format!("{err}: {}", path.display()))))
-        }
+        Err(err) => Command::Tasks(TasksCommand::Report(TaskError::new(WHAT, format!("{err}: {}", path.display())))),
     }
 }

@@ -72,6 +72,11 @@ pub enum UiRequest {
     ShowPane(Pane),
     /// Save a picture of the window.
     Screenshot,
+    /// Save a picture of the pane under the pointer, or copy it.
+    PanePicture {
+        /// To the clipboard instead of a file.
+        copied: bool,
+    },
     /// Fill the screen, or stop it.
     ToggleFullscreen,
     /// Let one pane fill the window, or stop it.
