@@ -55,3 +55,35 @@ fn save(folder: Option<&Path>, image: &ColorImage) -> Command {
         Err(err) => Command::Tasks(TasksCommand::Report(TaskError::new(WHAT, format!("{err}: {}", path.display())))),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use eframe::egui::{Color32, OutputCommand, pos2};
+
+    #[test]
+    fn the_part_that_is_wanted_is_written_or_copied() {
+        let (ctx, folder) = (egui::Context::default(), tempfile::tempdir().unwrap());
+        let mut window = ColorImage::filled([40, 20], Color32::BLACK);
+        window[(10, 6)] = Color32::RED;
+        // Points 4.5..12.5 and 2.5..7.5 at two pixels a point, less the frame.
+        let part = Some(Rect::from_min_max(pos2(4.5, 2.5), pos2(12.5, 7.5)));
+        let shot = Shot { part, copied: false, scale: 2.0 };
+        let said = shot.take(&ctx, Some(folder.path()), &window);
+        assert!(matches!(&said, Command::Tasks(TasksCommand::Notice(text)) if text.starts_with("Saved ")), "{said:?}");
+        let file = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
+        let written = image::open(file).unwrap().to_rgba8();
+        assert_eq!(written.dimensions(), (14, 8));
+        assert_eq!(written.get_pixel(0, 0).0, [255, 0, 0, 255]);
+        let said = Shot { copied: true, ..shot }.take(&ctx, None, &window);
+        assert!(matches!(&said, Command::Tasks(TasksCommand::Notice(text)) if text.contains("14 x 8")), "{said:?}");
+        let copied = ctx.output(|o| o.commands.iter().any(|c| matches!(c, OutputCommand::CopyImage(_))));
+        assert!(copied);
+        let missing = folder.path().join("not/there");
+        let said = shot.take(&ctx, Some(&missing), &window);
+        assert!(
+            matches!(&said, Command::Tasks(TasksCommand::Report(err)) if err.why.contains("not/there")),
+            "{said:?}"
+        );
+    }
+}
