@@ -281,21 +281,36 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         let clip = Rect::from_min_max(pos2(left, rect.top()), pos2(right, rect.bottom()));
         let text = ui.painter_at(clip);
         let name = entry.name.rsplit('/').next().unwrap_or(&entry.name);
-        text.text(
-            pos2(left, rect.top() + 5.0),
-            Align2::LEFT_TOP,
-            name,
-            FontId::proportional(13.0),
-            if selected { p.strong } else { p.text },
-        );
+        let (font, color) = (FontId::proportional(13.0), if selected { p.strong } else { p.text });
+        let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), color).size().x;
+        let name = cut_in_the_middle(name, rect.right() - 18.0 - left, width);
+        text.text(pos2(left, rect.top() + 5.0), Align2::LEFT_TOP, name, font.clone(), color);
         let tool = entry.tool.as_deref().unwrap_or("no tool");
         let tool = tool.strip_prefix("pattern_").unwrap_or(tool).replace('_', " ");
-        text.text(pos2(left, rect.bottom() - 5.0), Align2::LEFT_BOTTOM, tool, FontId::proportional(SMALL), p.weak);
+        let font = FontId::proportional(SMALL);
+        let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), p.weak).size().x;
+        let tool = cut_in_the_middle(&tool, right - left, width);
+        text.text(pos2(left, rect.bottom() - 5.0), Align2::LEFT_BOTTOM, tool, font.clone(), p.weak);
     }
     let tip = format!("{}\n{}", entry.name, review.name());
     if response.on_hover_text(tip).clicked() {
         cx.push(LibraryCommand::Select(id));
     }
+}
+
+/// A text that is no wider than there is room, with what had to go left out of its middle: names differ at their ends.
+fn cut_in_the_middle(text: &str, room: f32, width: impl Fn(&str) -> f32) -> String {
+    if width(text) <= room {
+        return text.to_owned();
+    }
+    let letters: Vec<char> = text.chars().collect();
+    let shortened = |kept: usize| {
+        let head: String = letters[..kept.div_ceil(2)].iter().collect();
+        let tail: String = letters[letters.len() - kept / 2..].iter().collect();
+        format!("{head}…{tail}")
+    };
+    let fitting = (1..letters.len()).rev().map(shortened).find(|short| width(short) <= room);
+    fitting.unwrap_or_else(|| "…".to_owned())
 }
 
 /// The figure of a pair in the results table that the list is ordered by, else the one that counts most.
@@ -325,4 +340,18 @@ fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
         .textures
         .get(ui.ctx(), ("thumbnail", key), (bits, map), false, || (depth_image(depth, map, range), None));
     Some(picture.texture.id())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_names_keep_their_ends() {
+        let width = |text: &str| text.chars().count() as f32;
+        assert_eq!(cut_in_the_middle("data_12", 7.0, width), "data_12");
+        assert_eq!(cut_in_the_middle("stl_in_millimetres_data_0", 11.0, width), "stl_i…ata_0");
+        assert_eq!(cut_in_the_middle("ärger", 4.0, width), "är…r");
+        assert_eq!(cut_in_the_middle("anything", 0.5, width), "…");
+    }
 }

@@ -4,14 +4,15 @@ mod paint;
 
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Color32, Rect, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{Align2, Button, Color32, Rect, RichText, Ui, UiBuilder, pos2, vec2};
 
 use super::cx::{Cx, side_color};
-use super::theme::Palette;
+use super::theme::{Palette, SMALL};
 use super::widget::colorbar::{self, Asked, Colorbar};
 use super::widget::empty;
 use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, ViewTransform, shows_squares};
 use super::widget::texture::{Histogram, Memo, depth_image, difference_gain, rgb_image};
+use crate::app::action::Action;
 use crate::app::command::{Hover, Pane, SettingsCommand, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::results::Preview;
@@ -182,7 +183,34 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         ui.painter().rect_filled(rect, 0.0, cx.p.panel);
         let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt((pane, "bar")));
         color_bar(cx, &mut child, memory, pane, histogram.as_ref());
+        if pane != Pane::Error
+            && let Some(histogram) = &histogram
+        {
+            offer_range(cx, ui, area, histogram);
+        }
     }
+}
+
+/// Where a picture takes little of the locked range, a way to see more of it.
+fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &Histogram) {
+    /// A picture that takes less of the range shows a few of its colors.
+    const LITTLE: f32 = 1.0 / 6.0;
+    let (range, bulk) = (cx.state.settings.range, histogram.bulk());
+    let shown = bulk.hi.min(range.max_m) - bulk.lo.max(range.min_m);
+    if !range.locked || bulk.hi <= bulk.lo || shown >= LITTLE * (range.max_m - range.min_m) {
+        return;
+    }
+    let text = format!("{:.1} to {:.1} mm: fit the colors (C)", bulk.lo * 1e3, bulk.hi * 1e3);
+    let place = Rect::from_min_max(pos2(area.left() + 4.0, area.bottom() - 24.0), area.max - vec2(4.0, 2.0));
+    ui.scope_builder(UiBuilder::new().max_rect(place).id_salt("offer range"), |ui| {
+        ui.vertical_centered(|ui| {
+            let button = Button::new(RichText::new(text).size(SMALL)).min_size(vec2(0.0, 20.0));
+            let tip = "The picture takes less than a sixth of the locked color range";
+            if ui.add(button).on_hover_text(tip).clicked() {
+                cx.act(Action::RangeOnce);
+            }
+        });
+    });
 }
 
 fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, histogram: Option<&Histogram>) {

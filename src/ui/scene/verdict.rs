@@ -1,11 +1,12 @@
 //! The verdict on a pose: one line above the picture, colored by the worst of what is known; the rest on demand.
 
-use eframe::egui::{Color32, RichText, Sense, Ui, vec2};
+use eframe::egui::{Button, Color32, RichText, Sense, Ui, vec2};
 
 use super::hands;
 use super::overlay::{difference, lower_first, pose_details, step_text};
+use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
-use crate::app::state::{Lookup, State};
+use crate::app::state::{Absent, Lookup, State};
 use crate::domain::hand::PoseDifference;
 use crate::domain::units;
 use crate::ui::cx::Cx;
@@ -77,7 +78,16 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT), Sense::hover());
     ui.painter().rect_filled(rect, 0.0, cx.p.frame);
     ui.painter().circle_filled(rect.left_center() + vec2(12.0, 0.0), 4.0, color);
-    let inner = rect.with_min_x(rect.left() + 22.0).shrink2(vec2(4.0, 2.0));
+    let mut inner = rect.with_min_x(rect.left() + 22.0).shrink2(vec2(4.0, 2.0));
+    // Too few contact points: the mask is where that is mended.
+    if matches!(cx.state.pose(source), Lookup::Absent(Absent::NoContact)) {
+        let place = inner.with_min_x(inner.right() - 92.0);
+        inner.set_right(place.left() - 4.0);
+        let button = Button::new(RichText::new("Open in Label").size(SMALL)).min_size(vec2(88.0, 16.0));
+        if ui.put(place, button).on_hover_text("The mask can be corrected there, or another source chosen").clicked() {
+            cx.act(Action::LabelWorkspace);
+        }
+    }
     ui.scope_builder(eframe::egui::UiBuilder::new().max_rect(inner), |ui| {
         ui.set_clip_rect(inner.intersect(ui.clip_rect()));
         ui.add(eframe::egui::Label::new(RichText::new(text).size(12.0).color(color)).truncate());

@@ -21,6 +21,23 @@ pub struct Histogram {
 }
 
 impl Histogram {
+    /// The span without the outermost half percent on each side, in the unit of the data: single flying pixels say nothing.
+    pub fn bulk(&self) -> Range {
+        let total: u32 = self.counts.iter().sum();
+        let (cut, width) = (total / 200, (self.span.hi - self.span.lo) / BINS as f32);
+        let bins_cut = |counts: &mut dyn Iterator<Item = &u32>| {
+            let mut seen = 0;
+            counts
+                .take_while(|n| {
+                    seen += **n;
+                    seen <= cut
+                })
+                .count() as f32
+        };
+        let (lo, hi) = (bins_cut(&mut self.counts.iter()), bins_cut(&mut self.counts.iter().rev()));
+        Range { lo: self.span.lo + lo * width, hi: self.span.hi - hi * width }
+    }
+
     /// Of all finite values; `None` without one.
     pub fn of(values: &[f32]) -> Option<Self> {
         let span = Range::of(values)?;
@@ -211,6 +228,20 @@ pub fn outline(mask: &Mask) -> Vec<[[f32; 2]; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn flying_pixels_do_not_widen_the_bulk() {
+        let mut values: Vec<f32> = (0..1000u16).map(|i| 0.004 + f32::from(i) * 1e-6).collect();
+        values.extend([0.1; 3]);
+        let found = Histogram::of(&values).unwrap();
+        let (bulk, bin) = (found.bulk(), 0.096 / BINS as f32);
+        assert!(bulk.lo == 0.004 && bulk.hi <= 0.005 + bin + 1e-6, "{bulk:?}");
+        let even: Vec<f32> = (0..10_000u16).map(f32::from).collect();
+        let bulk = Histogram::of(&even).unwrap().bulk();
+        assert!(bulk.lo <= 200.0 && bulk.hi >= 9_800.0, "{bulk:?}");
+        let one = Histogram::of(&[0.5]).unwrap().bulk();
+        assert!(one.lo.is_finite() && one.hi.is_finite());
+    }
 
     #[test]
     fn a_picture_is_uploaded_only_when_it_changed() {
