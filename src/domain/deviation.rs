@@ -124,7 +124,9 @@ mod tests {
                     seen[1] += 1;
                 }
             }
-            assert!(seen.iter().all(|n| *n > 100), "{seen:?}");
+            assert!(seen[0] > 100 && seen[1] > 0, "{seen:?}");
+            // Where no point is near, the model's own triangles do.
+            assert!(painted.mesh.triangles.len() < 4000, "{}", painted.mesh.triangles.len());
             let area: f64 = (0..painted.mesh.triangles.len())
                 .map(|i| painted.mesh.corners(i))
                 .map(|[a, b, c]| (b - a).cross(c - a).z / 2.0)

@@ -19,7 +19,7 @@ pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
         return;
     }
     let side = source.name().to_lowercase();
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.add_space(4.0);
         if let Some(section) = section {
@@ -33,9 +33,11 @@ pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
                     new = Section { axis, at_m: 0.0, ..section };
                 }
             }
+            // What stands behind the slider in the same row.
+            let others = if only_window { 350.0 } else { 200.0 };
             let reach = units::mm(SECTION_REACH_M);
             let mut at = units::mm(section.at_m);
-            ui.spacing_mut().slider_width = (ui.available_width() - 190.0).clamp(40.0, 220.0);
+            ui.spacing_mut().slider_width = (ui.available_width() - others).clamp(24.0, 220.0);
             let slider = ui.add(Slider::new(&mut at, -reach..=reach).fixed_decimals(1).suffix(" mm"));
             let slider = slider.accessible_name(format!("Place of the cut, {side}"));
             // A notch of the wheel over the slider is half a millimeter.
