@@ -170,10 +170,7 @@ impl GraspScore {
         match figure {
             Figure::Angle => self.angle_error_rad,
             Figure::Psnr => psnr(&[self], |image| Some(image.error)),
-            Figure::Ssim => {
-                let found: Vec<f64> = self.images.iter().filter_map(|image| image.ssim).collect();
-                (!found.is_empty()).then(|| found.iter().sum::<f64>() / found.len() as f64)
-            }
+            Figure::Ssim => mean(self.images.iter().filter_map(|image| image.ssim)),
         }
     }
 }

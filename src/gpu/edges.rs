@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::buffer::{Elements, Uniform};
 use super::pipelines::Pipelines;
-use super::vertex::CREASE_RAD;
+use super::vertex::{CREASE_RAD, place};
 use super::{Gpu, GpuError, view, wgpu};
 use crate::domain::mesh::TriMesh;
 
@@ -108,16 +108,14 @@ fn edges(mesh: &TriMesh) -> Vec<EdgeVertex> {
     const CREASE: u32 = 1;
     const BORDER: u32 = 2;
     let corner = |i: &u32| mesh.vertices.get(*i as usize).copied().filter(|p| p.is_finite());
-    // By position, not by index: the corners of an STL file are not shared.
-    let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
     let mut found: HashMap<[[u64; 3]; 2], usize> = HashMap::new();
     let mut list: Vec<([DVec3; 2], Vec<DVec3>)> = Vec::new();
     for t in &mesh.triangles {
         let [Some(a), Some(b), Some(c)] = t.map(|i| corner(&i)) else { continue };
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
         for (p, q) in [(a, b), (b, c), (c, a)] {
-            let (p, q) = if key(p) <= key(q) { (p, q) } else { (q, p) };
-            let at = *found.entry([key(p), key(q)]).or_insert_with(|| {
+            let (p, q) = if place(p) <= place(q) { (p, q) } else { (q, p) };
+            let at = *found.entry([place(p), place(q)]).or_insert_with(|| {
                 list.push(([p, q], Vec::new()));
                 list.len() - 1
             });

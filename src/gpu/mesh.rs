@@ -9,7 +9,7 @@ use glam::{DAffine3, DVec3};
 use super::buffer::{Elements, Uniform};
 use super::edges::{EdgeData, EdgeStyle};
 use super::pipelines::Pipelines;
-use super::vertex::{CREASE_RAD, MeshVertex};
+use super::vertex::{CREASE_RAD, MeshVertex, drawable, place};
 use super::view::Camera;
 use super::{Gpu, GpuError, view, wgpu};
 use crate::domain::colormap::{ColorMap, Range};
@@ -151,9 +151,7 @@ impl MeshData {
         let style = &item.style;
         let [r, g, b] = style.color;
         let world_from_mesh = view::matrix(&style.world_from_mesh);
-        // An empty or infinite range shows the middle color, as on the CPU.
-        let sound = (style.range.hi - style.range.lo).is_finite();
-        let range = if sound { style.range } else { Range { lo: 0.0, hi: 0.0 } };
+        let range = drawable(style.range);
         let written = data.uniform.set(
             gpu,
             MeshUniform {
@@ -209,13 +207,11 @@ fn vertices(mesh: &TriMesh, shading: Shading, values: &[f32]) -> Vec<MeshVertex>
         .unzip();
     // Twice the area long: large triangles have more say in a shared normal.
     let areas: Vec<DVec3> = faces.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect();
-    // By position, not by index: the corners of an STL file are not shared.
-    let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
     let mut around: HashMap<[u64; 3], Vec<usize>> = HashMap::new();
     if shading == Shading::Smooth {
         for (f, face) in faces.iter().enumerate() {
             for p in face {
-                around.entry(key(*p)).or_default().push(f);
+                around.entry(place(*p)).or_default().push(f);
             }
         }
     }
@@ -223,7 +219,7 @@ fn vertices(mesh: &TriMesh, shading: Shading, values: &[f32]) -> Vec<MeshVertex>
     for ((face, area), values) in faces.iter().zip(&areas).zip(values) {
         let own = area.normalize_or_zero();
         for (p, value) in face.iter().zip(values) {
-            let neighbors = around.get(&key(*p)).map_or(&[][..], Vec::as_slice);
+            let neighbors = around.get(&place(*p)).map_or(&[][..], Vec::as_slice);
             let rounded: DVec3 =
                 neighbors.iter().map(|&f| areas[f]).filter(|n| n.normalize_or_zero().dot(own) > CREASE_RAD.cos()).sum();
             let normal = rounded.try_normalize().unwrap_or(own);

@@ -7,6 +7,7 @@ use glam::{DAffine3, DVec3};
 
 use super::buffer::{Elements, Uniform};
 use super::pipelines::Pipelines;
+use super::vertex::drawable;
 use super::{Gpu, GpuError, view, wgpu};
 use crate::domain::colormap::{ColorMap, NAN_COLOR, Range};
 
@@ -194,9 +195,7 @@ fn uniform(style: &CloudStyle, color_mode: u32, stride: u32, drawn: u32, selecte
     };
     let [r, g, b] = style.color;
     let [hr, hg, hb] = style.highlight;
-    // An empty or infinite range shows the middle color, as on the CPU.
-    let sound = (style.range.hi - style.range.lo).is_finite();
-    let range = if sound { style.range } else { Range { lo: 0.0, hi: 0.0 } };
+    let range = drawable(style.range);
     PointsUniform {
         world_from_points: view::matrix(&style.world_from_points),
         color: [r, g, b, style.opacity.clamp(0.0, 1.0)],

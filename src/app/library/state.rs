@@ -1,6 +1,5 @@
 //! The open data set, and the list of pairs as the browser shows it.
 
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -220,45 +219,23 @@ impl Library {
             (0u32..).zip(pairs).filter(|(_, entry)| passes(entry)).map(|(id, _)| PairId(id)).collect();
         let entry = |id: &PairId| &pairs[id.0 as usize];
         match self.sort {
-            Sort::Natural => {}
+            Sort::Natural | Sort::WorstAngle | Sort::WorstPsnr | Sort::WorstSsim => {}
             Sort::Name => order.sort_by(|a, b| entry(a).name.cmp(&entry(b).name)),
             Sort::Tool => order.sort_by(|a, b| entry(a).tool.cmp(&entry(b).tool)),
             Sort::Review => order.sort_by_key(|id| review(entry(id))),
-            Sort::WorstAngle | Sort::WorstPsnr | Sort::WorstSsim => {
-                let found = self.sort.figure();
-                let figure = |id: &PairId| found.and_then(|figure| table.figure(&entry(id).name, figure));
-                order.sort_by_cached_key(|id| Worst(found, figure(id)));
-            }
+        }
+        if let Some(figure) = self.sort.figure() {
+            let mut scored: Vec<(Option<f64>, PairId)> =
+                order.iter().map(|id| (table.figure(&entry(id).name, figure), *id)).collect();
+            scored.sort_by(|(a, _), (b, _)| match (a, b) {
+                (Some(a), Some(b)) => figure.worse(*a, *b),
+                _ => b.is_some().cmp(&a.is_some()),
+            });
+            order = scored.into_iter().map(|(_, id)| id).collect();
         }
         self.order = order;
     }
 }
-
-/// A figure as a key to sort by: the worst first, what was not scored last.
-struct Worst(Option<Figure>, Option<f64>);
-
-impl Ord for Worst {
-    fn cmp(&self, other: &Self) -> Ordering {
-        match (self.0, self.1, other.1) {
-            (Some(figure), Some(a), Some(b)) => figure.worse(a, b),
-            (_, a, b) => b.is_some().cmp(&a.is_some()),
-        }
-    }
-}
-
-impl PartialOrd for Worst {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Worst {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Worst {}
 
 impl State {
     /// Recomputes the order of the list.
