@@ -29,6 +29,7 @@ pub mod models;
 pub mod pose;
 pub mod prediction;
 pub mod statistics;
+pub mod subject;
 pub mod tool;
 pub mod training_data;
 mod usable;

@@ -1,31 +1,33 @@
 //! The image panes: GelSlim, measured and predicted imprint, error. Linked pan, zoom and cross-hair.
 
+mod bar;
+mod link;
 mod paint;
 
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Button, Color32, Rect, RichText, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{Align2, Color32, Rect, Ui, UiBuilder, pos2, vec2};
 
 use super::cx::{Cx, side_color};
-use super::theme::{Palette, SMALL};
-use super::widget::colorbar::{self, Asked, Colorbar};
+use super::theme::Palette;
+use super::widget::colorbar;
 use super::widget::empty;
 use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, ViewTransform, shows_squares};
 use super::widget::texture::{Histogram, Memo, depth_image, difference_gain, rgb_image};
-use crate::app::action::Action;
-use crate::app::command::{Hover, Pane, SettingsCommand, TasksCommand, ViewCommand};
+use crate::app::command::{Hover, Pane, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::results::Preview;
-use crate::app::settings::{ColorMap as MapChoice, ColorRange, MaskTool};
+use crate::app::settings::{ColorMap as MapChoice, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::rig::{PadId, Rig, Sensor, SensorKind};
+use crate::domain::rig::{PadId, Sensor, SensorKind};
 use crate::domain::sample::Scale;
 use crate::domain::turn::Turn;
 use crate::domain::units;
 use crate::work::bundles::BundleKind;
 use crate::work::error::TaskError;
+use link::Link;
 
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
 pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
@@ -109,36 +111,6 @@ fn source_note(state: &State) -> String {
         .join(" · ")
 }
 
-/// Which part of a depth picture the color sensor sees (the dashed rectangle), and whether it sees it turned by 180
-/// degrees.
-#[derive(Clone, Copy)]
-struct Link {
-    window: [f64; 4],
-    turned: bool,
-}
-
-impl Link {
-    /// What the rig says; `None` where it does not.
-    fn of(rig: &Rig, finger: PadId) -> Option<Self> {
-        Some(Self { window: rig.color_window(finger)?.rectangle(), turned: rig.turned() })
-    }
-
-    /// Where a depth pixel appears in the color picture of `size` pixels.
-    fn color_from_depth(self, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
-        let [cx, cy, w, h] = self.window.map(|v| v as f32);
-        let share = [(px[0] - cx) / w + 0.5, (px[1] - cy) / h + 0.5].map(|s| if self.turned { 1.0 - s } else { s });
-        [share[0] * size[0] as f32 - 0.5, share[1] * size[1] as f32 - 0.5]
-    }
-
-    /// The opposite of [`Link::color_from_depth`].
-    fn depth_from_color(self, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
-        let [cx, cy, w, h] = self.window.map(|v| v as f32);
-        let share = [(px[0] + 0.5) / size[0].max(1) as f32, (px[1] + 0.5) / size[1].max(1) as f32];
-        let share = share.map(|s| if self.turned { 1.0 - s } else { s });
-        [(share[0] - 0.5) * w + cx, (share[1] - 0.5) * h + cy]
-    }
-}
-
 /// The stored size of a kind of picture, for a place where there is none yet.
 fn usual_size(cx: &Cx<'_>, kind: SensorKind) -> [usize; 2] {
     let rig = cx.state.rig();
@@ -182,78 +154,12 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
         ui.painter().rect_filled(rect, 0.0, cx.p.panel);
         let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt((pane, "bar")));
-        color_bar(cx, &mut child, memory, pane, histogram.as_ref());
+        bar::color_bar(cx, &mut child, memory, pane, histogram.as_ref());
         if pane != Pane::Error
             && let Some(histogram) = &histogram
         {
-            offer_range(cx, ui, area, histogram);
+            bar::offer_range(cx, ui, area, histogram);
         }
-    }
-}
-
-/// Where a picture takes little of the locked range, a way to see more of it.
-fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &Histogram) {
-    /// A picture that takes less of the range shows a few of its colors.
-    const LITTLE: f32 = 1.0 / 6.0;
-    let (range, bulk) = (cx.state.settings.range, histogram.bulk());
-    let shown = bulk.hi.min(range.max_m) - bulk.lo.max(range.min_m);
-    if !range.locked || bulk.hi <= bulk.lo || shown >= LITTLE * (range.max_m - range.min_m) {
-        return;
-    }
-    let text = format!("{:.1} to {:.1} mm: fit the colors (C)", bulk.lo * 1e3, bulk.hi * 1e3);
-    let place = Rect::from_min_max(pos2(area.left() + 4.0, area.bottom() - 24.0), area.max - vec2(4.0, 2.0));
-    ui.scope_builder(UiBuilder::new().max_rect(place).id_salt("offer range"), |ui| {
-        ui.vertical_centered(|ui| {
-            let button = Button::new(RichText::new(text).size(SMALL)).min_size(vec2(0.0, 20.0));
-            let tip = "The picture takes less than a sixth of the locked color range";
-            if ui.add(button).on_hover_text(tip).clicked() {
-                cx.act(Action::RangeOnce);
-            }
-        });
-    });
-}
-
-fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, histogram: Option<&Histogram>) {
-    let note = scale_note(cx.state);
-    if pane == Pane::Error {
-        let bar = Colorbar {
-            label: "Error range",
-            map: ColorMap::Diverging,
-            default: Range::symmetric(4.0),
-            symmetric: true,
-            histogram,
-            locked: None,
-            note,
-        };
-        match bar.show(ui, Range::symmetric(memory.error_mm)) {
-            Some(Asked::Range(range)) => memory.error_mm = range.hi.clamp(0.05, 100.0),
-            Some(Asked::Auto) => {
-                if let Some(h) = histogram {
-                    memory.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
-                }
-            }
-            Some(Asked::Lock(_)) | None => {}
-        }
-        return;
-    }
-    let range = cx.state.settings.range;
-    let default = ColorRange::default();
-    let bar = Colorbar {
-        label: "Depth range",
-        map: map_of(cx.state),
-        default: Range { lo: default.min_m * 1e3, hi: default.max_m * 1e3 },
-        symmetric: false,
-        histogram,
-        locked: Some(range.locked),
-        note,
-    };
-    match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {
-        Some(Asked::Range(r)) => {
-            cx.push(SettingsCommand::SetRange(ColorRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..range }));
-        }
-        Some(Asked::Auto) => cx.push(SettingsCommand::RangeFromShown),
-        Some(Asked::Lock(locked)) => cx.push(SettingsCommand::SetRange(ColorRange { locked, ..range })),
-        None => {}
     }
 }
 
@@ -641,25 +547,4 @@ fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, de
 pub(super) fn side_mark(ui: &mut Ui, p: &Palette, source: ImprintSource) {
     let (rect, _) = ui.allocate_exact_size(vec2(8.0, 8.0), eframe::egui::Sense::hover());
     ui.painter().rect_filled(rect, 2.0, side_color(p, source));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_cross_hair_finds_its_way_between_the_sensors() {
-        let rig = Rig::lab();
-        for finger in rig.pads() {
-            let link = Link::of(&rig, finger).unwrap();
-            let [cx, cy, w, h] = link.window.map(|v| v as f32);
-            let middle = link.color_from_depth([cx, cy], [427, 320]);
-            assert!((middle[0] - 213.0).abs() < 1e-3 && (middle[1] - 159.5).abs() < 1e-3);
-            // The GelSlim is rotated: its first pixel is the last corner of the rectangle.
-            let corner = link.color_from_depth([cx + w * 0.5, cy + h * 0.5], [427, 320]);
-            assert!(corner[0].abs() < 0.51 && corner[1].abs() < 0.51, "{corner:?}");
-            let back = link.depth_from_color(link.color_from_depth([50.0, 60.0], [427, 320]), [427, 320]);
-            assert!((back[0] - 50.0).abs() < 1e-3 && (back[1] - 60.0).abs() < 1e-3);
-        }
-    }
 }

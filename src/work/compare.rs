@@ -1,4 +1,6 @@
-//! A prediction against the measurement of the same touch: [`of_pad`].
+//! Imprints of the same touch against each other: [`between`], and a prediction against the measurement: [`of_pad`].
+
+use std::borrow::Cow;
 
 use super::error::TaskError;
 use super::imprint::picture_of;
@@ -130,10 +132,55 @@ pub fn tiles(predicted: &DepthMap, tile: &DepthMap, sample: &Sample, pad: PadId)
     compare_parts(predicted, tile, sample.scale, seen.as_ref())
 }
 
-/// The predicted imprint of a pad (meters, raw orientation) against what was measured: the figures that every part of
-/// the program shows. With a `tile` ([`tile_of`]) they are of its own pixels, so that what the file has is not resampled,
-/// nor the prediction more than once where it is known how it was `drawn`; the error map is of the imprint's pixels
-/// always. `None` where nothing was measured.
+/// An imprint that is compared.
+#[derive(Clone, Debug)]
+pub struct Depicted<'a> {
+    /// Meters, raw orientation.
+    pub imprint: &'a DepthMap,
+    /// The same as its file or its decoder has it, on the grid of the pair's picture ([`tile_of`]); `None` where imprints
+    /// were measured.
+    pub tile: Option<Cow<'a, DepthMap>>,
+}
+
+impl<'a> Depicted<'a> {
+    /// A predicted imprint of a pad. On the grid of a `tile` it is resampled once where it is known how it was `drawn`.
+    ///
+    /// # Errors
+    /// As [`picture_of`].
+    pub fn predicted(
+        imprint: &'a DepthMap,
+        drawn: Option<(&Prediction, ShiftMode)>,
+        sample: &Sample,
+        pad: PadId,
+        tile: Option<&DepthMap>,
+    ) -> Result<Self, TaskError> {
+        let tile = match (tile, drawn) {
+            (None, _) => None,
+            (Some(tile), Some((prediction, shift))) => Some(picture_of(prediction, shift, sample, pad, tile.size())?),
+            (Some(tile), None) => Some(as_tile(imprint, &sample.rig, tile.size())),
+        };
+        Ok(Self { imprint, tile: tile.map(Cow::Owned) })
+    }
+}
+
+/// An imprint of a pad against another of it: the figures that every part of the program shows. With pictures of both
+/// they are of the pictures' own pixels, so that what the file has is not resampled; the error map is of the imprint's
+/// pixels always.
+///
+/// # Errors
+/// As [`compare`].
+pub fn between(a: &Depicted<'_>, b: &Depicted<'_>, sample: &Sample, pad: PadId) -> Result<Comparison, TaskError> {
+    let (Some(a_tile), Some(b_tile)) = (&a.tile, &b.tile) else {
+        let seen = sample.rig.seen_mask(pad, b.imprint.size());
+        return compare_parts(a.imprint, b.imprint, sample.scale, seen.as_ref());
+    };
+    let error = compare(a.imprint, b.imprint, sample.scale)?.error;
+    let figures = tiles(a_tile, b_tile, sample, pad)?;
+    Ok(Comparison { error, ..figures })
+}
+
+/// The predicted imprint of a pad (meters, raw orientation) against what was measured; see [`between`] and
+/// [`Depicted::predicted`]. `None` where nothing was measured.
 ///
 /// # Errors
 /// As [`compare`].
@@ -145,18 +192,9 @@ pub fn of_pad(
     tile: Option<&DepthMap>,
 ) -> Result<Option<Comparison>, TaskError> {
     let Some(bubble) = sample.pad(pad).and_then(|touch| touch.depth()) else { return Ok(None) };
-    let measured = &bubble.imprint;
-    let Some(tile) = tile else {
-        let seen = sample.rig.seen_mask(pad, measured.size());
-        return compare_parts(imprint, measured, sample.scale, seen.as_ref()).map(Some);
-    };
-    let error = compare(imprint, measured, sample.scale)?.error;
-    let picture = match drawn {
-        Some((prediction, shift)) => picture_of(prediction, shift, sample, pad, tile.size())?,
-        None => as_tile(imprint, &sample.rig, tile.size()),
-    };
-    let figures = tiles(&picture, tile, sample, pad)?;
-    Ok(Some(Comparison { error, ..figures }))
+    let predicted = Depicted::predicted(imprint, drawn, sample, pad, tile)?;
+    let measured = Depicted { imprint: &bubble.imprint, tile: tile.map(Cow::Borrowed) };
+    between(&predicted, &measured, sample, pad).map(Some)
 }
 
 #[cfg(test)]

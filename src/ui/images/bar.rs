@@ -1,0 +1,79 @@
+//! The color bar under the pictures, and the offer to fit its range.
+
+use eframe::egui::{Button, Rect, RichText, Ui, UiBuilder, pos2, vec2};
+
+use super::{Memory, map_of, scale_note};
+use crate::app::action::Action;
+use crate::app::command::{Pane, SettingsCommand};
+use crate::app::settings::ColorRange;
+use crate::domain::colormap::{ColorMap, Range};
+use crate::ui::cx::Cx;
+use crate::ui::theme::SMALL;
+use crate::ui::widget::colorbar::{Asked, Colorbar};
+use crate::ui::widget::texture::Histogram;
+
+/// Where a picture takes little of the locked range, a way to see more of it.
+pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &Histogram) {
+    /// A picture that takes less of the range shows a few of its colors.
+    const LITTLE: f32 = 1.0 / 6.0;
+    let (range, bulk) = (cx.state.settings.range, histogram.bulk());
+    let shown = bulk.hi.min(range.max_m) - bulk.lo.max(range.min_m);
+    if !range.locked || bulk.hi <= bulk.lo || shown >= LITTLE * (range.max_m - range.min_m) {
+        return;
+    }
+    let text = format!("{:.1} to {:.1} mm: fit the colors (C)", bulk.lo * 1e3, bulk.hi * 1e3);
+    let place = Rect::from_min_max(pos2(area.left() + 4.0, area.bottom() - 24.0), area.max - vec2(4.0, 2.0));
+    ui.scope_builder(UiBuilder::new().max_rect(place).id_salt("offer range"), |ui| {
+        ui.vertical_centered(|ui| {
+            let button = Button::new(RichText::new(text).size(SMALL)).min_size(vec2(0.0, 20.0));
+            let tip = "The picture takes less than a sixth of the locked color range";
+            if ui.add(button).on_hover_text(tip).clicked() {
+                cx.act(Action::RangeOnce);
+            }
+        });
+    });
+}
+
+pub(super) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, histogram: Option<&Histogram>) {
+    let note = scale_note(cx.state);
+    if pane == Pane::Error {
+        let bar = Colorbar {
+            label: "Error range",
+            map: ColorMap::Diverging,
+            default: Range::symmetric(4.0),
+            symmetric: true,
+            histogram,
+            locked: None,
+            note,
+        };
+        match bar.show(ui, Range::symmetric(memory.error_mm)) {
+            Some(Asked::Range(range)) => memory.error_mm = range.hi.clamp(0.05, 100.0),
+            Some(Asked::Auto) => {
+                if let Some(h) = histogram {
+                    memory.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
+                }
+            }
+            Some(Asked::Lock(_)) | None => {}
+        }
+        return;
+    }
+    let range = cx.state.settings.range;
+    let default = ColorRange::default();
+    let bar = Colorbar {
+        label: "Depth range",
+        map: map_of(cx.state),
+        default: Range { lo: default.min_m * 1e3, hi: default.max_m * 1e3 },
+        symmetric: false,
+        histogram,
+        locked: Some(range.locked),
+        note,
+    };
+    match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {
+        Some(Asked::Range(r)) => {
+            cx.push(SettingsCommand::SetRange(ColorRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..range }));
+        }
+        Some(Asked::Auto) => cx.push(SettingsCommand::RangeFromShown),
+        Some(Asked::Lock(locked)) => cx.push(SettingsCommand::SetRange(ColorRange { locked, ..range })),
+        None => {}
+    }
+}
