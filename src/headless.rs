@@ -8,6 +8,7 @@ mod args;
 mod basin;
 mod bench;
 mod cache;
+mod compare;
 mod contact_mask;
 mod doctor;
 mod evaluate;
@@ -68,6 +69,8 @@ enum Verb {
     Simulate(simulate::SimulateArgs),
     /// Predict Soft Bubble imprints from GelSlim images and compare them with the measured ones.
     Generate(generate::GenerateArgs),
+    /// Any two imprints of a pair against each other: measured, predictions, the mean of seeds, a stored picture.
+    Compare(Box<compare::CompareArgs>),
     /// Everything between the decoder and the meters, for one pair: stages, histograms, line against truth, what is odd.
     Ledger(Box<ledger::LedgerArgs>),
     /// Statistics of a dataset's predictions and measurements, for the shift `--shift refit`.
@@ -223,6 +226,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         }
         Some(Verb::Simulate(args)) => simulate::run(&args),
         Some(Verb::Generate(args)) => generate::run(&args),
+        Some(Verb::Compare(args)) => compare::run(&args),
         Some(Verb::Ledger(args)) => ledger::run(&args),
         Some(Verb::Stats(args)) => stats::run(&args),
         Some(Verb::Watch(args)) => watch::run(&args),

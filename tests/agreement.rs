@@ -8,15 +8,19 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
+use touch2touch::app::command::{
+    Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand,
+};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::settings::{Versus, VersusMode};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Grid;
 use touch2touch::io::images;
+use touch2touch::work::subject::Subject;
 
 use crate::support::run;
 
@@ -81,6 +85,9 @@ fn how(action: Action) -> How {
         A::PoseTool | A::SixDof | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
         A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
         A::LockRange | A::RangeOnce | A::ResetRange | A::Fit | A::BothClouds | A::LinkCameras | A::Footprint => Window,
+        A::CompareMode | A::SwapCompared => {
+            Options(&["compare", "demo", "--pair", "a", "--a", "prediction:seed=7", "--b", "measured"])
+        }
         A::Section | A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera => Window,
         A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop | A::SwitchTheme => Window,
         A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace => Window,
@@ -227,6 +234,39 @@ fn on_the_demo_the_studio_says_what_the_verbs_say() {
     let home = tempfile::tempdir().unwrap();
     let found = assert_same(Place::Demo, "demo", home.path(), 2);
     assert_eq!((found.get("unet"), found.get("comparison")), (Some(&4), Some(&4)), "{found:?}");
+}
+
+#[test]
+fn two_predictions_are_compared_by_one_function() {
+    let home = tempfile::tempdir().unwrap();
+    let (a, b) = ("prediction:seed=7,shift=raw", "mean:seeds=2");
+    let mut studio = Studio::open(Place::Demo, home.path());
+    studio.send(ViewCommand::ShowPanes([Pane::Compare].into_iter().collect()).into());
+    let versus = Versus { a: a.parse().unwrap(), b: b.parse().unwrap(), mode: VersusMode::default() };
+    studio.send(SettingsCommand::SetVersus(versus.clone()).into());
+    studio.send(LibraryCommand::Select(PairId(40)).into());
+    let state = &studio.state;
+    let report = json(&["compare", "demo", "--pair", state.pair_name(), "--a", a, "--b", b], home.path());
+    let fingers = report["fingers"].as_array().unwrap();
+    assert_eq!(fingers.len(), 2);
+    for (pad, finger) in state.rig().pads().zip(fingers) {
+        for (key, [one, other]) in [
+            ("a", [&versus.a, &Subject::Measured]),
+            ("b", [&versus.b, &Subject::Measured]),
+            ("a_b", [&versus.a, &versus.b]),
+        ] {
+            let found = state.subjects_compared(one, other, pad).ready().expect(key);
+            let seen = found.split.and_then(|split| split.seen.mae);
+            assert_eq!(finger[key]["psnr_db"], optional(found.psnr_db), "{key}");
+            assert_eq!(finger[key]["ssim"], optional(found.ssim), "{key}");
+            assert_eq!(finger[key]["mae_m"], number(found.mae_m), "{key}");
+            assert_eq!(finger[key]["seen_mae_m"], optional(seen), "{key}");
+        }
+    }
+    for (key, subject) in [("a_deg", &versus.a), ("b_deg", &versus.b)] {
+        let pose = state.subject_pose(subject).expect("a pose");
+        assert_eq!(report["poses"][key], number(pose.angle_rad.to_degrees()), "{key}");
+    }
 }
 
 #[test]

@@ -13,6 +13,7 @@ use super::keys::{ImprintSource, Registration, Request, ShiftMode};
 use super::labels::state::Review;
 use super::library::state::Place;
 use super::settings::state::scene::{LayerLook, SceneLayer, SceneLook};
+use super::settings::state::versus::{Versus, VersusMode};
 use super::settings::state::{ColorRange, MaskTool, Theme, Workspace};
 use super::state::{Absent, State};
 use super::workbench::state::{Layer, SceneTool, Section};
@@ -182,6 +183,8 @@ actions! {
     NextLayer, View, "Next layer", "Goes through the layers of the 3D panes: none, residuals, reasons, distance, lines", [plain(K::V)];
     AnimateWeakest, View, "Animate weak direction", "Moves the tool to and fro by at most 2 mm and 2° in the direction that the contact determines least", [];
     BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [];
+    CompareMode, View, "Next comparison", "Goes through side by side, wipe, difference and 3D in the Compare pane", [shift(K::F)];
+    SwapCompared, View, "Swap A and B", "Puts B in the place of A in the Compare pane, and A in that of B", [shift(K::R)];
     Section, View, "Cut open", "Cuts the 3D views open with a plane, or no longer", [plain(K::X)];
     WindowOnly, View, "GelSlim's window only", "Draws in 3D only what the GelSlims see, or all of it", [plain(K::W)];
     MembraneSurface, View, "Membrane as a surface", "Draws the membrane in 3D as a surface, or as points", [];
@@ -394,6 +397,12 @@ impl Action {
             }
             Self::AnimateWeakest => does(WorkbenchCommand::SetAnimateWeakest(!state.workbench.animate_weakest)),
             Self::BothClouds => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds)),
+            Self::CompareMode => {
+                let versus = state.versus();
+                next_of::<VersusMode>(&versus.mode)
+                    .and_then(|mode| does(SettingsCommand::SetVersus(Versus { mode, ..versus })))
+            }
+            Self::SwapCompared => does(SettingsCommand::SetVersus(state.versus().swapped())),
             Self::Section => {
                 let next = if state.workbench.section.is_some() { None } else { Some(Section::default()) };
                 does(WorkbenchCommand::SetSection(next))

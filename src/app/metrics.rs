@@ -86,15 +86,12 @@ impl State {
         let mut place = None;
         for (finger, (imprint, mask)) in key.cloud.parts.entries() {
             let touch = imprint.touch();
-            let source = match imprint {
-                ImprintKey::Measured(_) => ImprintSource::Measured,
-                ImprintKey::Predicted(..) => ImprintSource::Predicted,
-            };
             let shown = match imprint {
                 ImprintKey::Measured(_) => true,
                 ImprintKey::Predicted(recipe, shift) => {
                     *shift == self.settings.shift && self.results.chosen.get(&touch) == Some(recipe)
                 }
+                ImprintKey::Mean(_) | ImprintKey::Picture(_) => false,
             };
             let in_force = match mask {
                 None => true,
@@ -107,7 +104,7 @@ impl State {
             if !shown || !in_force || touch.pair.dataset != open.seq {
                 return None;
             }
-            place = Some((touch.pair.pair, source));
+            place = Some((touch.pair.pair, imprint.side()));
         }
         place.filter(|_| key.engine == self.settings.pose_engine)
     }

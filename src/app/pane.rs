@@ -15,6 +15,8 @@ pub enum Kind {
     Imprint(ImprintSource),
     /// Differences of imprints.
     Error,
+    /// Two imprints.
+    Versus,
     /// A 3D view of one side.
     Scene(ImprintSource),
     /// Steps that can be played.
@@ -54,6 +56,8 @@ pub enum Need {
     Ledger,
     /// Several seeds.
     Seeds,
+    /// Any two imprints against each other.
+    Versus,
     /// Cloud and pose of a side, in 3D.
     Scene(ImprintSource),
     /// The poses of both sides.
@@ -122,6 +126,10 @@ macro_rules! panes {
                     "Predicted imprint", "What the generator predicts from the GelSlim image, in the same colors",
                     Imprint(Predicted), needs [Imprint(Predicted), Ambiguity],
                     at [Inspect Top(3), Align Top(2), Label Top(1), Evaluate Bottom(2)]
+                }
+                Compare {
+                    "Compare", "Any two imprints of the touch against each other: side by side, wiped, subtracted, in 3D",
+                    Versus, needs [Versus], at [Inspect Top(3), Align Top(2), Evaluate Bottom(2)]
                 }
                 Error {
                     "Error", "Predicted minus measured: blue too shallow, red too deep", Error, needs [Comparison],
@@ -212,7 +220,7 @@ macro_rules! define {
             /// What kind of thing that is.
             pub fn kind(self) -> Kind {
                 use ImprintSource::{Measured, Predicted};
-                use Kind::{Color, Error, Form, Imprint, Map, Scene, Steps};
+                use Kind::{Color, Error, Form, Imprint, Map, Scene, Steps, Versus};
                 match self { $($( Self::$pane => $kind, )*)* }
             }
 
@@ -221,7 +229,7 @@ macro_rules! define {
                 use ImprintSource::{Measured, Predicted};
                 use Need::{
                     Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Seeds, Steps,
-                    Thumbnails,
+                    Thumbnails, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }

@@ -230,6 +230,8 @@ pub enum Absent {
     NoMaskModel,
     /// No generator was found.
     NoGenerator,
+    /// The generator that was named is not there any more.
+    NoSuchGenerator,
     /// No tool classifier was found.
     NoClassifier,
     /// The mask has too few contact points.
@@ -256,6 +258,7 @@ impl Absent {
             Self::NotSimulated => "Only simulated data knows the true contact.",
             Self::NoMaskModel => "No mask model was found.",
             Self::NoGenerator => "No generator was found.",
+            Self::NoSuchGenerator => "The model that was chosen here is not there any more: choose another.",
             Self::NoClassifier => "No tool classifier was found.",
             Self::NoContact => "The mask has too few contact points for a pose.",
         }

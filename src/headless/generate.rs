@@ -22,7 +22,7 @@ use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::PadId;
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::{metrics, resample};
-use crate::io::dataset::{Dataset, assumed_meters};
+use crate::io::dataset::Dataset;
 use crate::io::names::with_ending;
 use crate::work::compare;
 use crate::work::imprint::{self, imprint_of};
@@ -163,9 +163,9 @@ fn score(
         take(pair, &found);
     }
     if let Some(tile) = tile
-        && let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_meters)
+        && let Some(vqvae) = compare::beside(dataset, id, sample)?
     {
-        let theirs = compare::tiles(&vqvae, &tile, sample, finger)?;
+        let theirs = compare::tiles(&vqvae.tile, &tile, sample, finger)?;
         (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
         pair.vqvae = theirs.unstretched.map(Stored);
     }

@@ -299,7 +299,7 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
 }
 
 /// A text that is no wider than there is room, with what had to go left out of its middle: names differ at their ends.
-fn cut_in_the_middle(text: &str, room: f32, width: impl Fn(&str) -> f32) -> String {
+pub(super) fn cut_in_the_middle(text: &str, room: f32, width: impl Fn(&str) -> f32) -> String {
     if width(text) <= room {
         return text.to_owned();
     }

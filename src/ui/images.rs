@@ -3,6 +3,7 @@
 mod bar;
 mod link;
 mod paint;
+mod versus;
 
 use std::sync::Arc;
 
@@ -44,12 +45,21 @@ pub(super) struct Memory {
     painting: Option<(Pane, PadId)>,
     /// Outlines of masks.
     outlines: Memo<Vec<[[f32; 2]; 2]>>,
+    /// What the comparison of any two imprints remembers.
+    compared: versus::Compared,
 }
 
 impl Default for Memory {
     fn default() -> Self {
         let view = ViewTransform::default();
-        Self { gel_view: view, bubble_view: view, error_mm: 4.0, painting: None, outlines: Memo::default() }
+        Self {
+            gel_view: view,
+            bubble_view: view,
+            error_mm: 4.0,
+            painting: None,
+            outlines: Memo::default(),
+            compared: versus::Compared::default(),
+        }
     }
 }
 
@@ -61,6 +71,7 @@ impl Memory {
         }
         if only != Some(SensorKind::Color) {
             self.bubble_view = ViewTransform::default();
+            self.compared.fit();
         }
     }
 
@@ -119,6 +130,9 @@ fn usual_size(cx: &Cx<'_>, kind: SensorKind) -> [usize; 2] {
 
 /// The pane of one kind of image, for every finger on screen.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane) {
+    if pane == Pane::Compare {
+        return versus::show(cx, ui, memory);
+    }
     let bar = matches!(pane, Pane::Measured | Pane::Predicted | Pane::Error);
     let full = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(full);

@@ -59,6 +59,7 @@ fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
         Kind::Form => return,
         Kind::Imprint(_) if cx.state.selection.panes.contains(&Pane::Masks) => help::PAINT,
         Kind::Color | Kind::Imprint(_) | Kind::Error => help::IMAGE,
+        Kind::Versus => help::VERSUS,
         Kind::Scene(_) => help::SCENE,
         Kind::Steps => help::STEPS,
         Kind::Map => help::BASIN,

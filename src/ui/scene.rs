@@ -35,6 +35,9 @@ use crate::gpu::pick::nearest_point;
 use crate::gpu::view::{Camera, Preset};
 use crate::work::cloud::Clouds;
 
+pub(super) use build::{guides, parts};
+pub(super) use layers::{DISTANCE_MAP, outline};
+pub(super) use legend::distances;
 pub(super) use overlay::{angle_text, error_color, pose_details};
 
 /// Width of the column of buttons, points.
@@ -300,6 +303,6 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
 }
 
 /// A color as the renderer takes it.
-fn rgb(c: Color32) -> [f32; 3] {
+pub(super) fn rgb(c: Color32) -> [f32; 3] {
     [f32::from(c.r()) / 255.0, f32::from(c.g()) / 255.0, f32::from(c.b()) / 255.0]
 }

@@ -26,7 +26,7 @@ use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::{
     ColorMap, ColorRange, GenerateSettings, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
-    SceneLayer, SceneLook, Settings, Theme, Workspace,
+    SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::tasks::Ticket;
 use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};
@@ -43,6 +43,7 @@ use touch2touch::work::adapt::{Adapted, Scored};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::job::{PreviewPicture, Progress};
+use touch2touch::work::subject::Subject;
 
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;
@@ -119,6 +120,23 @@ fn scene() -> impl Strategy<Value = SceneLook> {
         let look = LayerLook { shown: on, color: None, opacity: a, size: LayerSize::Mm(b) };
         SceneLook { distance_m: c, eye_dome: on, ..SceneLook::default() }.with(layer, look)
     })
+}
+
+fn subject() -> impl Strategy<Value = Subject> {
+    let texts = [
+        "measured",
+        "prediction",
+        "prediction:seed=7",
+        "prediction:bundle=gen,steps=3,shift=raw",
+        "prediction:bundle=missing",
+        "mean:seeds=2",
+        "stored",
+    ];
+    select(texts.map(|text| text.parse().expect("a subject")).to_vec())
+}
+
+fn versus() -> impl Strategy<Value = Versus> {
+    (subject(), subject(), any_of::<VersusMode>()).prop_map(|(a, b, mode)| Versus { a, b, mode })
 }
 
 fn planar() -> impl Strategy<Value = PlanarPose> {
@@ -352,6 +370,7 @@ draws! {
         1 SetCacheBudget(any::<u32>()),
         1 SetCamerasLinked(any::<bool>()),
         1 SetScene(scene()),
+        1 SetVersus(versus()),
         1 SetWorkspace(any_of::<Workspace>()),
         1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
         1 DismissHint,
