@@ -127,17 +127,17 @@ macro_rules! panes {
                     Imprint(Predicted), needs [Imprint(Predicted), Ambiguity],
                     at [Inspect Top(3), Align Top(2), Label Top(1), Evaluate Bottom(2)]
                 }
-                Compare {
-                    "Compare", "Any two imprints of the touch against each other: side by side, wiped, subtracted, in 3D",
-                    Versus, needs [Versus], at [Inspect Top(3), Align Top(2), Evaluate Bottom(2)]
-                }
                 Error {
                     "Error", "Predicted minus measured: blue too shallow, red too deep", Error, needs [Comparison],
                     at [Inspect Bottom(1), Evaluate Bottom(3)]
                 }
+                Compare {
+                    "Compare", "Any two imprints of the touch against each other: side by side, wiped, subtracted, in 3D",
+                    Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3)]
+                }
             }
             ledger { Ledger {
-                "Depth chain", "Everything between the decoder and the meters, stage by stage",
+                "Depth chain" as "Chain", "Everything between the decoder and the meters, stage by stage",
                 Form, needs [Ledger], at [Inspect Bottom(1), Evaluate Bottom(3)]
             } }
             seeds { Seeds {

@@ -20,7 +20,7 @@ use crate::domain::grid::DepthMap;
 use crate::domain::rig::PadId;
 use crate::domain::units;
 use crate::ui::cx::Cx;
-use crate::ui::theme::Palette;
+use crate::ui::theme::{Palette, SMALL};
 use crate::ui::widget::colorbar;
 use crate::ui::widget::image_canvas::{CanvasOutput, ImageCanvas, Primary, shows_squares};
 use crate::ui::widget::texture::{Histogram, depth_image};
@@ -133,10 +133,13 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
 /// What is compared, and how; whether the button is held that shows B in the place of A.
 fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
     let mut held = false;
-    ui.spacing_mut().item_spacing = vec2(4.0, 3.0);
+    ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
+    ui.spacing_mut().button_padding = vec2(4.0, 1.0);
+    ui.style_mut().override_font_id = Some(egui::FontId::proportional(SMALL));
+    let width = ui.available_width();
     ui.horizontal_wrapped(|ui| {
         for letter in [Letter::A, Letter::B] {
-            if let Some(subject) = choose::menu(cx, ui, versus, letter) {
+            if let Some(subject) = choose::menu(cx, ui, versus, letter, (width - 54.0) / 2.0) {
                 let changed = match letter {
                     Letter::A => Versus { a: subject, ..versus.clone() },
                     Letter::B => Versus { b: subject, ..versus.clone() },
@@ -153,7 +156,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
                 cx.push(SettingsCommand::SetVersus(Versus { mode, ..versus.clone() }));
             }
         }
-        let button = ui.button("Hold F: B").on_hover_text("While F or this is held, B stands in the place of A");
+        let button = ui.button("Hold: B").on_hover_text("While F or this is held, B stands in the place of A");
         held = button.is_pointer_button_down_on();
     });
     held

@@ -55,7 +55,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: Imprin
             residuals(cx, &ui.painter_at(rect), source, rect)
         }
         Layer::Distance if memory.layer_colors[source as usize].is_some() => {
-            distances(cx, ui, &source.name().to_lowercase(), rect);
+            distances(cx, ui, &source.name().to_lowercase(), "inside ", rect);
         }
         _ => {}
     }
@@ -230,14 +230,14 @@ fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) 
     }
 }
 
-/// Which color is which signed distance; the reach is one for all views, and can be changed.
-pub(in crate::ui) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, rect: Rect) {
+/// Which color is which signed distance, `below` being what negative ones are called; the reach is one for all views, and can be changed.
+pub(in crate::ui) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, below: &str, rect: Rect) {
     let bar = bar(rect);
     let painter = ui.painter_at(rect);
     colors(&painter, bar, layers::DISTANCE_MAP);
     let look: &SceneLook = &cx.state.settings.scene;
     let mut mm = units::mm(f64::from(look.distance_m));
-    let texts = [format!("inside -{mm:.2}"), "0".into(), format!("+{mm:.2} mm")];
+    let texts = [format!("{below}-{mm:.2}"), "0".into(), format!("+{mm:.2} mm")];
     ends(&painter, bar, texts, cx.p.text);
     let place = Rect::from_min_max(pos2(bar.left(), bar.top() - 20.0), pos2(bar.right(), bar.top() - 2.0));
     let builder = UiBuilder::new().max_rect(place).id_salt(("distances", view));

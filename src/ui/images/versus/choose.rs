@@ -15,18 +15,19 @@ use crate::ui::theme::{SMALL, caption};
 use crate::work::bundles::BundleKind;
 use crate::work::subject::{Mapping, SEEDS, Subject, Wish};
 
-/// Letters of a label that a button shows.
-const LETTERS: usize = 34;
+/// Width of a letter in a button, points.
+const LETTER: f32 = 5.8;
 
 fn cut(text: &str, letters: usize) -> String {
     cut_in_the_middle(text, letters as f32, |text| text.chars().count() as f32)
 }
 
-/// The button of one of the two, with its menu; what was chosen.
-pub(super) fn menu(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus, letter: Letter) -> Option<Subject> {
+/// The button of one of the two, `width` points wide at most, with its menu; what was chosen.
+pub(super) fn menu(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus, letter: Letter, width: f32) -> Option<Subject> {
     let subject = letter.of(versus);
     let label = subject.label();
-    let text = RichText::new(format!("{letter:?}  {}", cut(&label, LETTERS))).color(color(cx.p, versus, letter));
+    let text = RichText::new(format!("{letter:?}  {}", cut(&label, ((width - 28.0) / LETTER).max(6.0) as usize)))
+        .color(color(cx.p, versus, letter));
     let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
     let (button, inner) =
         MenuButton::from_button(Button::new(text)).config(config).ui(ui, |ui| content(cx, ui, subject));
@@ -37,6 +38,7 @@ pub(super) fn menu(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus, letter: Letter) ->
 }
 
 fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
+    ui.style_mut().override_font_id = None;
     ui.set_min_width(240.0);
     let mut chosen = None;
     let mut row = |ui: &mut Ui, value: Subject, text: &str, tip: &str| {

@@ -249,6 +249,6 @@ fn legend(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, flipped: bool, rect: ef
         }
     }
     if apart {
-        distances(cx, ui, "compared", rect);
+        distances(cx, ui, "compared", "", rect);
     }
 }
