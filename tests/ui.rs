@@ -14,6 +14,7 @@ mod follow;
 mod generate;
 mod inspect;
 mod job;
+mod jobs;
 mod results;
 mod scene;
 mod seeds;
