@@ -12,6 +12,7 @@
 
 pub mod adapt;
 pub mod bundles;
+pub(crate) mod canvas;
 pub mod cloud;
 pub mod compare;
 pub mod deviation;
@@ -19,6 +20,7 @@ pub mod ensemble;
 pub mod error;
 pub mod evaluate;
 pub mod export;
+pub mod figure;
 pub mod imprint;
 pub mod job;
 pub mod labels;

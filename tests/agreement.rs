@@ -8,7 +8,10 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
+use touch2touch::app::command::{
+    Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand,
+};
+use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
@@ -41,6 +44,7 @@ fn how(action: Action) -> How {
         A::Follow => Verb(&["watch", "folder"]),
         // Labels are on the disk as soon as a verb ends.
         A::Save => Shell,
+        A::Figure => Verb(&["figure", "demo", "--pairs", "a,b", "--panes", "measured,error", "--out", "a.svg"]),
         A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),
         A::Generate => Verb(&["generate", "demo", "--out", "folder"]),
         A::GenerateNewSeed | A::LockSeed => Options(&["generate", "demo", "--out", "folder", "--seed", "7"]),
@@ -85,6 +89,7 @@ fn how(action: Action) -> How {
         A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop | A::SwitchTheme => Window,
         A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace => Window,
         A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
+        // Image panes are drawn by `figure`; these are photographs of the window.
         A::SavePane | A::CopyPane => Window,
         A::Palette | A::ShortcutSheet | A::ResetSettings => Window,
     }
@@ -311,4 +316,43 @@ fn on_a_folder_of_pictures_the_figures_are_of_the_files_own_pixels_in_both() {
     }
     let found = assert_same(Place::Path(folder.clone()), folder.to_str().unwrap(), home.path(), 2);
     assert_eq!(found["comparison"], 2, "{found:?}");
+}
+
+#[test]
+fn figures_and_pictures_are_the_same_files_in_both() {
+    let home = tempfile::tempdir().unwrap();
+    let at = |name: &str| home.path().join(name);
+    let mut studio = Studio::open(Place::Demo, home.path());
+    studio.send(ViewCommand::ShowBothFingers(false).into());
+    let names: Vec<String> = {
+        let library = &studio.state.library;
+        let names = library.order.iter().take(2).filter_map(|pair| library.entry(*pair));
+        names.map(|entry| entry.name.clone()).collect()
+    };
+    let form = FigureForm { first: Some(2), scale: 1, ..FigureForm::default() };
+    studio.send(ExportCommand::SetForm(form).into());
+    studio.send(ExportCommand::Write(Output::Figure, at("studio.png")).into());
+    let picture = Output::Picture { pane: Pane::Predicted, scale: None, error_m: 0.004 };
+    studio.send(ExportCommand::Write(picture, at("studio")).into());
+    let entry = studio.state.log.entries.back().unwrap();
+    assert_eq!(entry.place, Some(at("studio.svg")), "{entry:?}");
+    let finger = studio.state.finger_name(studio.state.selection.finger).to_string();
+
+    let verb = |arguments: &[&str], file: &Path| {
+        let all = [&["figure", "demo", "--finger", &finger, "--scale", "1"], arguments].concat();
+        json(&[&all[..], &["--out", file.to_str().unwrap()]].concat(), home.path())
+    };
+    let said = verb(&["--pairs", &names.join(",")], &at("verb.png"));
+    assert_eq!((said["rows"].as_array().unwrap().len(), &said["range_mm"][1]), (2, &18.0.into()), "{said}");
+    let one = ["--panes", "predicted", "--pairs", studio.state.pair_name()];
+    verb(&one, &at("verb.svg"));
+    for ending in ["png", "svg"] {
+        let [a, b] = ["studio", "verb"].map(|by| std::fs::read(at(&format!("{by}.{ending}"))).unwrap());
+        assert!(a.len() > 5000 && a == b, "{ending}: {} and {} bytes", a.len(), b.len());
+    }
+    // What cannot be drawn is said before anything is predicted.
+    for wrong in [["--scale", "900"], ["--panes", "colors"], ["--range", "18..0"], ["--out", "a.gif"]] {
+        let arguments = [&["figure", "demo", "--pairs", &names[0], "--out", "a.png"], &wrong[..]].concat();
+        assert_eq!(run(&arguments, home.path()).status.code(), Some(2), "{wrong:?}");
+    }
 }

@@ -9,6 +9,7 @@ mod rig;
 
 mod adapt;
 mod chain;
+mod export;
 mod follow;
 mod generate;
 mod inspect;

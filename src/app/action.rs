@@ -5,8 +5,9 @@ mod key;
 use strum::{EnumIter, IntoEnumIterator};
 
 use super::command::{
-    AdaptCommand, CameraPreset, Command, EvaluateCommand, FollowCommand, InspectCommand, LabelsCommand, LibraryCommand,
-    Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand, WorkbenchCommand,
+    AdaptCommand, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand, LabelsCommand,
+    LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
+    WorkbenchCommand,
 };
 use super::inspect::state::Inspected;
 use super::keys::{ImprintSource, Registration, Request, ShiftMode};
@@ -98,6 +99,7 @@ actions! {
     Follow, File, "Follow the folder", "Shows and predicts each touch that arrives in the open folder, or stops", [ctrl_shift(K::F)];
     Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)];
     Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)];
+    Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)];
     ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
 
     PreviousSample, Navigate, "Previous sample", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)];
@@ -265,6 +267,7 @@ impl Action {
                 when(folder, FollowCommand::Set(state.library.follow.is_none()))
             }
             Self::Save => does(LabelsCommand::Save),
+            Self::Figure => when(state.can_draw(), ExportCommand::Ask(!state.export.asking)),
             Self::ExportMasks => when(open, ViewCommand::Ui(UiRequest::PickExportFolder)),
 
             Self::PreviousSample => when(listed, LibraryCommand::Step(-1)),

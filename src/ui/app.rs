@@ -16,7 +16,7 @@ use super::pane::{Docking, Panes};
 use super::scene_view::Device;
 use super::screenshot::Shot;
 use super::theme::{DARK, LIGHT};
-use super::{bars, layout, log as log_pane, palette, pane, shortcuts, theme};
+use super::{bars, export, layout, log as log_pane, palette, pane, shortcuts, theme};
 use crate::app::action::Action;
 use crate::app::command::{
     Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
@@ -242,6 +242,7 @@ impl StudioApp {
             UiRequest::PickFolder => self.shared.dialogs.open(Purpose::Folder, ctx),
             UiRequest::PickFile => self.shared.dialogs.open(Purpose::File, ctx),
             UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
+            UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
             UiRequest::PickExportFolder => self.shared.dialogs.open(Purpose::Export, ctx),
             UiRequest::Camera(preset) => {
                 // The view under the pointer turns; linked cameras turn together.
@@ -416,6 +417,7 @@ impl eframe::App for StudioApp {
                 }
             });
             bars::hint(&mut cx, &ctx);
+            export::form(&mut cx, &ctx);
             log_pane::notices(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::sheet(&mut cx, &ctx);
@@ -424,6 +426,7 @@ impl eframe::App for StudioApp {
                 cx.push(match purpose {
                     Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
                     Purpose::Export => Command::Labels(LabelsCommand::ExportMasks(path)),
+                    Purpose::Output(output) => Command::Export(export::chosen(output, path)),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });
             }

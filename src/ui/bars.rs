@@ -62,7 +62,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.shared.dialogs.type_path(Purpose::Folder, "");
         }
         ui.separator();
-        for action in [Action::ExportMasks, Action::Save, Action::Reload, Action::Follow] {
+        for action in [Action::Figure, Action::ExportMasks, Action::Save, Action::Reload, Action::Follow] {
             let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
             let on = action == Action::Follow && cx.state.library.follow.is_some();
             let button = egui::Button::new(action.name()).shortcut_text(keys).selected(on);

@@ -1,0 +1,181 @@
+//! What is chosen of a figure before it is drawn, and what it then is of.
+
+use super::super::keys::{ImprintSource, PredictionKey};
+use super::super::pane::{Kind, Pane};
+use super::super::settings::state::ColorMap as MapChoice;
+use super::super::state::State;
+use crate::domain::colormap::{ColorMap, Range};
+use crate::domain::dataset::PairId;
+use crate::work::bundles::{BundleInfo, BundleKind};
+use crate::work::figure::{FigureLook, FigurePane, FigureSetup, FigureTheme, note};
+
+/// Pairs of the list that a figure may take.
+pub const MOST_PAIRS: usize = 50;
+/// Scales that are offered.
+pub const SCALES: [u8; 4] = [1, 2, 4, 8];
+
+/// What a person chose about the next figure. Not kept between runs of the program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureForm {
+    /// How many pairs of the list, from the first; `None` = the selected pair alone.
+    pub first: Option<usize>,
+    /// Whether all fingers get a row, or only the active one.
+    pub both_fingers: bool,
+    /// The columns.
+    pub panes: Vec<FigurePane>,
+    /// Pixels of a PNG per pixel of an imprint.
+    pub scale: u8,
+    /// Ground and ink.
+    pub theme: FigureTheme,
+    /// Half the range of the colors of errors, meters.
+    pub error_m: f32,
+}
+
+impl Default for FigureForm {
+    fn default() -> Self {
+        let look = FigureLook::default();
+        Self {
+            first: Some(4),
+            both_fingers: false,
+            panes: look.panes,
+            scale: 2,
+            theme: FigureTheme::Light,
+            error_m: look.error_m,
+        }
+    }
+}
+
+impl FigureForm {
+    /// Numbers brought into range.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        self.first = self.first.map(|n| n.clamp(1, MOST_PAIRS));
+        self.scale = self.scale.clamp(SCALES[0], SCALES[3]);
+        self.error_m = crate::domain::units::clamp_or(self.error_m, 5e-5, 0.1, FigureLook::default().error_m);
+        self.panes.sort_unstable();
+        self.panes.dedup();
+        self
+    }
+}
+
+/// The room's state.
+#[derive(Clone, Debug, Default)]
+pub struct ExportState {
+    /// Whether the form is open.
+    pub asking: bool,
+    /// What it says.
+    pub form: FigureForm,
+}
+
+/// Something to be written once the place is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Output {
+    /// The figure that the form describes.
+    Figure,
+    /// One pane as a picture.
+    Picture {
+        /// The pane.
+        pane: Pane,
+        /// Pixels per pixel of an imprint; `None` for an SVG.
+        scale: Option<u8>,
+        /// Half the range of the colors of errors, meters.
+        error_m: f32,
+    },
+}
+
+/// A pair of a figure with the predictions that it needs.
+pub type Recipes = Vec<(PairId, Vec<(PredictionKey, BundleInfo)>)>;
+
+impl Pane {
+    /// The column of a figure that shows the same; `None` for panes that are no pictures.
+    pub fn in_figure(self) -> Option<FigurePane> {
+        Some(match (self, self.kind()) {
+            (Self::GelDifference, _) => FigurePane::GelSlim,
+            (Self::GelRaw, _) => FigurePane::Raw,
+            (Self::GelReference, _) => FigurePane::Reference,
+            (_, Kind::Imprint(ImprintSource::Measured)) => FigurePane::Measured,
+            (_, Kind::Imprint(ImprintSource::Predicted)) => FigurePane::Predicted,
+            (Self::Error, _) => FigurePane::Error,
+            _ => return None,
+        })
+    }
+}
+
+impl State {
+    /// How figures look, in the colors of the panes.
+    fn figure_look(&self, panes: Vec<FigurePane>, error_m: f32, theme: FigureTheme, scale: f64) -> FigureLook {
+        let (range, window) = (self.settings.range, self.settings.footprint_visible);
+        let map = match self.settings.color_map {
+            MapChoice::Viridis => ColorMap::Viridis,
+            MapChoice::Gray => ColorMap::Gray,
+        };
+        FigureLook { panes, map, range: Range { lo: range.min_m, hi: range.max_m }, error_m, theme, window, scale }
+    }
+
+    /// What the form describes, before anything is drawn.
+    pub fn figure_setup(&self) -> FigureSetup {
+        let form = &self.export.form;
+        let pairs = match form.first {
+            Some(n) => self.library.order.iter().copied().take(n).collect(),
+            None => self.selection.pair.into_iter().collect(),
+        };
+        let fingers = if form.both_fingers { self.rig().pad_list() } else { vec![self.selection.finger] };
+        let look = self.figure_look(form.panes.clone(), form.error_m, form.theme, f64::from(form.scale));
+        self.with_note(FigureSetup { pairs, fingers, shift: self.settings.shift, look, note: String::new() })
+    }
+
+    /// One pane of the selected pair, with the fingers that it shows.
+    pub fn picture_setup(&self, pane: Pane, scale: Option<u8>, error_m: f32) -> Option<FigureSetup> {
+        let shown = self.fingers();
+        let fingers = self.rig().pads().filter(|finger| shown.contains(finger)).collect();
+        let scale = f64::from(scale.unwrap_or(1));
+        let look = self.figure_look(vec![pane.in_figure()?], error_m, FigureTheme::Light, scale);
+        let pairs = vec![self.selection.pair?];
+        Some(self.with_note(FigureSetup { pairs, fingers, shift: self.settings.shift, look, note: String::new() }))
+    }
+
+    fn with_note(&self, setup: FigureSetup) -> FigureSetup {
+        let recipes = self.figure_recipes(&setup);
+        let mut said: Vec<String> = Vec::new();
+        for (recipe, bundle) in recipes.iter().flat_map(|(_, list)| list) {
+            let text = note(&bundle.name, &recipe.config(), setup.shift);
+            if !said.contains(&text) {
+                said.push(text);
+            }
+        }
+        // Pairs whose shown predictions were made in different ways are said so, not listed.
+        let note = match said.as_slice() {
+            [] => String::new(),
+            [one] => one.clone(),
+            several => format!("{} and {} other ways", several[0], several.len() - 1),
+        };
+        FigureSetup { note, ..setup }
+    }
+
+    /// The predictions that a figure shows: the one shown for a touch, else what the settings would make of it.
+    pub fn figure_recipes(&self, setup: &FigureSetup) -> Recipes {
+        let predicted = setup.look.panes.iter().any(|pane| pane.is_predicted());
+        let Some(open) = self.library.open.as_ref().filter(|_| predicted) else { return Vec::new() };
+        let of = |pair: &PairId| {
+            let touches = setup.fingers.iter().map(|finger| open.key(*pair).finger(*finger));
+            let recipes = touches.filter_map(|touch| {
+                let recipe = self.results.chosen.get(&touch).cloned().or_else(|| self.recipe(touch))?;
+                let bundle = self.library.bundle(&recipe.bundle)?.clone();
+                Some((recipe, bundle))
+            });
+            (*pair, recipes.collect())
+        };
+        setup.pairs.iter().map(of).collect()
+    }
+
+    /// Whether a figure of the open pairs can be drawn.
+    pub fn can_draw(&self) -> bool {
+        let open = self.library.open.as_ref();
+        open.is_some_and(|open| open.source.as_dataset().is_some()) && self.entry().is_some()
+    }
+
+    /// Whether something predicts for the open pairs.
+    pub fn has_generator(&self) -> bool {
+        self.bundle(BundleKind::Generator).is_ok()
+    }
+}
