@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::export::state::Recipes;
+use super::export::state::{PairExport, Recipes};
 use super::keys::{DatasetSeq, PredictionKey, Revision};
 use super::labels::state::PairLabels;
 use super::library::state::Place;
@@ -130,6 +130,15 @@ pub enum Effect {
         /// Where to.
         file: PathBuf,
     },
+    /// Write a pair for other programs.
+    ExportPair {
+        /// The job.
+        ticket: Ticket,
+        /// What of it.
+        pair: Box<PairExport>,
+        /// Where to.
+        folder: PathBuf,
+    },
     /// Show a file or folder in the system's own window.
     Reveal(PathBuf),
     /// Something only the window can do.
@@ -152,6 +161,7 @@ impl std::fmt::Debug for Effect {
             Self::Adapt { ticket, .. } => write!(f, "Adapt({ticket:?})"),
             Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),
             Self::Figure { setup, file, .. } => write!(f, "Figure({:?}, {})", setup.pairs, file.display()),
+            Self::ExportPair { folder, .. } => write!(f, "ExportPair({})", folder.display()),
             Self::Reveal(place) => write!(f, "Reveal({})", place.display()),
             Self::Ui(request) => write!(f, "Ui({request:?})"),
         }

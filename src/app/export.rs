@@ -1,8 +1,9 @@
 //! The room of what is taken away: figures and pictures.
 
+mod command;
 pub mod state;
 
-pub use state::{ExportState, FigureForm, MOST_PAIRS, Output, SCALES};
+pub use state::{ExportState, FigureForm, MOST_PAIRS, Output, PairExport, SCALES};
 
 use std::path::PathBuf;
 
@@ -40,6 +41,14 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             state.export.asking = false;
             let setup = state.figure_setup();
             draw(state, "Draw the figure", setup, ended(file, "png"), effects);
+        }
+        Output::Pair(source) => {
+            let Some(pair) = state.pair_export(source) else {
+                let err = TaskError::new("Export the pair", format!("there is no {} cloud of it", source.key()));
+                return state.log.error(&err.with_hint("Show it in 3D first."));
+            };
+            let ticket = state.tasks.start("Export the pair".into(), Vec::new());
+            effects.push(Effect::ExportPair { ticket, pair: Box::new(pair), folder: file });
         }
         Output::Picture { pane, scale, error_m } => {
             let Some(setup) = state.picture_setup(pane, scale, error_m) else { return };

@@ -19,7 +19,8 @@ use super::theme::{DARK, LIGHT};
 use super::{bars, export, layout, log as log_pane, palette, pane, shortcuts, theme};
 use crate::app::action::Action;
 use crate::app::command::{
-    Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
+    Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest,
+    ViewCommand,
 };
 use crate::app::evaluate::EvaluateCommand;
 use crate::app::keys::ImprintSource;
@@ -275,6 +276,11 @@ impl StudioApp {
                 let part = self.panes.hovered.and_then(|pane| self.panes.places.get(&pane).copied());
                 self.shoot(ctx, part, copied);
             }
+            UiRequest::PictureOf(pane) => {
+                if let Some(place) = self.panes.places.get(&pane).copied() {
+                    self.shoot(ctx, Some(place), true);
+                }
+            }
             UiRequest::ToggleFullscreen => {
                 let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
                 ctx.send_viewport_cmd(ViewportCommand::Fullscreen(!full));
@@ -426,7 +432,7 @@ impl eframe::App for StudioApp {
                 cx.push(match purpose {
                     Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
                     Purpose::Export => Command::Labels(LabelsCommand::ExportMasks(path)),
-                    Purpose::Output(output) => Command::Export(export::chosen(output, path)),
+                    Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });
             }

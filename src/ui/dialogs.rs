@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 
 use eframe::egui::{self, Key, RichText};
 
-use super::export;
 use crate::app::export::Output;
 use crate::ui::theme::{Palette, caption};
 
@@ -34,7 +33,7 @@ impl Purpose {
             Self::Folder => "Open a folder of pairs",
             Self::File => "Open a file of a data set",
             Self::Export => "Export masks to a folder",
-            Self::Output(output) => export::title(output),
+            Self::Output(output) => output.title(),
             Self::Table => "Write the results table to a folder",
         }
     }
@@ -81,7 +80,10 @@ impl Dialogs {
             let path = match purpose {
                 Purpose::Folder | Purpose::Export | Purpose::Table => dialog.pick_folder(),
                 Purpose::File => dialog.pick_file(),
-                Purpose::Output(output) => dialog.set_file_name(export::file_name(output)).save_file(),
+                Purpose::Output(output) => match output.file_name() {
+                    Some(name) => dialog.set_file_name(name).save_file(),
+                    None => dialog.pick_folder(),
+                },
             };
             // The window may be gone by now: then nobody waits for the answer.
             if sender.send((purpose, path, started.elapsed())).is_ok() {
@@ -132,7 +134,10 @@ impl Dialogs {
                 edit.request_focus();
             }
             let what = match state.purpose {
-                Purpose::Output(output) => format!("A file such as {}", export::file_name(output)),
+                Purpose::Output(output) => match output.file_name() {
+                    Some(name) => format!("A file such as {name}"),
+                    None => "A folder; it is made if it is not there.".to_owned(),
+                },
                 _ => "A folder in the lab's layout, a folder of image pairs, or any file in one.".to_owned(),
             };
             ui.label(caption(what, p));

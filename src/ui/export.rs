@@ -1,41 +1,15 @@
 //! Taking things away: the form of a figure, and the menu in each pane's title.
 
-use std::path::PathBuf;
-
 use eframe::egui::{self, DragValue, Rect, RichText, Sense, Stroke, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::cx::Cx;
 use super::theme::{SMALL, caption};
 use crate::app::action::Action;
-use crate::app::command::{ExportCommand, Pane};
+use crate::app::command::{ExportCommand, Pane, UiRequest, ViewCommand};
 use crate::app::export::{FigureForm, MOST_PAIRS, Output, SCALES};
+use crate::app::keys::ImprintSource;
 use crate::work::figure::{FigurePane, FigureTheme};
-
-/// The name that a file is offered under.
-pub(super) fn file_name(output: Output) -> String {
-    match output {
-        Output::Figure => "figure.png".into(),
-        Output::Picture { pane, scale, .. } => {
-            let ending = if scale.is_some() { "png" } else { "svg" };
-            format!("{}.{ending}", pane.title().to_lowercase().replace(' ', "-"))
-        }
-    }
-}
-
-/// What is asked for, as the title of a dialog.
-pub(super) fn title(output: Output) -> &'static str {
-    match output {
-        Output::Figure => "Save the figure (.png or .svg)",
-        Output::Picture { scale: Some(_), .. } => "Save the picture (.png)",
-        Output::Picture { scale: None, .. } => "Save the picture (.svg)",
-    }
-}
-
-/// What was written, as a command.
-pub(super) fn chosen(output: Output, path: PathBuf) -> ExportCommand {
-    ExportCommand::Write(output, path)
-}
 
 /// The form of a figure, where it is open. It blocks nothing: pairs and colors can be changed beside it.
 pub(super) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
@@ -224,12 +198,39 @@ pub(super) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
         });
         ui.separator();
     }
-    for action in [Action::Figure] {
+    let sides: &[Action] = match pane.side() {
+        Some(ImprintSource::Measured) => &[Action::ExportMeasured],
+        Some(ImprintSource::Predicted) => &[Action::ExportPredicted],
+        None if pane.is_of_pair() => &[Action::ExportMeasured, Action::ExportPredicted],
+        None => &[],
+    };
+    for action in [Action::Figure].iter().chain(sides).copied() {
         let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
         let button = egui::Button::new(action.name()).shortcut_text(keys);
-        let response = ui.add_enabled(action.command(cx.state).is_some(), button);
+        let response = ui.add_enabled(action.command(cx.state).is_some(), button).accessible_name(action.name());
         if response.on_hover_text(action.tooltip()).clicked() {
             cx.act(action);
+            ui.close();
+        }
+    }
+    if matches!(pane, Pane::Results | Pane::Table) {
+        let action = Action::ExportTable;
+        let button = ui.add_enabled(action.command(cx.state).is_some(), egui::Button::new(action.name()));
+        if button.on_hover_text(action.tooltip()).clicked() {
+            cx.act(action);
+            ui.close();
+        }
+    }
+    ui.separator();
+    if ui.button("Copy as picture").on_hover_text("Copies this pane as it is on the screen (Ctrl+F12)").clicked() {
+        cx.push(ViewCommand::Ui(UiRequest::PictureOf(pane)));
+        ui.close();
+    }
+    if let Some(command) = cx.state.equivalent(pane, error_m) {
+        let copy = ui.button("Copy the command");
+        let tip = format!("What does the same in a shell:\n{command}");
+        if copy.on_hover_text(tip).clicked() {
+            ui.copy_text(command);
             ui.close();
         }
     }

@@ -496,7 +496,7 @@ mod tests {
         assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"));
         // Four of two columns, and the bar.
         assert_eq!(text.matches("<image ").count(), 9);
-        for word in ["Measured imprint", "GelSlim raw", "imprint, mm", ">18", ">20 mm", "data_"] {
+        for word in ["Measured imprint", "GelSlim raw", "imprint, mm", "\n18\n", "\n20 mm\n", "data_"] {
             assert!(text.contains(word), "{word}");
         }
         assert!(!text.contains("predicted minus"));

@@ -173,6 +173,7 @@ fn output() -> impl Strategy<Value = Output> {
     let picture = (any_of::<Pane>(), proptest::option::of(any::<u8>()), number());
     prop_oneof![
         Just(Output::Figure),
+        source().prop_map(Output::Pair),
         picture.prop_map(|(pane, scale, error_m)| Output::Picture { pane, scale, error_m }),
     ]
 }

@@ -1,13 +1,27 @@
 //! What is chosen of a figure before it is drawn, and what it then is of.
 
-use super::super::keys::{ImprintSource, PredictionKey};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use strum::IntoEnumIterator as _;
+
+use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, Registration};
 use super::super::pane::{Kind, Pane};
 use super::super::settings::state::ColorMap as MapChoice;
 use super::super::state::State;
 use crate::domain::colormap::{ColorMap, Range};
+use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
-use crate::work::bundles::{BundleInfo, BundleKind};
+use crate::domain::frames::PlanarPose;
+use crate::domain::rig::Rig;
+use crate::work::bundles::BundleInfo;
+use crate::work::cloud::Clouds;
+use crate::work::error::TaskError;
 use crate::work::figure::{FigureLook, FigurePane, FigureSetup, FigureTheme, note};
+use crate::work::mask::made_of;
+use crate::work::pair_files::{PairFile, PairParts, write};
+use crate::work::pose::PoseResult;
+use crate::work::tool::NamedTool;
 
 /// Pairs of the list that a figure may take.
 pub const MOST_PAIRS: usize = 50;
@@ -81,12 +95,78 @@ pub enum Output {
         /// Half the range of the colors of errors, meters.
         error_m: f32,
     },
+    /// Cloud, pose and mesh of an imprint of the selected pair, into a folder.
+    Pair(ImprintSource),
+}
+
+impl Output {
+    /// What is asked for, as the title of a dialog.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Figure => "Save the figure (.png or .svg)",
+            Self::Pair(_) => "Export cloud, pose and mesh to a folder",
+            Self::Picture { scale: Some(_), .. } => "Save the picture (.png)",
+            Self::Picture { scale: None, .. } => "Save the picture (.svg)",
+        }
+    }
+
+    /// The name that a file is offered under; `None` where a folder is asked for.
+    pub fn file_name(self) -> Option<String> {
+        match self {
+            Self::Figure => Some("figure.png".into()),
+            Self::Picture { pane, scale, .. } => Some(pane.picture_name(scale.is_some())),
+            Self::Pair(_) => None,
+        }
+    }
+}
+
+/// What is written of the selected pair for other programs, gathered for a job.
+#[derive(Clone, Debug)]
+pub struct PairExport {
+    name: String,
+    source: ImprintSource,
+    rig: Arc<Rig>,
+    clouds: Arc<Clouds>,
+    mask: String,
+    engine: Registration,
+    pose: Option<Arc<PoseResult>>,
+    truth: Option<PlanarPose>,
+    tool: Option<Arc<NamedTool>>,
+}
+
+impl PairExport {
+    /// Writes the files that there can be: without a pose only the cloud.
+    ///
+    /// # Errors
+    /// As [`write`].
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, TaskError> {
+        let files: Vec<PairFile> =
+            PairFile::iter().filter(|file| *file == PairFile::Cloud || self.pose.is_some()).collect();
+        let parts = PairParts {
+            name: &self.name,
+            source: self.source,
+            rig: &self.rig,
+            clouds: &self.clouds,
+            mask: &self.mask,
+            engine: self.engine,
+            pose: self.pose.as_deref(),
+            truth: self.truth,
+            tool: self.tool.as_ref().map(|tool| (tool.name.as_str(), &tool.model)),
+        };
+        write(&parts, &files, folder)
+    }
 }
 
 /// A pair of a figure with the predictions that it needs.
 pub type Recipes = Vec<(PairId, Vec<(PredictionKey, BundleInfo)>)>;
 
 impl Pane {
+    /// The name that a picture of it is offered under.
+    pub(in crate::app) fn picture_name(self, pixels: bool) -> String {
+        let name = self.title().to_lowercase().replace(' ', "-");
+        format!("{name}.{}", if pixels { "png" } else { "svg" })
+    }
+
     /// The column of a figure that shows the same; `None` for panes that are no pictures.
     pub fn in_figure(self) -> Option<FigurePane> {
         Some(match (self, self.kind()) {
@@ -168,14 +248,39 @@ impl State {
         setup.pairs.iter().map(of).collect()
     }
 
+    /// What the contact masks of a cloud are made of, as the verbs say it.
+    fn masks_made_of(&self, cloud: &CloudKey) -> String {
+        let source = self.settings.mask.choice.source.key();
+        let keys = cloud.parts.iter().flatten().filter_map(|(imprint, version)| match version.as_ref()? {
+            MaskVersion::Hand(_) => Some(MaskBasis::Hand.key(source)),
+            MaskVersion::Auto(recipe) => {
+                let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
+                Some(self.results.masks.get(&key)?.basis.key(recipe.source().key()))
+            }
+        });
+        made_of(keys.collect(), source)
+    }
+
+    /// What can be written of the selected pair; `None` while its cloud is not there.
+    pub fn pair_export(&self, source: ImprintSource) -> Option<PairExport> {
+        let cloud = self.cloud_key(source).ok()??;
+        let pose = self.pose_key(source).ok().flatten().and_then(|key| self.results.poses.get(&key)).cloned();
+        Some(PairExport {
+            name: self.pair_name().to_owned(),
+            source,
+            rig: self.rig(),
+            clouds: self.results.clouds.get(&cloud)?.clone(),
+            mask: self.masks_made_of(&cloud),
+            engine: self.settings.pose_engine,
+            pose,
+            truth: self.sample().ready()?.grasp_from_object,
+            tool: self.tool_key().ok().and_then(|key| self.results.tools.get(&key)).cloned(),
+        })
+    }
+
     /// Whether a figure of the open pairs can be drawn.
     pub fn can_draw(&self) -> bool {
         let open = self.library.open.as_ref();
         open.is_some_and(|open| open.source.as_dataset().is_some()) && self.entry().is_some()
-    }
-
-    /// Whether something predicts for the open pairs.
-    pub fn has_generator(&self) -> bool {
-        self.bundle(BundleKind::Generator).is_ok()
     }
 }

@@ -1,5 +1,6 @@
 //! From effects to jobs.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::super::answers::Answer;
@@ -24,6 +25,11 @@ use crate::work::figure::figure;
 use crate::work::job::{Cancel, JobCx};
 use crate::work::models::Wanted;
 use crate::work::statistics::{STUDIO_PAIRS, StatisticsSetup, statistics};
+
+/// A place as the system knows it, whatever folder the program was started in: what a note says must be found again.
+fn absolute(place: PathBuf) -> PathBuf {
+    std::path::absolute(&place).unwrap_or(place)
+}
 
 impl Runtime {
     pub(super) fn perform(&mut self, effect: Effect, ui: &mut Vec<UiRequest>) {
@@ -158,7 +164,7 @@ impl Runtime {
                 self.task(Lane::Files, ticket, "Export the table".into(), body);
             }
             Effect::Figure { ticket, source, setup, recipes, file } => {
-                let services = self.services.clone();
+                let (services, file) = (self.services.clone(), absolute(file));
                 let body = Box::new(move |cx: &JobCx| {
                     let dataset = source.as_dataset().ok_or_else(|| {
                         TaskError::new("Figure", "this kind of source cannot be read outside the studio")
@@ -184,6 +190,16 @@ impl Runtime {
                     Ok(Answer::Saved(ticket, text, file))
                 });
                 self.task(Lane::Models, ticket, "Figure".into(), body);
+            }
+            Effect::ExportPair { ticket, pair, folder } => {
+                let body = Box::new(move |_: &JobCx| {
+                    let files = pair.write(&absolute(folder))?;
+                    let names = files.iter().filter_map(|file| file.file_name()).map(|name| name.to_string_lossy());
+                    let text = format!("Saved {}", names.collect::<Vec<_>>().join(", "));
+                    let first = files.into_iter().next().unwrap_or_default();
+                    Ok(Answer::Saved(ticket, text, first))
+                });
+                self.task(Lane::Compute, ticket, "Export the pair".into(), body);
             }
             Effect::Reveal(place) => {
                 self.unwatched(

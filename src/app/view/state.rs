@@ -80,6 +80,8 @@ pub enum UiRequest {
         /// To the clipboard instead of a file.
         copied: bool,
     },
+    /// Copy a picture of a pane.
+    PictureOf(Pane),
     /// Fill the screen, or stop it.
     ToggleFullscreen,
     /// Let one pane fill the window, or stop it.
