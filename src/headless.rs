@@ -12,6 +12,8 @@ mod compare;
 mod contact_mask;
 mod doctor;
 mod evaluate;
+mod export;
+mod figure;
 mod generate;
 mod guard;
 mod label;
@@ -84,6 +86,10 @@ enum Verb {
     Pose(pose::PoseArgs),
     /// The paper's results table of a dataset: generators side by side, with the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
+    /// Draw pairs side by side for a paper: chosen pairs and panes as a grid with one range of colors, as PNG or SVG.
+    Figure(Box<figure::FigureArgs>),
+    /// Write a pair for other programs: its cloud (PLY), pose (JSON) and CAD model in the hand (STL).
+    Export(Box<export::ExportArgs>),
     /// Fits a generator to pairs of your own sensors, and says what it is worth on pairs that were left out.
     Adapt(Box<adapt::AdaptArgs>),
     /// Write training data for the networks: a dataset or, with `simulator` as PATH, simulated touches, as shards that
@@ -232,6 +238,8 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
+        Some(Verb::Figure(args)) => figure::run(&args),
+        Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Adapt(args)) => adapt::run(&args),
         Some(Verb::TrainingData(args)) => training_data::run(&args),
         Some(Verb::Basin(args)) => basin::run(&args),

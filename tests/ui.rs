@@ -10,6 +10,7 @@ mod rig;
 mod adapt;
 mod chain;
 mod compare;
+mod export;
 mod follow;
 mod generate;
 mod inspect;

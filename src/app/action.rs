@@ -5,9 +5,11 @@ mod key;
 use strum::{EnumIter, IntoEnumIterator};
 
 use super::command::{
-    AdaptCommand, CameraPreset, Command, EvaluateCommand, FollowCommand, InspectCommand, LabelsCommand, LibraryCommand,
-    Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand, WorkbenchCommand,
+    AdaptCommand, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand, LabelsCommand,
+    LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
+    WorkbenchCommand,
 };
+use super::export::state::Output;
 use super::inspect::state::Inspected;
 use super::keys::{ImprintSource, Registration, Request, ShiftMode};
 use super::labels::state::Review;
@@ -99,6 +101,9 @@ actions! {
     Follow, File, "Follow the folder", "Shows and predicts each touch that arrives in the open folder, or stops", [ctrl_shift(K::F)];
     Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)];
     Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)];
+    Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)];
+    ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [];
+    ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [];
     ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
 
     PreviousSample, Navigate, "Previous sample", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)];
@@ -120,7 +125,7 @@ actions! {
     FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [];
     UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [];
     EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [];
-    ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown and JSON", [];
+    ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
     NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)];
     Refit, Generate, "Refit on this dataset", "Computes shift statistics of this data set's predictions and measurements, and uses them", [];
@@ -268,6 +273,9 @@ impl Action {
                 when(folder, FollowCommand::Set(state.library.follow.is_none()))
             }
             Self::Save => does(LabelsCommand::Save),
+            Self::Figure => when(state.can_draw(), ExportCommand::Ask(!state.export.asking)),
+            Self::ExportMeasured => export(state, ImprintSource::Measured),
+            Self::ExportPredicted => export(state, ImprintSource::Predicted),
             Self::ExportMasks => when(open, ViewCommand::Ui(UiRequest::PickExportFolder)),
 
             Self::PreviousSample => when(listed, LibraryCommand::Step(-1)),
@@ -506,6 +514,11 @@ fn escape(state: &State) -> Option<WorkbenchCommand> {
 fn inspect(state: &State, useful: impl Fn(Inspected<'_>) -> bool, command: InspectCommand) -> Option<Command> {
     let shown = state.selection.panes.contains(&Pane::TimeMachine).then(|| state.inspected())??;
     when(useful(shown), command)
+}
+
+/// Asks where the cloud, pose and mesh of an imprint go, where there is a cloud.
+fn export(state: &State, source: ImprintSource) -> Option<Command> {
+    when(state.pair_export(source).is_some(), ExportCommand::Place(Output::Pair(source)))
 }
 
 /// Accepts the pose shown, or withdraws it if it is the accepted one.

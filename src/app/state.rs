@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::adapt::state::AdaptState;
 use super::evaluate::state::TableState;
+use super::export::state::ExportState;
 use super::history::History;
 use super::inspect::state::Inspect;
 use super::keys::{PairKey, TouchKey};
@@ -37,6 +38,8 @@ pub struct State {
     pub results: Results,
     /// The results table of the data set.
     pub table: TableState,
+    /// What is chosen of the next figure.
+    pub export: ExportState,
     /// The fit to the open pairs.
     pub adapt: AdaptState,
     /// What the 3D panes do and show besides.

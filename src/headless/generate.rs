@@ -43,6 +43,9 @@ pub(super) struct GenerateArgs {
     /// Which finger's GelSlim image: right, left (or as the data set names it), both.
     #[arg(long, default_value = "right")]
     finger: FingerArg,
+    /// Only this pair, by its name or a part of it that no other has.
+    #[arg(long, conflicts_with = "limit")]
+    pair: Option<String>,
     #[command(flatten)]
     limit: LimitArgs,
     #[command(flatten)]
@@ -55,7 +58,7 @@ pub(super) struct GenerateArgs {
 
 pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
-    let ids = args.limit.spread(dataset.index.pairs.len());
+    let ids = args.limit.or_pair(&dataset, args.pair.as_deref())?;
     let fingers = args.finger.fingers(&dataset.rig)?;
     let output = Output::new(args.common, "generating", ids.len());
     let mut predictor = Predictor::new(&args.model, &dataset.rig);

@@ -14,7 +14,7 @@ use super::theme::Palette;
 use super::widget::colorbar;
 use super::widget::empty;
 use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, ViewTransform, shows_squares};
-use super::widget::texture::{Histogram, Memo, depth_image, difference_gain, rgb_image};
+use super::widget::texture::{Histogram, Memo, depth_image, picture_image};
 use crate::app::command::{Hover, Pane, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::results::Preview;
@@ -22,6 +22,7 @@ use crate::app::settings::{ColorMap as MapChoice, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::grid::{DepthMap, RgbGrid};
+use crate::domain::picture;
 use crate::domain::rig::{PadId, Sensor, SensorKind};
 use crate::domain::sample::Scale;
 use crate::domain::turn::Turn;
@@ -73,6 +74,11 @@ impl Memory {
             self.bubble_view = ViewTransform::default();
             self.compared.fit();
         }
+    }
+
+    /// Half the range of the error's colors, meters.
+    pub(super) fn error_m(&self) -> f32 {
+        self.error_mm * 1e-3
     }
 
     /// Follows the pen no further; whether it was drawing.
@@ -333,11 +339,11 @@ fn gel_image(
     let recipe = cx.state.chosen(finger).filter(|_| pane == Pane::Predicted);
     let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), (touch, pane, recipe), squares, || {
         let picture = if matches!(pane, Pane::GelDifference | Pane::Predicted) {
-            rgb_image(image, difference_gain(image), 128.0)
+            picture::difference(image)
         } else {
-            rgb_image(image, 1.0, 0.0)
+            picture::plain(image)
         };
-        (picture, None)
+        (picture_image(&picture), None)
     });
     output.paint(picture.texture.id(), Color32::WHITE);
     if let Some(px) = output.hovered {
