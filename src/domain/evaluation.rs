@@ -12,7 +12,7 @@ mod write;
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::catalog;
 use super::dataset::{PairEntry, Split};
@@ -29,7 +29,7 @@ pub const PEAK_M: f64 = 0.0225;
 const BOOTSTRAP_SEED: u64 = 1;
 
 /// Grasps that are averaged together: a column group of the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
     /// Grasps of tools that were trained on, which were not.
@@ -89,7 +89,7 @@ impl Group {
 }
 
 /// A squared error that can be pooled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SquaredError {
     /// Sum over the pixels, m² (or of the stretched images).
     pub sum: f64,
@@ -98,7 +98,7 @@ pub struct SquaredError {
 }
 
 /// The figures of one predicted image.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ImageScore {
     /// Which finger's; 0 right, 1 left.
     pub finger: usize,
@@ -122,7 +122,7 @@ pub struct ImageScore {
 }
 
 /// The figures of one grasp by one method.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspScore {
     /// The pair's name.
     pub pair: String,
