@@ -29,6 +29,7 @@ mod pane;
 mod poses;
 mod results;
 mod saved;
+mod scatter;
 mod scene;
 mod scene_view;
 mod screenshot;

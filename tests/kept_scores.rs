@@ -3,7 +3,15 @@
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
+use strum::IntoEnumIterator as _;
+use touch2touch::app::command::{Command, EvaluateCommand, Pane, ViewCommand};
+use touch2touch::app::library::Place;
+use touch2touch::app::runtime::Runtime;
+use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::state::State;
 use touch2touch::domain::catalog;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::evaluation::Figure;
 use touch2touch::domain::grid::Mask;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
@@ -108,6 +116,39 @@ fn a_second_evaluation_computes_nothing_and_says_the_same() {
     assert_eq!(run(&copy, &setup(), &cache).1, 0, "the same content elsewhere");
     let other = Setup { mask: MaskChoice { threshold_m: 0.004, ..setup().mask }, ..setup() };
     assert!(known(&dataset, &other, &models(&cache)).unwrap().iter().all(|s| s.grasps.is_empty()));
+}
+
+/// The studio as it stands when nothing is left to compute.
+fn studio(data: &Path, home: &Path, commands: Vec<Command>) -> State {
+    let services = LiveServices::with_config_folder(Some(home.to_owned()));
+    let (mut state, mut runtime) = (State::default(), Runtime::inline(Arc::new(services)));
+    runtime.start(&mut state, Some(Place::Path(data.to_owned())));
+    runtime.settle(&mut state);
+    runtime.tick(&mut state, vec![ViewCommand::ShowPanes([Pane::Table].into()).into()]);
+    runtime.settle(&mut state);
+    runtime.tick(&mut state, commands);
+    runtime.settle(&mut state);
+    state
+}
+
+#[test]
+fn the_studio_shows_the_scores_of_the_last_time_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, home) = (folder.path().join("data"), folder.path().join("home"));
+    write(&data, 0..1);
+    assert!(studio(&data, &home, Vec::new()).table.scores.sources.is_empty());
+    let made = studio(&data, &home, vec![EvaluateCommand::All.into()]);
+    let table = made.table.result.as_ref().expect("a table as well");
+    assert_eq!((table.complete, table.setup.grasps_per_tool), (true, None));
+    let again = studio(&data, &home, Vec::new());
+    assert!(again.table.result.is_none());
+    let values = |state: &State| {
+        let sources = state.table.scores.sources.iter();
+        let of = |pair: u32| sources.clone().map(move |s| Figure::iter().map(|f| s.value(PairId(pair), f)).collect());
+        (0..2).flat_map(of).collect::<Vec<Vec<Option<f64>>>>()
+    };
+    assert_eq!(values(&again), values(&made));
+    assert!(values(&again).iter().all(|figures| figures[0].is_some()), "{:?}", values(&again));
 }
 
 #[test]

@@ -20,6 +20,7 @@ impl State {
         list.selection();
         list.seeds();
         list.thumbnails();
+        list.scores();
         list.neighbors();
         list.list
     }

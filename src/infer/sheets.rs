@@ -60,6 +60,11 @@ impl Sheets {
         keys.into_iter().map(|key| lines.get(key).cloned()).collect()
     }
 
+    /// Whether nothing is in a sheet.
+    pub fn is_empty(&self, sheet: &str) -> bool {
+        self.lock().read(sheet).lines.is_empty()
+    }
+
     /// Puts values (without line breaks) under keys (without spaces). What the disk refuses is said in the log and kept
     /// until the program ends.
     pub fn put(&self, sheet: &str, values: impl IntoIterator<Item = (String, String)>) {

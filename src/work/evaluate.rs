@@ -155,7 +155,7 @@ pub fn evaluate(
     if total == 0 {
         return Err(TaskError::new(WHAT, "the data set has no pairs"));
     }
-    let book = Kept::open(dataset, setup, &models, &sheets, &work);
+    let book = Kept::open(dataset, setup, &models, &sheets, &work, false);
     let missing = |tool: &ToolWork| ToolWork {
         tool: tool.tool.clone(),
         ids: tool.ids.iter().copied().filter(|id| !book.is_whole(*id)).collect(),
@@ -246,7 +246,7 @@ pub fn known(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Resul
     let sheets = models.sheets().clone();
     let models = Models::open(setup, dataset, models)?;
     let work = load::plan(dataset, setup);
-    let book = Kept::open(dataset, setup, &models, &sheets, &work);
+    let book = Kept::open(dataset, setup, &models, &sheets, &work, true);
     let mut scores = models.empty_scores();
     for (at, scores) in scores.iter_mut().enumerate() {
         let entries = work.iter().flat_map(|tool| book.of(at, &tool.ids));

@@ -124,9 +124,18 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// Looks up what is known of some grasps.
-    pub(super) fn open(dataset: &Dataset, setup: &Setup, models: &Models, sheets: &Arc<Sheets>, work: &[ToolWork]) -> Self {
-        let names: Vec<String> = models.methods.iter().map(|method| sheet(dataset, setup, models, &method.recipe(setup))).collect();
+    /// Looks up what is known of some grasps; `only_known`: no file is read where nothing is known of any.
+    pub(super) fn open(
+        dataset: &Dataset,
+        setup: &Setup,
+        models: &Models,
+        sheets: &Arc<Sheets>,
+        work: &[ToolWork],
+        only_known: bool,
+    ) -> Self {
+        let names: Vec<String> =
+            models.methods.iter().map(|method| sheet(dataset, setup, models, &method.recipe(setup))).collect();
+        let work = if only_known && names.iter().all(|name| sheets.is_empty(name)) { &[] } else { work };
         let labels = Labeled::of(dataset, setup);
         let files = Files::new(sheets.clone());
         let mut keys = BTreeMap::new();

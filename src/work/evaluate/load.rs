@@ -79,8 +79,7 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
                 if cx.cancel.is_cancelled() {
                     return;
                 }
-                let loaded: Vec<Result<Case, Skipped>> =
-                    ids.par_iter().map(|&id| load(dataset, labels, id)).collect();
+                let loaded: Vec<Result<Case, Skipped>> = ids.par_iter().map(|&id| load(dataset, labels, id)).collect();
                 let mut cases = Cases { good: Vec::new(), bad: Vec::new() };
                 for one in loaded {
                     match one {

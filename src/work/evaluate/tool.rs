@@ -216,7 +216,8 @@ impl Tool {
             let known = book.of(at, ids);
             let spans = known.iter().flat_map(|(_, entry)| entry.spans.iter().copied().flatten());
             let range = width(pending.iter().flat_map(|p| &p.images).filter_map(|i| span(&i.prediction)).chain(spans));
-            let (mut kept, stale): (Vec<_>, Vec<_>) = known.into_iter().partition(|(_, entry)| entry.is_of_range(range));
+            let (mut kept, stale): (Vec<_>, Vec<_>) =
+                known.into_iter().partition(|(_, entry)| entry.is_of_range(range));
             // The lab's SSIM takes its range from all predictions of the tool: with others beside them it is another.
             let mut fresh = redone(stale, range, at, again);
             let class = self.class;
@@ -299,7 +300,8 @@ fn redone(
         .filter(|(_, entry, images)| entry.score.images.len() == images.len())
         .collect();
     let anew = |(id, mut entry, images): (PairId, Entry, Vec<Image>)| {
-        let found = guarded(|| Ok(images.into_iter().map(|i| finished(i, None, ranges(range, false), false)).collect()));
+        let found =
+            guarded(|| Ok(images.into_iter().map(|i| finished(i, None, ranges(range, false), false)).collect()));
         let found: Vec<ImageScore> = found.ok()?;
         for (known, new) in entry.score.images.iter_mut().zip(found) {
             (known.ssim, known.ssim_noise_free) = (new.ssim, new.ssim_noise_free);
@@ -312,11 +314,7 @@ fn redone(
 
 /// The ranges of the SSIM: the lab's, and the fixed one.
 fn ranges(range: f64, assumed: bool) -> [SsimRange; 2] {
-    if assumed {
-        [SsimRange::Explicit(1.0); 2]
-    } else {
-        [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)]
-    }
+    if assumed { [SsimRange::Explicit(1.0); 2] } else { [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)] }
 }
 
 /// A grasp with its image figures, and whether it is only for this table; else its pair and what failed.
