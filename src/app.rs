@@ -28,7 +28,6 @@ pub mod jobs;
 pub mod keys;
 pub mod labels;
 pub mod library;
-pub mod metrics;
 pub mod pane;
 pub mod predict;
 pub mod results;

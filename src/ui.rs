@@ -30,6 +30,7 @@ mod pane;
 mod poses;
 mod results;
 mod saved;
+mod scatter;
 mod scene;
 mod scene_view;
 mod screenshot;

@@ -57,6 +57,7 @@ fn how(action: Action) -> How {
         A::FitPairs => Verb(&["adapt", "demo", "--out", "folder"]),
         A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
+        A::PredictAll => Verb(&["evaluate", "demo"]),
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
         A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),

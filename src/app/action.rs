@@ -113,7 +113,7 @@ actions! {
     FirstSample, Navigate, "First sample", "Shows the first pair of the list", [plain(K::Home)];
     LastSample, Navigate, "Last sample", "Shows the last pair of the list", [plain(K::End)];
     NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift(K::N)];
-    NextWorst, Navigate, "Next worst", "Shows the pair that comes out worst in the results table, then the next worse one", [plain(K::N)];
+    NextWorst, Navigate, "Next worst", "Shows the pair that is worst by the chosen score, then the next worse one", [plain(K::N)];
     OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)];
     BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)];
     FindSample, Navigate, "Filter samples", "Moves the keyboard to the filter of the list", [ctrl(K::F)];
@@ -125,6 +125,7 @@ actions! {
     FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [];
     UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [];
     EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [];
+    PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [];
     ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
     NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)];
@@ -285,7 +286,7 @@ impl Action {
             Self::FirstSample => when(listed, LibraryCommand::First),
             Self::LastSample => when(listed, LibraryCommand::Last),
             Self::NextUnfinished => when(listed, LibraryCommand::NextUnfinished),
-            Self::NextWorst => when(listed && state.table.worst_by().is_some(), LibraryCommand::NextWorst),
+            Self::NextWorst => when(listed && state.table.by().is_some(), LibraryCommand::NextWorst),
             Self::OtherFinger => does(ViewCommand::SelectFinger(state.other_finger())),
             Self::BothFingers => does(ViewCommand::ShowBothFingers(!state.selection.both_fingers)),
             Self::FindSample => {
@@ -302,6 +303,10 @@ impl Action {
             Self::EvaluateDataset => {
                 let ready = state.evaluation_setup().is_some() && state.evaluating().is_none();
                 when(ready, EvaluateCommand::Start)
+            }
+            Self::PredictAll => {
+                let ready = state.scores_key().is_some() && state.evaluating().is_none();
+                when(ready, EvaluateCommand::All)
             }
             Self::ExportTable => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder)),
             Self::RunSeeds => {
@@ -320,6 +325,8 @@ impl Action {
                     does(command)
                 } else if state.tasks.demanded.iter().any(|r| matches!(r, Request::Basin(_))) {
                     does(InspectCommand::StopBasin)
+                } else if state.library.brush.is_some() && state.tasks.running.is_empty() {
+                    does(LibraryCommand::Brush(None))
                 } else if state.seeds_to_come() > 0 {
                     does(SeedsCommand::Run(false))
                 } else {

@@ -108,6 +108,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             predict::refit::arrived(state, &statistics, saved, effects);
         }
         Answer::Progressed(ticket, progress) => {
+            evaluate::progressed(state, ticket, &progress);
             if let Some(task) = state.tasks.running.get_mut(&ticket) {
                 task.progress = progress;
             }
@@ -181,7 +182,10 @@ fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
         state.library.opening = None;
         state.library.failure = Some(err.clone());
     }
-    state.table.running.take_if(|running| *running == ticket);
+    if state.table.running.take_if(|running| *running == ticket).is_some() {
+        // What was scored before it stopped is kept.
+        state.table.round += 1;
+    }
     state.log.error(err);
 }
 

@@ -2,12 +2,15 @@
 
 pub mod state;
 
-pub use state::{Follow, Library, OpenDataset, Place, Sort};
+pub use state::{Follow, Library, OpenDataset, Place, Sort, short_name};
 
+use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::adapt::AdaptState;
 use super::effect::Effect;
+use super::evaluate::state::ScoreChoice;
 use super::keys::DatasetSeq;
 use super::labels::state::{Document, Review};
 use super::results::{Request, Results};
@@ -35,6 +38,10 @@ pub enum LibraryCommand {
     SetToolFilter(Option<String>),
     /// Sorts the list.
     SetSort(Sort),
+    /// Sorts it by a score.
+    SetScore(ScoreChoice),
+    /// Shows only these pairs, or all.
+    Brush(Option<Arc<BTreeSet<PairId>>>),
     /// The rows of the list that are on screen.
     ShowRows(Range<usize>),
     /// Shows a pair.
@@ -47,7 +54,7 @@ pub enum LibraryCommand {
     Last,
     /// Shows the next of the list whose review is not finished, going round.
     NextUnfinished,
-    /// Selects the next worst pair of the results table; the list is then in that order.
+    /// Selects the next worst pair by the chosen score; the list is then in that order.
     NextWorst,
     /// Marks the selected pair as done and shows the next unfinished one.
     DoneAndNext,
@@ -75,6 +82,15 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         }
         LibraryCommand::SetSort(sort) => {
             state.library.sort = sort;
+            state.reorder();
+        }
+        LibraryCommand::SetScore(choice) => {
+            state.table.chosen = choice;
+            state.library.sort = Sort::Score;
+            state.reorder();
+        }
+        LibraryCommand::Brush(brush) => {
+            state.library.brush = brush;
             state.reorder();
         }
         LibraryCommand::ShowRows(rows) => state.library.rows = rows,
@@ -149,11 +165,14 @@ fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
 }
 
 fn select_next_worst(state: &mut State, effects: &mut Vec<Effect>) {
-    if state.library.sort.figure().is_some() {
+    if state.table.by().is_none() {
+        return;
+    }
+    if state.library.sort == Sort::Score && !state.table.chosen.best_first {
         return step_by(state, 1, effects);
     }
-    let Some(figure) = state.table.worst_by() else { return };
-    state.library.sort = Sort::worst(figure);
+    state.library.sort = Sort::Score;
+    state.table.chosen.best_first = false;
     state.reorder();
     select_row(state, 0, effects);
 }
@@ -207,8 +226,10 @@ pub(super) fn show(
     let before = state.entry().map(|entry| entry.name.clone());
     let same_place = state.library.open.as_ref().is_some_and(|open| open.place == place);
     state.results = Results::default();
-    state.table.set_result(None);
+    state.table.result = None;
+    state.table.scores = Arc::default();
     state.table.running = None;
+    state.library.brush = None;
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.history.clear();
     state.tasks.failed.clear();

@@ -38,8 +38,8 @@ pub enum Dock {
     Right(u8),
 }
 
-/// What is computed while a pane is on screen. Everything but [`Need::Thumbnails`] is of the selected pair and begins
-/// with its tensors and labels.
+/// What is computed while a pane is on screen. Everything but [`Need::Thumbnails`] and [`Need::Scores`] is of the
+/// selected pair and begins with its tensors and labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
     /// Nothing besides the tensors and labels.
@@ -72,6 +72,8 @@ pub enum Need {
     Basin,
     /// Small pictures of the pairs in the list.
     Thumbnails,
+    /// The scores that are kept of all pairs.
+    Scores,
 }
 
 /// The table, given to the macro `$with`: for each file of `ui` the panes that it draws.
@@ -79,7 +81,7 @@ macro_rules! panes {
     ($with:ident) => {
         $with! {
             browser { Browser {
-                "Samples", "The pairs of what is open", Form, needs [Thumbnails],
+                "Samples", "The pairs of what is open", Form, needs [Thumbnails, Scores],
                 at [Inspect Left, Align Left, Label Left, Evaluate Left]
             } }
             metrics { Metrics {
@@ -172,8 +174,12 @@ macro_rules! panes {
                 at [Evaluate Top(1)]
             } }
             table {
-                Table { "All metrics", "The metrics of all pairs so far", Form, needs [], at [Evaluate Top(1)] }
+                Table { "All metrics", "The scores of all pairs by every source", Form, needs [Scores], at [Evaluate Top(1)] }
             }
+            scatter { Scatter {
+                "Scatter", "Two scores of all pairs against each other, or one score by tool", Form, needs [Scores],
+                at [Evaluate Right(2)]
+            } }
             log { Log {
                 "Log", "What happened", Form, needs [],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
@@ -228,8 +234,8 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Need] {
                 use ImprintSource::{Measured, Predicted};
                 use Need::{
-                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Seeds, Steps,
-                    Thumbnails, Versus,
+                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
+                    Steps, Thumbnails, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }
@@ -268,7 +274,7 @@ impl Pane {
 
     /// Whether it shows something of the selected pair.
     pub fn is_of_pair(self) -> bool {
-        self.needs().iter().any(|need| *need != Need::Thumbnails)
+        self.needs().iter().any(|need| !matches!(need, Need::Thumbnails | Need::Scores))
     }
 }
 

@@ -33,6 +33,7 @@ pub mod prediction;
 pub mod preview;
 pub mod run;
 pub mod sample;
+pub mod scores;
 pub mod thumbnail;
 pub mod tool;
 pub mod versus;
@@ -252,6 +253,8 @@ results! {
     Inspection(inspection::InspectionKey) in inspections, 64 * MIB;
     /// Where starts lead.
     Basin(basin::BasinKey) in basins, 32 * MIB;
+    /// The scores that are kept of all pairs.
+    Scores(scores::ScoresKey) in scores, 64 * MIB;
     /// A small picture of a pair's measured imprint (right finger, else left).
     Thumbnail(thumbnail::ThumbnailKey) in thumbnails, 32 * MIB;
 }

@@ -21,6 +21,7 @@ impl State {
         list.versus();
         list.seeds();
         list.thumbnails();
+        list.scores();
         list.neighbors();
         list.list
     }

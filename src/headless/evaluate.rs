@@ -39,7 +39,7 @@ pub(super) struct EvaluateArgs {
     /// Whose images are compared. Angles always come from the contact of both fingers.
     #[arg(long, value_enum, default_value_t = Fingers::Both)]
     fingers: Fingers,
-    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
+    /// Neither look for predictions and figures that were made before (by the studio, too), nor keep those made now.
     #[arg(long)]
     no_cache: bool,
     /// Take only this many grasps of each tool, spread evenly.

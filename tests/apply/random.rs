@@ -15,6 +15,7 @@ use touch2touch::app::command::{
     LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest,
     ViewCommand, WorkbenchCommand,
 };
+use touch2touch::app::evaluate::ScoreChoice;
 use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{
@@ -34,6 +35,7 @@ use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis
 use touch2touch::domain::align::basin::Plane;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::diffusion::GenerateConfig;
+use touch2touch::domain::evaluation::Figure;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::hand::{HandAxis, HandPose};
@@ -265,9 +267,15 @@ draws! {
         1 Open(place()),
         1 Reload,
         1 ForgetRecent(place()),
-        1 SetFilter(select(vec![String::new(), "tool_a".into(), "is:todo".into(), "nothing like it".into()])),
+        1 SetFilter(select(vec![String::new(), "tool_a".into(), "is:todo".into(), "angle>5".into(), "nothing like it".into()])),
         1 SetToolFilter(proptest::option::of(Just("tool_b".to_owned()))),
         1 SetSort(any_of::<Sort>()),
+        1 SetScore((any::<bool>(), proptest::option::of(any_of::<Figure>())).prop_map(|(best_first, figure)| ScoreChoice {
+            figure,
+            best_first,
+            ..ScoreChoice::default()
+        })),
+        1 Brush(proptest::option::of(pair().prop_map(|pair| Arc::new([pair].into())))),
         1 ShowRows((0usize..20, 0usize..40).prop_map(|(a, b)| a..b)),
         4 Select(pair()),
         1 Step(any::<i64>()),
@@ -355,6 +363,7 @@ draws! {
         1 Grasps(proptest::option::of(0usize..3)),
         1 Published(any::<bool>()),
         1 Start,
+        1 All,
         1 Export(Just(PathBuf::from("table"))),
     }
     export: ExportCommand {
