@@ -117,6 +117,7 @@ impl Wanted<'_> {
                 self.basin();
             }
         }
+        self.predictions_ahead();
         if state.needs(Need::Ledger) {
             self.ledger(pair.finger(state.selection.finger));
         }

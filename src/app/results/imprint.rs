@@ -138,6 +138,7 @@ impl State {
     /// The imprint shown for one finger, meters, raw bubble orientation.
     pub fn imprint(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
         match self.imprint_key(source, finger) {
+            Err(Absent::NoPrediction) if self.ahead(finger).is_some() => Lookup::Waiting,
             Err(absent) => Lookup::Absent(absent),
             Ok(ImprintKey::Measured(_)) => self.bubble(finger).and_then(Absent::NoBubble, |b| Some(&b.imprint)),
             Ok(ImprintKey::Predicted(recipe, shift)) => self.look(MetersKey(recipe, shift)).value(),
