@@ -7,6 +7,7 @@ pub mod live;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::keys::{PredictionKey, TouchKey};
 use super::labels::state::{PairLabels, Review};
@@ -208,6 +209,11 @@ pub trait Services: Send + Sync {
         cx: &JobCx,
     ) -> Result<(Adapted, Option<BundleInfo>), TaskError> {
         Ok((adapt::adapt(dataset, setup, &Models::new(None), cx)?, None))
+    }
+
+    /// How long a pair stays on screen before it is predicted without being asked for.
+    fn patience(&self) -> Duration {
+        Duration::ZERO
     }
 
     /// The stored settings (defaults where there are none), and what was wrong if they were set aside.

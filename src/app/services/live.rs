@@ -6,6 +6,7 @@ mod follow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::super::keys::{PredictionKey, TouchKey};
 use super::super::labels::state::{PairLabels, Review};
@@ -37,6 +38,8 @@ use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
 use crate::work::tool::tool_file;
 
+/// Longer than a key that is held down leaves a pair on screen.
+const PATIENCE: Duration = Duration::from_millis(150);
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";
 /// Where a settings file that cannot be used is put.
@@ -210,6 +213,10 @@ impl Services for LiveServices {
 
     fn evaluate(&self, dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
         evaluate::evaluate(dataset, setup, &self.models, cx)
+    }
+
+    fn patience(&self) -> Duration {
+        PATIENCE
     }
 
     fn known_scores(&self, dataset: &Dataset, setup: &Setup) -> Result<Vec<Scores>, TaskError> {
