@@ -7,13 +7,14 @@ use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::library::Place;
 use touch2touch::app::settings::{ColorRange, Theme, Workspace};
 use touch2touch::app::state::State;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::rig::lab;
 use touch2touch::io::images;
 
-use super::rig::Rig;
+use super::rig::{Rig, write_dataset};
 
 const SIZE: [f32; 2] = [1280.0, 800.0];
 
@@ -126,18 +127,22 @@ fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a
 
 #[test]
 fn a_case_is_saved_and_opened_elsewhere_to_the_same_picture_in_eight_actions() {
-    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
-    rig.send(LibraryCommand::Select(PairId(4)));
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("grasps");
+    write_dataset(&data, 2);
+    let Some(mut rig) = Rig::live(SIZE, Place::Path(data)) else { return };
+    rig.send(LibraryCommand::Select(PairId(3)));
     rig.predicted();
     rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
     rig.send(LabelsCommand::AdoptAutomatic);
     rig.send(ViewCommand::SelectFinger(lab::LEFT));
     rig.send(SettingsCommand::SetRange(ColorRange { min_m: 0.001, max_m: 0.012, locked: true }));
-    let file = rig.data.join("grasp.t2tcase");
+    let file = folder.path().join("grasp.t2tcase");
     let mut actions = rig.clicks(&["Open", "Save case…"]) + rig.take_to(&file);
     assert!(file.is_file(), "{:?}", rig.harness.state().state().log.entries.back());
 
-    let Some(mut other) = Rig::new(SIZE, 1) else { return };
+    let Some(mut other) = Rig::live(SIZE, Place::Demo) else { return };
+    other.send(SettingsCommand::DismissHint);
     actions += other.clicks(&["Open", "Path…"]) + other.take_to(&file);
     assert!(actions <= 8, "{actions}");
     other.shoot("case-elsewhere");

@@ -157,7 +157,7 @@ impl Runtime {
             }
             Effect::ExportTable { ticket, evaluation, published, folder } => {
                 let body = Box::new(move |_: &JobCx| {
-                    let folder = evaluate::export(&evaluation, published, &folder)?;
+                    let folder = evaluate::export(&evaluation, published, &absolute(folder))?;
                     let line = format!("Wrote evaluation.csv, .md, .tex and .json to {}", folder.display());
                     Ok(Answer::Saved(ticket, line, folder))
                 });
@@ -228,6 +228,7 @@ impl Runtime {
             }
             Effect::ExportMasks { ticket, source, labels, folder } => {
                 let body = Box::new(move |cx: &JobCx| {
+                    let folder = absolute(folder);
                     let line = source.export_masks(&labels, &folder, cx)?;
                     Ok(Answer::Saved(ticket, line, folder))
                 });
