@@ -15,6 +15,7 @@ mod basin;
 mod browser;
 mod cx;
 mod dialogs;
+mod export;
 mod fuzzy;
 mod generate;
 mod images;

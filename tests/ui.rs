@@ -9,10 +9,13 @@ mod rig;
 
 mod adapt;
 mod chain;
+mod compare;
+mod export;
 mod follow;
 mod generate;
 mod inspect;
 mod job;
+mod jobs;
 mod results;
 mod scene;
 mod seeds;

@@ -1,5 +1,6 @@
 //! [`Answer`]: what the runtime answers, and what follows from it in the rooms.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::effect::Effect;
@@ -44,6 +45,10 @@ pub enum Answer {
     Progressed(Ticket, Progress),
     /// A job without a result is done, with a line for the log.
     Finished(Ticket, Option<String>),
+    /// A job is done that wrote something there, with a line for the log.
+    Saved(Ticket, String, PathBuf),
+    /// The system was asked to show a place.
+    Revealed,
     /// A job ended without a result.
     TaskFailed(Ticket, TaskError),
     /// A result that a pane asked for could not be made.
@@ -114,6 +119,10 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
                 state.log.info(line);
             }
         }
+        Answer::Saved(ticket, line, place) => {
+            state.tasks.running.remove(&ticket);
+            state.log.saved(line, place);
+        }
         Answer::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
         Answer::RequestFailed(seq, request, err) if is_open(state, seq) => failed_request(state, request, err),
         // An answer to anything but the last request: what was changed since is not on the disk yet.
@@ -135,7 +144,8 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         | Answer::RequestFailed(..)
         | Answer::Previewed(..)
         | Answer::LabelsSaved(..)
-        | Answer::SettingsSaved => {}
+        | Answer::SettingsSaved
+        | Answer::Revealed => {}
     }
 }
 

@@ -15,6 +15,8 @@ pub enum Kind {
     Imprint(ImprintSource),
     /// Differences of imprints.
     Error,
+    /// Two imprints.
+    Versus,
     /// A 3D view of one side.
     Scene(ImprintSource),
     /// Steps that can be played.
@@ -54,6 +56,8 @@ pub enum Need {
     Ledger,
     /// Several seeds.
     Seeds,
+    /// Any two imprints against each other.
+    Versus,
     /// Cloud and pose of a side, in 3D.
     Scene(ImprintSource),
     /// The poses of both sides.
@@ -129,9 +133,13 @@ macro_rules! panes {
                     "Error", "Predicted minus measured: blue too shallow, red too deep", Error, needs [Comparison],
                     at [Inspect Bottom(1), Evaluate Bottom(3)]
                 }
+                Compare {
+                    "Compare", "Any two imprints of the touch against each other: side by side, wiped, subtracted, in 3D",
+                    Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3)]
+                }
             }
             ledger { Ledger {
-                "Depth chain", "Everything between the decoder and the meters, stage by stage",
+                "Depth chain" as "Chain", "Everything between the decoder and the meters, stage by stage",
                 Form, needs [Ledger], at [Inspect Bottom(1), Evaluate Bottom(3)]
             } }
             seeds { Seeds {
@@ -218,7 +226,7 @@ macro_rules! define {
             /// What kind of thing that is.
             pub fn kind(self) -> Kind {
                 use ImprintSource::{Measured, Predicted};
-                use Kind::{Color, Error, Form, Imprint, Map, Scene, Steps};
+                use Kind::{Color, Error, Form, Imprint, Map, Scene, Steps, Versus};
                 match self { $($( Self::$pane => $kind, )*)* }
             }
 
@@ -227,7 +235,7 @@ macro_rules! define {
                 use ImprintSource::{Measured, Predicted};
                 use Need::{
                     Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
-                    Steps, Thumbnails,
+                    Steps, Thumbnails, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }

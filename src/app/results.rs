@@ -28,6 +28,7 @@ pub mod labels;
 pub mod layers;
 pub mod ledger;
 pub mod mask;
+pub mod picture;
 pub mod pose;
 pub mod prediction;
 pub mod preview;
@@ -36,6 +37,7 @@ pub mod sample;
 pub mod scores;
 pub mod thumbnail;
 pub mod tool;
+pub mod versus;
 
 pub use cache::Cache;
 pub use preview::Preview;
@@ -226,6 +228,14 @@ results! {
     Color(imprint::ColorKey) in colors, 32 * MIB;
     /// A prediction against the measurement.
     Comparison(comparison::ComparisonKey) in comparisons, 32 * MIB;
+    /// The prediction of another program that lies beside a pair as a picture.
+    Picture(picture::PictureKey) in pictures, 16 * MIB;
+    /// A prediction that is compared with something: kept with the others.
+    Compared(versus::ComparedKey);
+    /// Any two imprints of a touch against each other.
+    Versus(versus::VersusKey) in versus, 32 * MIB;
+    /// How far the points of one cloud lie from another.
+    Apart(versus::ApartKey) in apart, 16 * MIB;
     /// The depth chain of a prediction, stage by stage.
     Ledger(ledger::LedgerKey) in ledgers, 24 * MIB;
     /// What a GelSlim image leaves open.

@@ -23,7 +23,7 @@ use super::sample::Scale;
 
 pub use figure::{Condition, Figure};
 pub use paper::paper_rows;
-pub use write::{Column, NOTES, columns, conventions, csv, markdown, text};
+pub use write::{Column, NOTES, columns, conventions, csv, latex, markdown, text};
 
 /// The lab's peak of the PSNR, meters.
 pub const PEAK_M: f64 = 0.0225;

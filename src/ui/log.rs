@@ -18,9 +18,22 @@ fn color(p: &Palette, level: Level) -> Color32 {
     }
 }
 
-fn entry_ui(p: &Palette, ui: &mut Ui, entry: &Entry) {
+fn entry_ui(cx: &mut Cx<'_>, ui: &mut Ui, entry: &Entry) {
+    let p = cx.p;
     let count = if entry.count > 1 { format!(" ({} times)", entry.count) } else { String::new() };
     ui.add(egui::Label::new(RichText::new(format!("{}{count}", entry.text)).color(color(p, entry.level))).wrap());
+    if let Some(place) = &entry.place {
+        ui.horizontal(|ui| {
+            let show = ui.link(RichText::new("Show in its folder").size(12.0));
+            if show.on_hover_text(place.display().to_string()).clicked() {
+                cx.push(TasksCommand::Reveal(place.clone()));
+            }
+            let copy = ui.link(RichText::new("Copy the path").size(12.0));
+            if copy.on_hover_text(place.display().to_string()).clicked() {
+                ui.copy_text(place.display().to_string());
+            }
+        });
+    }
     if let Some(hint) = &entry.hint {
         ui.add(egui::Label::new(RichText::new(hint).size(12.0).color(p.text)).wrap());
     }
@@ -43,15 +56,16 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         }
         ScrollArea::vertical().stick_to_bottom(true).id_salt("log").show(ui, |ui| {
             for entry in &cx.state.log.entries {
-                entry_ui(cx.p, ui, entry);
+                entry_ui(cx, ui, entry);
             }
         });
     });
 }
 
-/// Warnings and errors that were not seen yet, over the lower right corner. They never block anything.
+/// Warnings, errors and what was saved, as far as they were not seen yet, over the lower right corner. They never block anything.
 pub(super) fn notices(cx: &mut Cx<'_>, ctx: &egui::Context) {
-    let unseen: Vec<Entry> = cx.state.log.unseen().filter(|e| e.level >= Level::Warning).cloned().collect();
+    let unseen: Vec<Entry> =
+        cx.state.log.unseen().filter(|e| e.level >= Level::Warning || e.place.is_some()).cloned().collect();
     if unseen.is_empty() {
         return;
     }
@@ -61,7 +75,7 @@ pub(super) fn notices(cx: &mut Cx<'_>, ctx: &egui::Context) {
         egui::Frame::popup(ui.style()).fill(cx.p.panel).inner_margin(12).show(ui, |ui| {
             ui.set_width(340.0);
             for entry in unseen.iter().rev().take(MOST) {
-                entry_ui(cx.p, ui, entry);
+                entry_ui(cx, ui, entry);
                 ui.add_space(4.0);
             }
             ui.horizontal(|ui| {
