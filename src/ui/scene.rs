@@ -94,6 +94,16 @@ impl Memory {
         serde_json::to_string(&self.views[source as usize].camera).unwrap_or_default()
     }
 
+    /// Lets both sides look from where [`Self::camera_text`] says; what is no camera changes nothing.
+    pub(super) fn look_as(&mut self, text: &str) {
+        if let Some(camera) = serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid) {
+            for view in &mut self.views {
+                view.camera = camera;
+                view.placed = true;
+            }
+        }
+    }
+
     /// Where a point of the grasp frame (meters) appeared when a side was last drawn.
     pub(super) fn on_screen(&self, source: ImprintSource, point: DVec3) -> Option<egui::Pos2> {
         self.views[source as usize].on_screen(point)
