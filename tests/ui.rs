@@ -10,6 +10,7 @@ mod rig;
 mod adapt;
 mod chain;
 mod follow;
+mod frames;
 mod generate;
 mod inspect;
 mod job;

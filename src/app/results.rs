@@ -155,6 +155,16 @@ macro_rules! results {
             }
         }
 
+        impl Results {
+            /// Bytes that the caches hold now.
+            pub fn bytes(&self) -> usize {
+                0 $( $( + self.$cache.bytes() )? )*
+            }
+
+            /// Bytes that the caches may hold together.
+            pub const BUDGET: usize = 0 $( $( + $budget )? )*;
+        }
+
         impl Request {
             /// Its job; `None` if an input is not there (any more).
             pub(super) fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Computed>> {

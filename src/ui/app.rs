@@ -12,6 +12,7 @@ use strum::IntoEnumIterator as _;
 
 use super::cx::{Cx, Shared};
 use super::dialogs::Purpose;
+use super::kept::Kept;
 use super::pane::{Docking, Panes};
 use super::scene_view::Device;
 use super::screenshot::Shot;
@@ -47,12 +48,22 @@ pub struct Options {
     pub reset: bool,
     /// Where pictures are written; `None` = the user's folder for pictures.
     pub screenshots: Option<PathBuf>,
+    /// Whether every frame is painted whole even where a program draws (for measuring what [`super::kept`] saves).
+    pub whole_frames: bool,
 }
 
 impl Options {
     /// The usual ones.
     pub fn new(services: SharedServices, open: Option<PathBuf>) -> Self {
-        Self { services, open, inline: false, native_dialogs: true, reset: false, screenshots: None }
+        Self {
+            services,
+            open,
+            inline: false,
+            native_dialogs: true,
+            reset: false,
+            screenshots: None,
+            whole_frames: false,
+        }
     }
 }
 
@@ -88,6 +99,11 @@ impl StudioApp {
         };
         if let Err(why) = &device {
             log::error!("No 3D views: {why}");
+        }
+        if let Some(state) = cc.wgpu_render_state.as_ref().filter(|_| !options.whole_frames)
+            && let Err(error) = Kept::install(&cc.egui_ctx, state)
+        {
+            log::error!("Every frame is painted whole: {error}");
         }
         let ctx = cc.egui_ctx.clone();
         let (shot_sender, shots) = channel();
@@ -137,6 +153,11 @@ impl StudioApp {
     /// Pictures sent to the graphics card so far.
     pub fn uploads(&self) -> u64 {
         self.shared.textures.uploads
+    }
+
+    /// Pixels of the window painted so far, where only what changed is painted. For tests.
+    pub fn painted(&self, ctx: &egui::Context) -> Option<u64> {
+        ctx.with_plugin(|kept: &mut Kept| kept.painted())
     }
 
     /// Whether nothing runs, nothing waits and nothing is to be executed.

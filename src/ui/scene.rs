@@ -62,6 +62,8 @@ pub(super) struct Memory {
     mesh: Option<SceneMesh>,
     /// Correspondences of the step that the time machine shows.
     step_lines: Option<StepLines>,
+    /// The pass in which a camera was last moved, and whose.
+    moved: Option<(u64, ImprintSource)>,
     /// Counts what was made for the renderer.
     revision: u64,
 }
@@ -188,9 +190,15 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         other.camera = camera;
         other.placed |= memory.clouds[1 - source as usize].is_some();
     }
-    scene.moving = output.moved;
+    // A linked camera may be drawn before the one that leads it: it moves in the next frame.
+    let pass = ui.ctx().cumulative_pass_nr();
     if output.moved {
-        // Points were thinned out while moving: draw all of them once it rests.
+        memory.moved = Some((pass, source));
+    }
+    let linked = state.settings.cameras_linked;
+    scene.moving = memory.moved.is_some_and(|(at, by)| pass <= at + 1 && (by == source || linked));
+    if scene.moving {
+        // Moving views are drawn coarsely: draw all there is once they rest.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(120));
     }
     memory.views[source as usize].draw(ui, device, &output, &scene);
