@@ -14,6 +14,7 @@ mod frames;
 mod generate;
 mod inspect;
 mod job;
+mod palette;
 mod results;
 mod scene;
 mod seeds;

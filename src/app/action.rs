@@ -229,6 +229,52 @@ impl Action {
         )
     }
 
+    /// Other words that people look for it by, in small letters.
+    pub fn words(self) -> std::str::SplitWhitespace<'static> {
+        let text = match self {
+            Self::OpenFolder => "load directory data dataset browse file",
+            Self::OpenDemo => "example sample simulated simulator",
+            Self::Follow => "live watch camera stream",
+            Self::Reload => "refresh again",
+            Self::ExportMasks => "unet training labels npy save",
+            Self::NextWorst => "bad largest error outlier failure hardest",
+            Self::NextUnfinished => "todo open unlabeled remaining",
+            Self::FindSample => "search list find",
+            Self::Generate => "predict prediction run inference diffusion",
+            Self::RunSeeds => "ensemble uncertainty spread repeat",
+            Self::FitPairs => "adapt calibrate tune finetune train",
+            Self::EvaluateDataset => "score metrics benchmark results table",
+            Self::ExportTable => "csv markdown json save results latex",
+            Self::CancelJobs => "stop abort interrupt",
+            Self::NextShift => "depth offset gain millimeters scale",
+            Self::Refit => "statistics mean deviation shift",
+            Self::AdoptAutomatic => "use copy automatic mask",
+            Self::ResetMask => "clear delete mask",
+            Self::Undo => "revert back",
+            Self::BrushSmaller | Self::BrushLarger => "pen size radius width",
+            Self::RunPose => "retry recompute register registration icp failed",
+            Self::NextPoseEngine => "icp gicp register method algorithm",
+            Self::PoseTool => "hand gizmo drag manual move",
+            Self::MeasureDistance | Self::MeasureAngle => "ruler mm length degrees",
+            Self::LockRange | Self::RangeOnce | Self::ResetRange => "colorbar colormap scale limits minimum maximum mm",
+            Self::Fit => "zoom center home view",
+            Self::Section => "clip slice plane cross",
+            Self::EyeDome => "edl shadow",
+            Self::Parallel => "orthographic perspective camera",
+            Self::Footprint => "rectangle outline crop",
+            Self::SwitchTheme => "mode bright black white appearance",
+            Self::DepthChain => "ledger trace pipeline stages",
+            Self::Screenshot | Self::SavePane => "png picture image figure save export",
+            Self::CopyPane => "png picture image figure clipboard",
+            Self::CopyHovered => "clipboard number",
+            Self::ShortcutSheet => "keys keyboard help bindings hotkeys",
+            Self::ResetSettings => "defaults factory settings",
+            Self::ResetWorkspace => "layout panes windows default",
+            _ => "",
+        };
+        text.split_whitespace()
+    }
+
     /// Its main shortcut.
     pub fn shortcut(self) -> Option<Shortcut> {
         self.shortcuts().first().copied()
