@@ -341,7 +341,7 @@ impl Action {
             Self::ExportTable => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder)),
             Self::RunSeeds => {
                 let possible = state.can_generate().is_ok() && state.selection.panes.contains(&Pane::Seeds);
-                when(possible, SeedsCommand::Run(!state.seeds.running))
+                when(possible, SeedsCommand::Run(!state.seeds_running()))
             }
             Self::LockSeed => {
                 let mut generate = settings.generate.clone();

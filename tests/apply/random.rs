@@ -264,6 +264,7 @@ draws! {
     seeds: SeedsCommand {
         1 Count(0usize..4),
         1 Run(any::<bool>()),
+        1 EveryPair(any::<bool>()),
     }
     labels: LabelsCommand {
         6 BeginStroke(finger(), source(), position(), any::<bool>()),
