@@ -175,10 +175,10 @@ actions! {
     RangeOnce, View, "Fit the color range once", "Sets the color range from what is shown", [plain(K::C)];
     ResetRange, View, "Reset the color range", "Sets the color range to 0 to 18 mm", [shift(K::C)];
     Fit, View, "Fit", "Fits images and 3D views to their panes", [plain(K::Num0)];
-    CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl_alt(K::Num1)];
-    CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl_alt(K::Num2)];
-    CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl_alt(K::Num3)];
-    CameraTop, View, "View from the top", "Looks along the tool", [ctrl_alt(K::Num4)];
+    CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl(K::Num1)];
+    CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl(K::Num2)];
+    CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl(K::Num3)];
+    CameraTop, View, "View from the top", "Looks along the tool", [ctrl(K::Num4)];
     NextLayer, View, "Next layer", "Goes through the layers of the 3D panes: none, residuals, reasons, distance, lines", [plain(K::V)];
     AnimateWeakest, View, "Animate weak direction", "Moves the tool to and fro by at most 2 mm and 2° in the direction that the contact determines least", [];
     BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [];
