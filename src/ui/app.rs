@@ -28,7 +28,7 @@ use crate::app::library::Place;
 use crate::app::pane::Kind;
 use crate::app::runtime::Runtime;
 use crate::app::services::SharedServices;
-use crate::app::settings::{Theme, Workspace};
+use crate::app::settings::{Last, Theme, Workspace};
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
 use crate::domain::rig::SensorKind;
@@ -81,6 +81,8 @@ pub struct StudioApp {
     device: Result<Device, String>,
     inline: bool,
     first_prediction: bool,
+    /// Whether cameras and the large pane of the last run were looked for.
+    resumed: bool,
     applied_theme: Option<Theme>,
     applied_zoom: f32,
     folder: Option<PathBuf>,
@@ -131,6 +133,7 @@ impl StudioApp {
             device,
             inline: options.inline,
             first_prediction: false,
+            resumed: false,
             applied_theme: None,
             applied_zoom: 1.0,
             folder: options.screenshots,
@@ -221,6 +224,7 @@ impl StudioApp {
         }
         self.shared.saved.observe(&self.state.document.unsaved);
         self.first_prediction();
+        self.resume();
         let settings = &self.state.settings;
         if self.applied_theme != Some(settings.theme) {
             self.applied_theme = Some(settings.theme);
@@ -255,6 +259,31 @@ impl StudioApp {
                 self.inbox.push(Command::Predict(PredictCommand::Generate));
             }
         }
+    }
+
+    /// Once, as the first data set is there: cameras and the large pane as they were when it was last closed.
+    fn resume(&mut self) {
+        let Some(open) = self.state.library.open.as_ref().filter(|_| !self.resumed) else { return };
+        self.resumed = true;
+        let last = &self.state.settings.last;
+        if last.place.as_ref() == Some(&open.place) {
+            self.panes.memories.scene.resume(open.seq, &last.cameras);
+            self.panes.maximized = serde_json::from_str(&last.maximized).ok();
+        }
+    }
+
+    /// Keeps what is on screen for the next start; closing the window does it.
+    pub fn remember(&mut self) {
+        let state = &self.state;
+        let last = Last {
+            place: state.library.open.as_ref().map(|open| open.place.clone()),
+            pair: state.pair_name().to_owned(),
+            finger: state.selection.finger.index(),
+            both_fingers: state.selection.both_fingers,
+            cameras: self.panes.memories.scene.cameras(),
+            maximized: self.panes.maximized.and_then(|pane| serde_json::to_string(&pane).ok()).unwrap_or_default(),
+        };
+        self.inbox.push(Command::Settings(SettingsCommand::Remember(last)));
     }
 
     /// What only the window can do.
@@ -462,6 +491,7 @@ impl eframe::App for StudioApp {
     }
 
     fn on_exit(&mut self) {
+        self.remember();
         let commands = std::mem::take(&mut self.inbox);
         self.runtime.tick(&mut self.state, commands);
         self.runtime.tick(

@@ -88,6 +88,25 @@ impl Memory {
         }
     }
 
+    /// The cameras of both sides as text; empty where a view was not placed yet.
+    pub(super) fn cameras(&self) -> [String; 2] {
+        [ImprintSource::Measured, ImprintSource::Predicted].map(|side| match self.views[side as usize].placed {
+            true => self.camera_text(side),
+            false => String::new(),
+        })
+    }
+
+    /// Looks at a data set from where a text of [`Self::cameras`] says; what is no camera is left to be fitted.
+    pub(super) fn resume(&mut self, seq: DatasetSeq, cameras: &[String; 2]) {
+        self.fitted = Some(seq);
+        for (view, text) in self.views.iter_mut().zip(cameras) {
+            if let Some(camera) = serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid) {
+                view.camera = camera;
+                view.placed = true;
+            }
+        }
+    }
+
     /// The camera of a side, as text for the clipboard.
     pub(super) fn camera_text(&self, source: ImprintSource) -> String {
         serde_json::to_string(&self.views[source as usize].camera).unwrap_or_default()

@@ -25,7 +25,7 @@ use touch2touch::app::results::ambiguity::AmbiguityKey;
 use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::{
-    ColorMap, ColorRange, GenerateSettings, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
+    ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
     SceneLayer, SceneLook, Settings, Theme, Workspace,
 };
 use touch2touch::app::tasks::Ticket;
@@ -356,6 +356,7 @@ draws! {
         1 SetWorkspace(any_of::<Workspace>()),
         1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
         1 DismissHint,
+        1 Remember(Just(Last { pair: "nowhere".into(), finger: 7, ..Last::default() })),
         1 ResetSettings,
     }
     tasks: TasksCommand {
