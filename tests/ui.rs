@@ -9,6 +9,7 @@ mod rig;
 
 mod adapt;
 mod chain;
+mod daily;
 mod follow;
 mod frames;
 mod generate;
