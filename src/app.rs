@@ -4,7 +4,7 @@
 //! * [`command::Command`] is what can happen to it, by room; [`apply::apply`] is the only writer and is pure:
 //!   work and files come out as [`effect::Effect`]s.
 //! * A room is a feature ([`library`], [`follow`], [`view`], [`predict`], [`seeds`], [`labels`], [`inspect`],
-//!   [`workbench`], [`evaluate`], [`adapt`], [`settings`], [`tasks`]): its file has its commands and what they do,
+//!   [`workbench`], [`evaluate`], [`export`], [`adapt`], [`settings`], [`tasks`]): its file has its commands and what they do,
 //!   `state.rs` in its folder what it keeps and how views find it.
 //! * [`results`] is the table of what is computed: each kind with its recipe, its job and its look-up in one file.
 //! * [`pane`] is the table of the panes: titles, places, which file of the window draws each and what it needs.
@@ -20,6 +20,7 @@ pub mod apply;
 pub mod command;
 pub mod effect;
 pub mod evaluate;
+pub mod export;
 pub mod follow;
 pub mod history;
 pub mod inspect;
@@ -27,7 +28,6 @@ pub mod jobs;
 pub mod keys;
 pub mod labels;
 pub mod library;
-pub mod metrics;
 pub mod pane;
 pub mod predict;
 pub mod results;

@@ -30,6 +30,7 @@ pub mod mesh;
 pub mod metrics;
 pub mod moments;
 mod noise;
+pub mod picture;
 pub mod pose;
 pub mod postprocess;
 pub mod resample;

@@ -8,9 +8,12 @@ mod args;
 mod basin;
 mod bench;
 mod cache;
+mod compare;
 mod contact_mask;
 mod doctor;
 mod evaluate;
+mod export;
+mod figure;
 mod generate;
 mod guard;
 mod label;
@@ -68,6 +71,8 @@ enum Verb {
     Simulate(simulate::SimulateArgs),
     /// Predict Soft Bubble imprints from GelSlim images and compare them with the measured ones.
     Generate(generate::GenerateArgs),
+    /// Any two imprints of a pair against each other: measured, predictions, the mean of seeds, a stored picture.
+    Compare(Box<compare::CompareArgs>),
     /// Everything between the decoder and the meters, for one pair: stages, histograms, line against truth, what is odd.
     Ledger(Box<ledger::LedgerArgs>),
     /// Statistics of a dataset's predictions and measurements, for the shift `--shift refit`.
@@ -81,6 +86,10 @@ enum Verb {
     Pose(pose::PoseArgs),
     /// The paper's results table of a dataset: generators side by side, with the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
+    /// Draw pairs side by side for a paper: chosen pairs and panes as a grid with one range of colors, as PNG or SVG.
+    Figure(Box<figure::FigureArgs>),
+    /// Write a pair for other programs: its cloud (PLY), pose (JSON) and CAD model in the hand (STL).
+    Export(Box<export::ExportArgs>),
     /// Fits a generator to pairs of your own sensors, and says what it is worth on pairs that were left out.
     Adapt(Box<adapt::AdaptArgs>),
     /// Write training data for the networks: a dataset or, with `simulator` as PATH, simulated touches, as shards that
@@ -223,11 +232,14 @@ fn run(cli: Option<Cli>) -> VerbResult {
         }
         Some(Verb::Simulate(args)) => simulate::run(&args),
         Some(Verb::Generate(args)) => generate::run(&args),
+        Some(Verb::Compare(args)) => compare::run(&args),
         Some(Verb::Ledger(args)) => ledger::run(&args),
         Some(Verb::Stats(args)) => stats::run(&args),
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
+        Some(Verb::Figure(args)) => figure::run(&args),
+        Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Adapt(args)) => adapt::run(&args),
         Some(Verb::TrainingData(args)) => training_data::run(&args),
         Some(Verb::Basin(args)) => basin::run(&args),

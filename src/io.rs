@@ -17,6 +17,7 @@ pub mod masks;
 pub mod memory;
 pub mod names;
 pub mod npz;
+pub mod ply;
 pub mod pt;
 pub mod shards;
 pub mod simulated;

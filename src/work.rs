@@ -7,11 +7,13 @@
 //! * [`models`]: bundles found and loaded once; predictions, from the disk where they were made before.
 //! * [`imprint`], [`mask`], [`cloud`], [`pose`]: one step each. [`compare`], [`ledger`], [`layers`], [`ensemble`]: what
 //!   there is to know about their results.
+//! * [`figure`], [`pair_files`]: results as pictures for papers and as files for other programs.
 //! * [`evaluate`], [`statistics`], [`adapt`], [`export`], [`training_data`]: passes over a whole data set.
 //! * [`job`], [`error`]: how work is watched, stopped, and how it fails.
 
 pub mod adapt;
 pub mod bundles;
+pub(crate) mod canvas;
 pub mod cloud;
 pub mod compare;
 pub mod deviation;
@@ -19,6 +21,7 @@ pub mod ensemble;
 pub mod error;
 pub mod evaluate;
 pub mod export;
+pub mod figure;
 pub mod imprint;
 pub mod job;
 pub mod labels;
@@ -26,6 +29,7 @@ pub mod layers;
 pub mod ledger;
 pub mod mask;
 pub mod models;
+pub mod pair_files;
 pub mod pose;
 pub mod prediction;
 pub mod statistics;

@@ -8,15 +8,21 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
+use touch2touch::app::command::{
+    Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand,
+};
+use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, Versus, VersusMode};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Grid;
+use touch2touch::domain::postprocess::ShiftMode;
 use touch2touch::io::images;
+use touch2touch::work::subject::Subject;
 
 use crate::support::run;
 
@@ -41,6 +47,9 @@ fn how(action: Action) -> How {
         A::Follow => Verb(&["watch", "folder"]),
         // Labels are on the disk as soon as a verb ends.
         A::Save => Shell,
+        A::Figure => Verb(&["figure", "demo", "--pairs", "a,b", "--panes", "measured,error", "--out", "a.svg"]),
+        A::ExportMeasured => Verb(&["export", "demo", "--pair", "a", "--out", "folder"]),
+        A::ExportPredicted => Verb(&["export", "demo", "--pair", "a", "--imprint", "predicted", "--out", "folder"]),
         A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),
         A::Generate => Verb(&["generate", "demo", "--out", "folder"]),
         A::GenerateNewSeed | A::LockSeed => Options(&["generate", "demo", "--out", "folder", "--seed", "7"]),
@@ -48,7 +57,8 @@ fn how(action: Action) -> How {
         A::FitPairs => Verb(&["adapt", "demo", "--out", "folder"]),
         A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
-        A::ExportTable => Verb(&["evaluate", "demo", "--csv", "a.csv", "--markdown", "a.md"]),
+        A::PredictAll => Verb(&["evaluate", "demo"]),
+        A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
         A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),
         A::FillHoles => Verb(&["label", "demo", "--pair", "a", "--fill-holes"]),
@@ -81,10 +91,14 @@ fn how(action: Action) -> How {
         A::PoseTool | A::SixDof | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
         A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
         A::LockRange | A::RangeOnce | A::ResetRange | A::Fit | A::BothClouds | A::LinkCameras | A::Footprint => Window,
+        A::CompareMode | A::SwapCompared => {
+            Options(&["compare", "demo", "--pair", "a", "--a", "prediction:seed=7", "--b", "measured"])
+        }
         A::Section | A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera => Window,
         A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop | A::SwitchTheme => Window,
         A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace => Window,
         A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
+        // Image panes are drawn by `figure`; these are photographs of the window.
         A::SavePane | A::CopyPane => Window,
         A::Palette | A::ShortcutSheet | A::ResetSettings => Window,
     }
@@ -230,6 +244,39 @@ fn on_the_demo_the_studio_says_what_the_verbs_say() {
 }
 
 #[test]
+fn two_predictions_are_compared_by_one_function() {
+    let home = tempfile::tempdir().unwrap();
+    let (a, b) = ("prediction:seed=7,shift=raw", "mean:seeds=2");
+    let mut studio = Studio::open(Place::Demo, home.path());
+    studio.send(ViewCommand::ShowPanes([Pane::Compare].into_iter().collect()).into());
+    let versus = Versus { a: a.parse().unwrap(), b: b.parse().unwrap(), mode: VersusMode::default() };
+    studio.send(SettingsCommand::SetVersus(versus.clone()).into());
+    studio.send(LibraryCommand::Select(PairId(40)).into());
+    let state = &studio.state;
+    let report = json(&["compare", "demo", "--pair", state.pair_name(), "--a", a, "--b", b], home.path());
+    let fingers = report["fingers"].as_array().unwrap();
+    assert_eq!(fingers.len(), 2);
+    for (pad, finger) in state.rig().pads().zip(fingers) {
+        for (key, [one, other]) in [
+            ("a", [&versus.a, &Subject::Measured]),
+            ("b", [&versus.b, &Subject::Measured]),
+            ("a_b", [&versus.a, &versus.b]),
+        ] {
+            let found = state.subjects_compared(one, other, pad).ready().expect(key);
+            let seen = found.split.and_then(|split| split.seen.mae);
+            assert_eq!(finger[key]["psnr_db"], optional(found.psnr_db), "{key}");
+            assert_eq!(finger[key]["ssim"], optional(found.ssim), "{key}");
+            assert_eq!(finger[key]["mae_m"], number(found.mae_m), "{key}");
+            assert_eq!(finger[key]["seen_mae_m"], optional(seen), "{key}");
+        }
+    }
+    for (key, subject) in [("a_deg", &versus.a), ("b_deg", &versus.b)] {
+        let pose = state.subject_pose(subject).expect("a pose");
+        assert_eq!(report["poses"][key], number(pose.angle_rad.to_degrees()), "{key}");
+    }
+}
+
+#[test]
 fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
     let home = tempfile::tempdir().unwrap();
     let folder = lab_folder(home.path());
@@ -311,4 +358,102 @@ fn on_a_folder_of_pictures_the_figures_are_of_the_files_own_pixels_in_both() {
     }
     let found = assert_same(Place::Path(folder.clone()), folder.to_str().unwrap(), home.path(), 2);
     assert_eq!(found["comparison"], 2, "{found:?}");
+}
+
+#[test]
+fn figures_and_pictures_are_the_same_files_in_both() {
+    let home = tempfile::tempdir().unwrap();
+    let at = |name: &str| home.path().join(name);
+    let mut studio = Studio::open(Place::Demo, home.path());
+    studio.send(ViewCommand::ShowBothFingers(false).into());
+    let names: Vec<String> = {
+        let library = &studio.state.library;
+        let names = library.order.iter().take(2).filter_map(|pair| library.entry(*pair));
+        names.map(|entry| entry.name.clone()).collect()
+    };
+    let form = FigureForm { first: Some(2), scale: 1, ..FigureForm::default() };
+    studio.send(ExportCommand::SetForm(form).into());
+    studio.send(ExportCommand::Write(Output::Figure, at("studio.png")).into());
+    let picture = Output::Picture { pane: Pane::Predicted, scale: None, error_m: 0.004 };
+    studio.send(ExportCommand::Write(picture, at("studio")).into());
+    let entry = studio.state.log.entries.back().unwrap();
+    assert_eq!(entry.place, Some(at("studio.svg")), "{entry:?}");
+    let finger = studio.state.finger_name(studio.state.selection.finger).to_string();
+
+    let verb = |arguments: &[&str], file: &Path| {
+        let all = [&["figure", "demo", "--finger", &finger, "--scale", "1"], arguments].concat();
+        json(&[&all[..], &["--out", file.to_str().unwrap()]].concat(), home.path())
+    };
+    let said = verb(&["--pairs", &names.join(",")], &at("verb.png"));
+    assert_eq!((said["rows"].as_array().unwrap().len(), &said["range_mm"][1]), (2, &18.0.into()), "{said}");
+    let one = ["--panes", "predicted", "--pairs", studio.state.pair_name()];
+    verb(&one, &at("verb.svg"));
+    for ending in ["png", "svg"] {
+        let [a, b] = ["studio", "verb"].map(|by| std::fs::read(at(&format!("{by}.{ending}"))).unwrap());
+        assert!(a.len() > 5000 && a == b, "{ending}: {} and {} bytes", a.len(), b.len());
+    }
+    // What cannot be drawn is said before anything is predicted.
+    for wrong in [["--scale", "900"], ["--panes", "colors"], ["--range", "18..0"], ["--out", "a.gif"]] {
+        let arguments = [&["figure", "demo", "--pairs", &names[0], "--out", "a.png"], &wrong[..]].concat();
+        assert_eq!(run(&arguments, home.path()).status.code(), Some(2), "{wrong:?}");
+    }
+}
+
+#[test]
+fn a_pair_in_files_is_the_same_in_both() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
+    studio.predict(1);
+    studio.send(LabelsCommand::AdoptAutomatic.into());
+    let name = studio.state.pair_name().to_owned();
+    for source in ImprintSource::iter() {
+        let [by_studio, by_verb] = ["studio", "verb"].map(|by| home.path().join(by));
+        studio.send(ExportCommand::Write(Output::Pair(source), by_studio.clone()).into());
+        let path = folder.to_str().unwrap();
+        let out = by_verb.to_str().unwrap();
+        let said = json(&["export", path, "--pair", &name, "--imprint", source.key(), "--out", out], home.path());
+        let files = said["files"].as_array().unwrap();
+        assert_eq!(files.len(), 3, "{said}");
+        for file in files {
+            let file = Path::new(file.as_str().unwrap());
+            let [a, b] = [&by_studio, &by_verb].map(|f| std::fs::read(f.join(file.file_name().unwrap())).unwrap());
+            assert!(a.len() > 500 && a == b, "{}: {} and {} bytes", file.display(), a.len(), b.len());
+        }
+        assert!(said["mask"].as_str().unwrap().starts_with("hand"), "{said}");
+    }
+}
+
+#[test]
+fn every_pane_says_a_command_that_the_program_understands() {
+    let home = tempfile::tempdir().unwrap();
+    let mut studio = Studio::open(Place::Demo, home.path());
+    studio.send(LibraryCommand::Select(PairId(3)).into());
+    let mut said = 0;
+    for shift in ShiftMode::ALL {
+        studio.send(SettingsCommand::SetShift(shift).into());
+        for source in MaskSource::iter() {
+            let choice = MaskChoice { source, ..MaskChoice::default() };
+            studio.send(SettingsCommand::SetMask(MaskSettings { choice, ..MaskSettings::default() }).into());
+            for pane in Pane::iter() {
+                let Some(words) = studio.state.equivalent_words(pane, 0.004) else { continue };
+                said += 1;
+                if let Err(err) = touch2touch::headless::check_command(&words) {
+                    panic!("{pane:?}: {words:?}: {err}");
+                }
+            }
+        }
+    }
+    assert!(said > 18 * 12, "{said}");
+    // One of them, run: it answers with the number that the studio shows.
+    studio.send(SettingsCommand::SetShift(ShiftMode::ExactInverse).into());
+    studio.send(SettingsCommand::SetMask(MaskSettings::default()).into());
+    studio.predict(3);
+    let words = studio.state.equivalent_words(Pane::Metrics, 0.004).unwrap();
+    let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
+    let report = json(&words, home.path());
+    for (case, source) in report["cases"].as_array().unwrap().iter().zip(ImprintSource::iter()) {
+        let shown = studio.state.pose(source).ready().unwrap();
+        assert_eq!(case["angle_deg"], number(shown.angle_rad.to_degrees()), "{source:?}");
+    }
 }

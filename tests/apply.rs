@@ -5,7 +5,6 @@ mod double;
 mod generating;
 mod inspect;
 mod masks;
-mod metrics;
 mod random;
 mod whole;
 

@@ -29,6 +29,8 @@ mod gpu;
 #[cfg(feature = "onnx")]
 mod handed_on;
 #[cfg(feature = "onnx")]
+mod kept_scores;
+#[cfg(feature = "onnx")]
 mod sensors;
 #[cfg(feature = "ui-test")]
 mod ui;

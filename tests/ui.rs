@@ -9,12 +9,15 @@ mod rig;
 
 mod adapt;
 mod chain;
+mod compare;
 mod daily;
+mod export;
 mod follow;
 mod frames;
 mod generate;
 mod inspect;
 mod job;
+mod jobs;
 mod palette;
 mod results;
 mod scene;

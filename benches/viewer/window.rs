@@ -21,7 +21,7 @@ use touch2touch::ui::{Options, StudioApp};
 const SIZE: [f32; 2] = [1920.0, 1080.0];
 /// Frames per figure.
 const FRAMES: usize = 30;
-/// Pairs of the demo that are paged through for the figure of memory.
+/// Pairs of the demo that are paged through for the figure of memory, unless `--pairs` says otherwise.
 const PAIRS: usize = 200;
 
 /// What puts frames on a texture as the window puts them on the screen.
@@ -327,7 +327,10 @@ pub(super) fn frames() -> std::io::Result<serde_json::Value> {
 pub(super) fn memory() -> std::io::Result<serde_json::Value> {
     let mut studio = Studio::new(false)?;
     let [before, _] = resident_mib();
-    for _ in 0..PAIRS {
+    let words: Vec<String> = std::env::args().collect();
+    let asked = words.iter().position(|word| word == "--pairs").and_then(|at| words.get(at + 1)?.parse().ok());
+    let pairs = asked.unwrap_or(PAIRS);
+    for _ in 0..pairs {
         studio.harness.key_press(Key::D);
         studio.harness.step();
         studio.settle();
@@ -335,7 +338,7 @@ pub(super) fn memory() -> std::io::Result<serde_json::Value> {
     let [after, peak] = resident_mib();
     let held = studio.harness.state().state().results.bytes() as f64 / f64::from(1 << 20);
     println!(
-        "\nMemory, MiB: {before:.0} at first, {after:.0} after {PAIRS} pairs ({held:.0} in caches), {peak:.0} at most"
+        "\nMemory, MiB: {before:.0} at first, {after:.0} after {pairs} pairs ({held:.0} in caches), {peak:.0} at most"
     );
-    Ok(json!({ "pairs": PAIRS, "first_mib": before, "after_mib": after, "caches_mib": held, "peak_mib": peak }))
+    Ok(json!({ "pairs": pairs, "first_mib": before, "after_mib": after, "caches_mib": held, "peak_mib": peak }))
 }

@@ -5,14 +5,17 @@ mod key;
 use strum::{EnumIter, IntoEnumIterator};
 
 use super::command::{
-    AdaptCommand, CameraPreset, Command, EvaluateCommand, FollowCommand, InspectCommand, LabelsCommand, LibraryCommand,
-    Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand, WorkbenchCommand,
+    AdaptCommand, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand, LabelsCommand,
+    LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
+    WorkbenchCommand,
 };
+use super::export::state::Output;
 use super::inspect::state::Inspected;
 use super::keys::{ImprintSource, Registration, Request, ShiftMode};
 use super::labels::state::Review;
 use super::library::state::Place;
 use super::settings::state::scene::{LayerLook, SceneLayer, SceneLook};
+use super::settings::state::versus::{Versus, VersusMode};
 use super::settings::state::{ColorRange, MaskTool, Theme, Workspace};
 use super::state::{Absent, State};
 use super::workbench::state::{Layer, SceneTool, Section};
@@ -98,6 +101,9 @@ actions! {
     Follow, File, "Follow the folder", "Shows and predicts each touch that arrives in the open folder, or stops", [ctrl_shift(K::F)];
     Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)];
     Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)];
+    Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)];
+    ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [];
+    ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [];
     ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
 
     PreviousSample, Navigate, "Previous sample", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)];
@@ -107,7 +113,7 @@ actions! {
     FirstSample, Navigate, "First sample", "Shows the first pair of the list", [plain(K::Home)];
     LastSample, Navigate, "Last sample", "Shows the last pair of the list", [plain(K::End)];
     NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift(K::N)];
-    NextWorst, Navigate, "Next worst", "Shows the pair that comes out worst in the results table, then the next worse one", [plain(K::N)];
+    NextWorst, Navigate, "Next worst", "Shows the pair that is worst by the chosen score, then the next worse one", [plain(K::N)];
     OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)];
     BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)];
     FindSample, Navigate, "Filter samples", "Moves the keyboard to the filter of the list", [ctrl(K::F)];
@@ -119,7 +125,8 @@ actions! {
     FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [];
     UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [];
     EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [];
-    ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown and JSON", [];
+    PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [];
+    ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
     NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)];
     Refit, Generate, "Refit on this dataset", "Computes shift statistics of this data set's predictions and measurements, and uses them", [];
@@ -182,6 +189,8 @@ actions! {
     NextLayer, View, "Next layer", "Goes through the layers of the 3D panes: none, residuals, reasons, distance, lines", [plain(K::V)];
     AnimateWeakest, View, "Animate weak direction", "Moves the tool to and fro by at most 2 mm and 2° in the direction that the contact determines least", [];
     BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [];
+    CompareMode, View, "Next comparison", "Goes through side by side, wipe, difference and 3D in the Compare pane", [shift(K::F)];
+    SwapCompared, View, "Swap A and B", "Puts B in the place of A in the Compare pane, and A in that of B", [shift(K::R)];
     Section, View, "Cut open", "Cuts the 3D views open with a plane, or no longer", [plain(K::X)];
     WindowOnly, View, "GelSlim's window only", "Draws in 3D only what the GelSlims see, or all of it", [plain(K::W)];
     MembraneSurface, View, "Membrane as a surface", "Draws the membrane in 3D as a surface, or as points", [];
@@ -311,6 +320,9 @@ impl Action {
                 when(folder, FollowCommand::Set(state.library.follow.is_none()))
             }
             Self::Save => does(LabelsCommand::Save),
+            Self::Figure => when(state.can_draw(), ExportCommand::Ask(!state.export.asking)),
+            Self::ExportMeasured => export(state, ImprintSource::Measured),
+            Self::ExportPredicted => export(state, ImprintSource::Predicted),
             Self::ExportMasks => when(open, ViewCommand::Ui(UiRequest::PickExportFolder)),
 
             Self::PreviousSample => when(listed, LibraryCommand::Step(-1)),
@@ -320,7 +332,7 @@ impl Action {
             Self::FirstSample => when(listed, LibraryCommand::First),
             Self::LastSample => when(listed, LibraryCommand::Last),
             Self::NextUnfinished => when(listed, LibraryCommand::NextUnfinished),
-            Self::NextWorst => when(listed && state.table.worst_by().is_some(), LibraryCommand::NextWorst),
+            Self::NextWorst => when(listed && state.table.by().is_some(), LibraryCommand::NextWorst),
             Self::OtherFinger => does(ViewCommand::SelectFinger(state.other_finger())),
             Self::BothFingers => does(ViewCommand::ShowBothFingers(!state.selection.both_fingers)),
             Self::FindSample => {
@@ -337,6 +349,10 @@ impl Action {
             Self::EvaluateDataset => {
                 let ready = state.evaluation_setup().is_some() && state.evaluating().is_none();
                 when(ready, EvaluateCommand::Start)
+            }
+            Self::PredictAll => {
+                let ready = state.scores_key().is_some() && state.evaluating().is_none();
+                when(ready, EvaluateCommand::All)
             }
             Self::ExportTable => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder)),
             Self::RunSeeds => {
@@ -355,6 +371,8 @@ impl Action {
                     does(command)
                 } else if state.tasks.demanded.iter().any(|r| matches!(r, Request::Basin(_))) {
                     does(InspectCommand::StopBasin)
+                } else if state.library.brush.is_some() && state.tasks.running.is_empty() {
+                    does(LibraryCommand::Brush(None))
                 } else if state.seeds_to_come() > 0 {
                     does(SeedsCommand::Run(false))
                 } else {
@@ -440,6 +458,12 @@ impl Action {
             }
             Self::AnimateWeakest => does(WorkbenchCommand::SetAnimateWeakest(!state.workbench.animate_weakest)),
             Self::BothClouds => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds)),
+            Self::CompareMode => {
+                let versus = state.versus();
+                next_of::<VersusMode>(&versus.mode)
+                    .and_then(|mode| does(SettingsCommand::SetVersus(Versus { mode, ..versus })))
+            }
+            Self::SwapCompared => does(SettingsCommand::SetVersus(state.versus().swapped())),
             Self::Section => {
                 let next = if state.workbench.section.is_some() { None } else { Some(Section::default()) };
                 does(WorkbenchCommand::SetSection(next))
@@ -543,6 +567,11 @@ fn escape(state: &State) -> Option<WorkbenchCommand> {
 fn inspect(state: &State, useful: impl Fn(Inspected<'_>) -> bool, command: InspectCommand) -> Option<Command> {
     let shown = state.selection.panes.contains(&Pane::TimeMachine).then(|| state.inspected())??;
     when(useful(shown), command)
+}
+
+/// Asks where the cloud, pose and mesh of an imprint go, where there is a cloud.
+fn export(state: &State, source: ImprintSource) -> Option<Command> {
+    when(state.pair_export(source).is_some(), ExportCommand::Place(Output::Pair(source)))
 }
 
 /// Accepts the pose shown, or withdraws it if it is the accepted one.

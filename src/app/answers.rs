@@ -1,5 +1,6 @@
 //! [`Answer`]: what the runtime answers, and what follows from it in the rooms.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::effect::Effect;
@@ -44,6 +45,10 @@ pub enum Answer {
     Progressed(Ticket, Progress),
     /// A job without a result is done, with a line for the log.
     Finished(Ticket, Option<String>),
+    /// A job is done that wrote something there, with a line for the log.
+    Saved(Ticket, String, PathBuf),
+    /// The system was asked to show a place.
+    Revealed,
     /// A job ended without a result.
     TaskFailed(Ticket, TaskError),
     /// A result that a pane asked for could not be made.
@@ -103,6 +108,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             predict::refit::arrived(state, &statistics, saved, effects);
         }
         Answer::Progressed(ticket, progress) => {
+            evaluate::progressed(state, ticket, &progress);
             if let Some(task) = state.tasks.running.get_mut(&ticket) {
                 task.progress = progress;
             }
@@ -112,6 +118,10 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             if let Some(line) = line {
                 state.log.info(line);
             }
+        }
+        Answer::Saved(ticket, line, place) => {
+            state.tasks.running.remove(&ticket);
+            state.log.saved(line, place);
         }
         Answer::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
         Answer::RequestFailed(seq, request, err) if is_open(state, seq) => failed_request(state, request, err),
@@ -134,7 +144,8 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         | Answer::RequestFailed(..)
         | Answer::Previewed(..)
         | Answer::LabelsSaved(..)
-        | Answer::SettingsSaved => {}
+        | Answer::SettingsSaved
+        | Answer::Revealed => {}
     }
 }
 
@@ -171,7 +182,10 @@ fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
         state.library.opening = None;
         state.library.failure = Some(err.clone());
     }
-    state.table.running.take_if(|running| *running == ticket);
+    if state.table.running.take_if(|running| *running == ticket).is_some() {
+        // What was scored before it stopped is kept.
+        state.table.round += 1;
+    }
     state.log.error(err);
 }
 

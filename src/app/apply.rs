@@ -4,7 +4,8 @@ use super::command::Command;
 use super::effect::Effect;
 use super::state::State;
 use super::{
-    adapt, answers, evaluate, follow, inspect, labels, library, predict, seeds, settings, tasks, view, workbench,
+    adapt, answers, evaluate, export, follow, inspect, labels, library, predict, seeds, settings, tasks, view,
+    workbench,
 };
 
 /// Carries a command out. What has to happen outside the state comes back.
@@ -22,6 +23,7 @@ pub fn apply(state: &mut State, command: Command) -> Vec<Effect> {
         Command::Inspect(command) => inspect::step(state, command),
         Command::Workbench(command) => workbench::step(state, command, &mut effects),
         Command::Evaluate(command) => evaluate::step(state, command, &mut effects),
+        Command::Export(command) => export::step(state, command, &mut effects),
         Command::Adapt(command) => adapt::step(state, command, &mut effects),
         Command::Settings(command) => settings::step(state, command, &mut effects),
         Command::Tasks(command) => tasks::step(state, command, &mut effects),

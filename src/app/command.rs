@@ -3,6 +3,7 @@
 pub use super::adapt::AdaptCommand;
 pub use super::answers::Answer;
 pub use super::evaluate::EvaluateCommand;
+pub use super::export::ExportCommand;
 pub use super::follow::FollowCommand;
 pub use super::inspect::InspectCommand;
 pub use super::labels::LabelsCommand;
@@ -50,6 +51,8 @@ commands! {
     Workbench(WorkbenchCommand),
     /// To the results table.
     Evaluate(EvaluateCommand),
+    /// To figures and other things that are taken away.
+    Export(ExportCommand),
     /// The fit to one's own pairs.
     Adapt(AdaptCommand),
     /// To the preferences.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::export::state::{PairExport, Recipes};
 use super::keys::{DatasetSeq, PredictionKey, Revision};
 use super::labels::state::PairLabels;
 use super::library::state::Place;
@@ -15,6 +16,7 @@ use crate::domain::sample::Sample;
 use crate::work::adapt::AdaptSetup;
 use crate::work::bundles::BundleInfo;
 use crate::work::evaluate::{Evaluation, Setup};
+use crate::work::figure::FigureSetup;
 
 /// A pair whose labels are to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,6 +117,30 @@ pub enum Effect {
         /// Where to.
         folder: PathBuf,
     },
+    /// Draw a figure into a file.
+    Figure {
+        /// The job.
+        ticket: Ticket,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// What to draw.
+        setup: Box<FigureSetup>,
+        /// The predictions in it.
+        recipes: Recipes,
+        /// Where to.
+        file: PathBuf,
+    },
+    /// Write a pair for other programs.
+    ExportPair {
+        /// The job.
+        ticket: Ticket,
+        /// What of it.
+        pair: Box<PairExport>,
+        /// Where to.
+        folder: PathBuf,
+    },
+    /// Show a file or folder in the system's own window.
+    Reveal(PathBuf),
     /// Something only the window can do.
     Ui(UiRequest),
 }
@@ -134,6 +160,9 @@ impl std::fmt::Debug for Effect {
             Self::Evaluate { ticket, .. } => write!(f, "Evaluate({ticket:?})"),
             Self::Adapt { ticket, .. } => write!(f, "Adapt({ticket:?})"),
             Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),
+            Self::Figure { setup, file, .. } => write!(f, "Figure({:?}, {})", setup.pairs, file.display()),
+            Self::ExportPair { folder, .. } => write!(f, "ExportPair({})", folder.display()),
+            Self::Reveal(place) => write!(f, "Reveal({})", place.display()),
             Self::Ui(request) => write!(f, "Ui({request:?})"),
         }
     }

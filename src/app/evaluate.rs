@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::{GRASPS, TableState};
+pub use state::{GRASPS, ScoreChoice, ScoreTable, SourceScores, Standing, TableState};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,7 +10,11 @@ use std::sync::Arc;
 use super::effect::Effect;
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use crate::work::evaluate::Evaluation;
+use crate::work::evaluate::{Evaluation, Setup};
+use crate::work::job::Progress;
+
+/// How often what was scored so far is looked up while all pairs are scored.
+const LOOKS: u64 = 24;
 
 /// What can happen to the results table.
 #[derive(Clone, Debug)]
@@ -23,6 +27,8 @@ pub enum EvaluateCommand {
     Published(bool),
     /// Scores the open data set.
     Start,
+    /// Predicts and scores every pair of it.
+    All,
     /// Writes the table into a folder.
     Export(PathBuf),
 }
@@ -38,22 +44,34 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
         }
         EvaluateCommand::Grasps(grasps) => state.table.grasps_per_tool = grasps.map(|n| n.max(1)),
         EvaluateCommand::Published(shown) => state.table.published = shown,
-        EvaluateCommand::Start => {
-            // One at a time: a second would only take the cores from the first.
-            if state.evaluating().is_some() {
-                return;
-            }
-            let (Some(setup), Some(open)) = (state.evaluation_setup(), &state.library.open) else { return };
-            let source = open.source.clone();
-            let ticket = state.tasks.start(format!("Evaluate {}", source.title()), Vec::new());
-            state.table.running = Some(ticket);
-            effects.push(Effect::Evaluate { ticket, source, setup: Box::new(setup) });
-        }
+        EvaluateCommand::Start => start(state, state.evaluation_setup(), "Evaluate", effects),
+        EvaluateCommand::All => start(state, state.setup_of_all(), "Predict all of", effects),
         EvaluateCommand::Export(folder) => {
             let Some(evaluation) = state.table.result.clone() else { return };
             let ticket = state.tasks.start("Export the table".into(), Vec::new());
             effects.push(Effect::ExportTable { ticket, evaluation, published: state.table.published, folder });
         }
+    }
+}
+
+/// Has the open data set scored. One at a time: a second would only take the cores from the first.
+fn start(state: &mut State, setup: Option<Setup>, what: &str, effects: &mut Vec<Effect>) {
+    if state.evaluating().is_some() {
+        return;
+    }
+    let (Some(setup), Some(open)) = (setup, &state.library.open) else { return };
+    let source = open.source.clone();
+    let ticket = state.tasks.start(format!("{what} {}", source.title()), Vec::new());
+    (state.table.running, state.table.next_look) = (Some(ticket), 0);
+    effects.push(Effect::Evaluate { ticket, source, setup: Box::new(setup) });
+}
+
+/// Has what was scored so far looked up now and then.
+pub(super) fn progressed(state: &mut State, ticket: Ticket, progress: &Progress) {
+    let table = &mut state.table;
+    if table.running == Some(ticket) && progress.done >= table.next_look {
+        table.next_look = progress.done + (progress.total / LOOKS).max(1);
+        table.round += 1;
     }
 }
 
@@ -70,6 +88,6 @@ pub(super) fn arrived(state: &mut State, ticket: Ticket, evaluation: Arc<Evaluat
         let why = format!("the first: {}: {}", first.what, first.why);
         state.log.push(Level::Warning, text, Some(why), None);
     }
-    state.table.set_result(Some(evaluation));
-    state.reorder();
+    state.table.result = Some(evaluation);
+    state.table.round += 1;
 }

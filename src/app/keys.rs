@@ -17,6 +17,7 @@ pub use super::results::mask::{MaskKey, MaskVersion};
 pub use super::results::pose::PoseKey;
 pub use super::results::prediction::PredictionKey;
 pub use super::results::run::RunKey;
+pub use super::results::versus::{ApartKey, VersusKey};
 pub use crate::domain::pose::Registration;
 
 use crate::domain::dataset::PairId;

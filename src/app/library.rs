@@ -2,12 +2,15 @@
 
 pub mod state;
 
-pub use state::{Follow, Library, OpenDataset, Place, Sort};
+pub use state::{Follow, Library, OpenDataset, Place, Sort, short_name};
 
+use std::collections::BTreeSet;
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::adapt::AdaptState;
 use super::effect::Effect;
+use super::evaluate::state::ScoreChoice;
 use super::keys::DatasetSeq;
 use super::labels::state::{Document, Review};
 use super::results::{Request, Results};
@@ -36,6 +39,10 @@ pub enum LibraryCommand {
     SetToolFilter(Option<String>),
     /// Sorts the list.
     SetSort(Sort),
+    /// Sorts it by a score.
+    SetScore(ScoreChoice),
+    /// Shows only these pairs, or all.
+    Brush(Option<Arc<BTreeSet<PairId>>>),
     /// The rows of the list that are on screen.
     ShowRows(Range<usize>),
     /// Shows a pair.
@@ -48,7 +55,7 @@ pub enum LibraryCommand {
     Last,
     /// Shows the next of the list whose review is not finished, going round.
     NextUnfinished,
-    /// Selects the next worst pair of the results table; the list is then in that order.
+    /// Selects the next worst pair by the chosen score; the list is then in that order.
     NextWorst,
     /// Marks the selected pair as done and shows the next unfinished one.
     DoneAndNext,
@@ -76,6 +83,15 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         }
         LibraryCommand::SetSort(sort) => {
             state.library.sort = sort;
+            state.reorder();
+        }
+        LibraryCommand::SetScore(choice) => {
+            state.table.chosen = choice;
+            state.library.sort = Sort::Score;
+            state.reorder();
+        }
+        LibraryCommand::Brush(brush) => {
+            state.library.brush = brush;
             state.reorder();
         }
         LibraryCommand::ShowRows(rows) => state.library.rows = rows,
@@ -150,11 +166,14 @@ fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
 }
 
 fn select_next_worst(state: &mut State, effects: &mut Vec<Effect>) {
-    if state.library.sort.figure().is_some() {
+    if state.table.by().is_none() {
+        return;
+    }
+    if state.library.sort == Sort::Score && !state.table.chosen.best_first {
         return step_by(state, 1, effects);
     }
-    let Some(figure) = state.table.worst_by() else { return };
-    state.library.sort = Sort::worst(figure);
+    state.library.sort = Sort::Score;
+    state.table.chosen.best_first = false;
     state.reorder();
     select_row(state, 0, effects);
 }
@@ -211,8 +230,10 @@ pub(super) fn show(
     let last = state.settings.last.clone();
     let resumed = state.library.open.is_none() && last.place.as_ref() == Some(&place);
     state.results = Results::default();
-    state.table.set_result(None);
+    state.table.result = None;
+    state.table.scores = Arc::default();
     state.table.running = None;
+    state.library.brush = None;
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.history.clear();
     state.tasks.failed.clear();

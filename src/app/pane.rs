@@ -15,6 +15,8 @@ pub enum Kind {
     Imprint(ImprintSource),
     /// Differences of imprints.
     Error,
+    /// Two imprints.
+    Versus,
     /// A 3D view of one side.
     Scene(ImprintSource),
     /// Steps that can be played.
@@ -36,8 +38,8 @@ pub enum Dock {
     Right(u8),
 }
 
-/// What is computed while a pane is on screen. Everything but [`Need::Thumbnails`] is of the selected pair and begins
-/// with its tensors and labels.
+/// What is computed while a pane is on screen. Everything but [`Need::Thumbnails`] and [`Need::Scores`] is of the
+/// selected pair and begins with its tensors and labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
     /// Nothing besides the tensors and labels.
@@ -54,6 +56,8 @@ pub enum Need {
     Ledger,
     /// Several seeds.
     Seeds,
+    /// Any two imprints against each other.
+    Versus,
     /// Cloud and pose of a side, in 3D.
     Scene(ImprintSource),
     /// The poses of both sides.
@@ -68,6 +72,8 @@ pub enum Need {
     Basin,
     /// Small pictures of the pairs in the list.
     Thumbnails,
+    /// The scores that are kept of all pairs.
+    Scores,
 }
 
 /// The table, given to the macro `$with`: for each file of `ui` the panes that it draws.
@@ -75,7 +81,7 @@ macro_rules! panes {
     ($with:ident) => {
         $with! {
             browser { Browser {
-                "Samples", "The pairs of what is open", Form, needs [Thumbnails],
+                "Samples", "The pairs of what is open", Form, needs [Thumbnails, Scores],
                 at [Inspect Left, Align Left, Label Left, Evaluate Left]
             } }
             metrics { Metrics {
@@ -127,9 +133,13 @@ macro_rules! panes {
                     "Error", "Predicted minus measured: blue too shallow, red too deep", Error, needs [Comparison],
                     at [Inspect Bottom(1), Evaluate Bottom(3)]
                 }
+                Compare {
+                    "Compare", "Any two imprints of the touch against each other: side by side, wiped, subtracted, in 3D",
+                    Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3)]
+                }
             }
             ledger { Ledger {
-                "Depth chain", "Everything between the decoder and the meters, stage by stage",
+                "Depth chain" as "Chain", "Everything between the decoder and the meters, stage by stage",
                 Form, needs [Ledger], at [Inspect Bottom(1), Evaluate Bottom(3)]
             } }
             seeds { Seeds {
@@ -164,8 +174,12 @@ macro_rules! panes {
                 at [Evaluate Top(1)]
             } }
             table {
-                Table { "All metrics", "The metrics of all pairs so far", Form, needs [], at [Evaluate Top(1)] }
+                Table { "All metrics", "The scores of all pairs by every source", Form, needs [Scores], at [Evaluate Top(1)] }
             }
+            scatter { Scatter {
+                "Scatter", "Two scores of all pairs against each other, or one score by tool", Form, needs [Scores],
+                at [Evaluate Right(2)]
+            } }
             log { Log {
                 "Log", "What happened", Form, needs [],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
@@ -212,7 +226,7 @@ macro_rules! define {
             /// What kind of thing that is.
             pub fn kind(self) -> Kind {
                 use ImprintSource::{Measured, Predicted};
-                use Kind::{Color, Error, Form, Imprint, Map, Scene, Steps};
+                use Kind::{Color, Error, Form, Imprint, Map, Scene, Steps, Versus};
                 match self { $($( Self::$pane => $kind, )*)* }
             }
 
@@ -220,8 +234,8 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Need] {
                 use ImprintSource::{Measured, Predicted};
                 use Need::{
-                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Seeds, Steps,
-                    Thumbnails,
+                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
+                    Steps, Thumbnails, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }
@@ -260,7 +274,7 @@ impl Pane {
 
     /// Whether it shows something of the selected pair.
     pub fn is_of_pair(self) -> bool {
-        self.needs().iter().any(|need| *need != Need::Thumbnails)
+        self.needs().iter().any(|need| !matches!(need, Need::Thumbnails | Need::Scores))
     }
 }
 

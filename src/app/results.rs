@@ -27,13 +27,16 @@ pub mod labels;
 pub mod layers;
 pub mod ledger;
 pub mod mask;
+pub mod picture;
 pub mod pose;
 pub mod prediction;
 pub mod preview;
 pub mod run;
 pub mod sample;
+pub mod scores;
 pub mod thumbnail;
 pub mod tool;
+pub mod versus;
 
 pub use cache::Cache;
 pub use preview::Preview;
@@ -213,7 +216,7 @@ macro_rules! results {
 
 results! {
     /// The tensors of a pair: about 10 MB of a lab pair (two GelSlim images and their difference, per finger).
-    Sample(PairKey) in samples, 384 * MIB;
+    Sample(PairKey) in samples, 192 * MIB;
     /// The labels stored for a pair: they go to the document.
     Labels(labels::LabelsKey);
     /// The CAD model of a tool and what the registration derives from it.
@@ -232,6 +235,14 @@ results! {
     Color(imprint::ColorKey) in colors, 32 * MIB;
     /// A prediction against the measurement.
     Comparison(comparison::ComparisonKey) in comparisons, 32 * MIB;
+    /// The prediction of another program that lies beside a pair as a picture.
+    Picture(picture::PictureKey) in pictures, 16 * MIB;
+    /// A prediction that is compared with something: kept with the others.
+    Compared(versus::ComparedKey);
+    /// Any two imprints of a touch against each other.
+    Versus(versus::VersusKey) in versus, 32 * MIB;
+    /// How far the points of one cloud lie from another.
+    Apart(versus::ApartKey) in apart, 16 * MIB;
     /// The depth chain of a prediction, stage by stage.
     Ledger(ledger::LedgerKey) in ledgers, 24 * MIB;
     /// What a GelSlim image leaves open.
@@ -252,6 +263,8 @@ results! {
     Inspection(inspection::InspectionKey) in inspections, 64 * MIB;
     /// Where starts lead.
     Basin(basin::BasinKey) in basins, 32 * MIB;
+    /// The scores that are kept of all pairs.
+    Scores(scores::ScoresKey) in scores, 64 * MIB;
     /// A small picture of a pair's measured imprint (right finger, else left).
     Thumbnail(thumbnail::ThumbnailKey) in thumbnails, 32 * MIB;
 }

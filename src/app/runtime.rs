@@ -45,6 +45,8 @@ pub(super) enum JobId {
     Bundles,
     /// Following a folder.
     Follow,
+    /// Showing a folder.
+    Reveal,
 }
 
 /// Runs what `apply` wants done and what the panes want to show.

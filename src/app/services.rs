@@ -15,6 +15,7 @@ use super::settings::state::Settings;
 use crate::domain::contact::ContactMask;
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
+use crate::domain::evaluation::Scores;
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::rig::Rig;
@@ -186,6 +187,14 @@ pub trait Services: Send + Sync {
     /// As [`evaluate::evaluate`].
     fn evaluate(&self, dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
         evaluate::evaluate(dataset, setup, &Models::new(None), cx)
+    }
+
+    /// The scores that are kept of a data set.
+    ///
+    /// # Errors
+    /// As [`evaluate::known`].
+    fn known_scores(&self, dataset: &Dataset, setup: &Setup) -> Result<Vec<Scores>, TaskError> {
+        evaluate::known(dataset, setup, &Models::new(None))
     }
 
     /// Fits a generator to pairs; the new bundle, where one is kept.

@@ -3,6 +3,7 @@
 pub mod state;
 
 pub use state::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
+pub use state::versus::{Versus, VersusMode};
 pub use state::{
     BRUSH_RADIUS_PX, ColorMap, ColorRange, GenerateSettings, Last, MAX_CACHE_MIB, MAX_RECENT, MaskChoice, MaskSettings,
     MaskSource, MaskTool, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
@@ -58,6 +59,8 @@ pub enum SettingsCommand {
     SetCamerasLinked(bool),
     /// How the 3D views look.
     SetScene(SceneLook),
+    /// What is compared with what, in the workspace in front.
+    SetVersus(Versus),
     /// The workspace in front.
     SetWorkspace(Workspace),
     /// The arrangement of the panes of a workspace, in the window's format.
@@ -106,6 +109,9 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
         SettingsCommand::SetCacheBudget(mib) => settings.cache_mib = mib,
         SettingsCommand::SetCamerasLinked(linked) => settings.cameras_linked = linked,
         SettingsCommand::SetScene(look) => settings.scene = look.validated(),
+        SettingsCommand::SetVersus(versus) => {
+            settings.versus.insert(settings.workspace, versus);
+        }
         SettingsCommand::SetWorkspace(workspace) => settings.workspace = workspace,
         SettingsCommand::SetLayout(workspace, layout) => {
             settings.layouts.insert(workspace.name().to_owned(), layout);

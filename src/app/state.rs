@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::adapt::state::AdaptState;
 use super::evaluate::state::TableState;
+use super::export::state::ExportState;
 use super::history::History;
 use super::inspect::state::Inspect;
 use super::keys::{PairKey, TouchKey};
@@ -37,6 +38,8 @@ pub struct State {
     pub results: Results,
     /// The results table of the data set.
     pub table: TableState,
+    /// What is chosen of the next figure.
+    pub export: ExportState,
     /// The fit to the open pairs.
     pub adapt: AdaptState,
     /// What the 3D panes do and show besides.
@@ -230,6 +233,8 @@ pub enum Absent {
     NoMaskModel,
     /// No generator was found.
     NoGenerator,
+    /// The generator that was named is not there any more.
+    NoSuchGenerator,
     /// No tool classifier was found.
     NoClassifier,
     /// The mask has too few contact points.
@@ -256,6 +261,7 @@ impl Absent {
             Self::NotSimulated => "Only simulated data knows the true contact.",
             Self::NoMaskModel => "No mask model was found.",
             Self::NoGenerator => "No generator was found.",
+            Self::NoSuchGenerator => "The model that was chosen here is not there any more: choose another.",
             Self::NoClassifier => "No tool classifier was found.",
             Self::NoContact => "The mask has too few contact points for a pose.",
         }

@@ -2,6 +2,8 @@
 
 pub mod state;
 
+use std::path::PathBuf;
+
 pub use state::{Entry, Level, Log, Task, Tasks, Ticket};
 
 use super::effect::Effect;
@@ -23,6 +25,10 @@ pub enum TasksCommand {
     Report(TaskError),
     /// Adds a notice of the window's own.
     Notice(String),
+    /// Adds a notice of something that the window wrote there.
+    Saved(String, PathBuf),
+    /// Shows a file or folder in the system's own window.
+    Reveal(PathBuf),
 }
 
 pub(super) fn step(state: &mut State, command: TasksCommand, effects: &mut Vec<Effect>) {
@@ -38,6 +44,8 @@ pub(super) fn step(state: &mut State, command: TasksCommand, effects: &mut Vec<E
         TasksCommand::LogSeen(number) => state.log.seen = state.log.seen.max(number),
         TasksCommand::Report(err) => state.log.error(&err),
         TasksCommand::Notice(text) => state.log.info(text),
+        TasksCommand::Saved(text, place) => state.log.saved(text, place),
+        TasksCommand::Reveal(place) => effects.push(Effect::Reveal(place)),
     }
 }
 

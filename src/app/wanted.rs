@@ -18,8 +18,10 @@ impl State {
     pub fn wanted(&self) -> Vec<Request> {
         let mut list = Wanted { state: self, list: Vec::new() };
         list.selection();
+        list.versus();
         list.seeds();
         list.thumbnails();
+        list.scores();
         list.neighbors();
         list.list
     }

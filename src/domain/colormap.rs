@@ -111,6 +111,19 @@ impl Range {
         }
         ((value - self.lo) / span).clamp(0.0, 1.0)
     }
+
+    /// Round numbers in the range, at most `most` of them or one more; none in an empty range.
+    pub fn ticks(self, most: usize) -> Vec<f32> {
+        let span = self.hi - self.lo;
+        if !(span > 0.0 && span.is_finite()) || most == 0 {
+            return Vec::new();
+        }
+        let raw = span / most as f32;
+        let base = 10f32.powf(raw.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * base).into_iter().find(|s| *s >= raw).unwrap_or(base * 10.0);
+        let first = (self.lo / step).ceil() as i64;
+        (0..=most as i64 + 1).map(|i| (first + i) as f32 * step).take_while(|v| *v <= self.hi + step * 1e-3).collect()
+    }
 }
 
 /// 0..1 to 0..255, rounded to nearest.
@@ -178,5 +191,13 @@ mod tests {
         assert_eq!(Range { lo: 3.0, hi: 3.0 }.unit(3.0), 0.5);
         assert_eq!(Range { lo: f32::NAN, hi: 3.0 }.unit(3.0), 0.5);
         assert_eq!(Range::symmetric(-2.0).unit(0.0), 0.5);
+    }
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        assert_eq!(Range { lo: 0.0, hi: 18.0 }.ticks(4), vec![0.0, 5.0, 10.0, 15.0]);
+        assert_eq!(Range { lo: -4.0, hi: 4.0 }.ticks(4), vec![-4.0, -2.0, 0.0, 2.0, 4.0]);
+        assert!(Range { lo: 1.0, hi: 1.0 }.ticks(4).is_empty());
+        assert!(Range { lo: f32::NAN, hi: 1.0 }.ticks(4).is_empty());
     }
 }

@@ -58,7 +58,7 @@ impl Index {
 }
 
 /// Something wrong with a dataset that did not keep the rest from opening.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Problem {
     /// The file or folder.
     pub file: PathBuf,

@@ -17,6 +17,34 @@ pub fn of_points(points: &[DVec3], object_from_points: &DAffine3, distance: &Mes
     points.par_iter().map(|p| distance.signed(object_from_points.transform_point3(*p)) as f32).collect()
 }
 
+/// Distances of points to the nearest point of another cloud, meters; NaN of a point that is not finite, and without one
+/// in the other cloud.
+pub fn to_cloud(points: &[DVec3], others: &[DVec3]) -> Vec<f32> {
+    let tree = Nearest::new(others);
+    let far = |p: &DVec3| tree.of(*p).filter(|_| p.is_finite()).map_or(f32::NAN, |(_, distance)| distance as f32);
+    points.par_iter().map(far).collect()
+}
+
+/// Finds the nearest of some points. Those that are not finite are left out.
+struct Nearest {
+    points: Vec<[f64; 3]>,
+    tree: Option<ImmutableKdTree<f64, 3>>,
+}
+
+impl Nearest {
+    fn new(points: &[DVec3]) -> Self {
+        let points: Vec<[f64; 3]> = points.iter().filter(|p| p.is_finite()).map(|p| p.to_array()).collect();
+        let tree = ImmutableKdTree::new_from_slice(&points).ok().filter(|_| !points.is_empty());
+        Self { points, tree }
+    }
+
+    /// The nearest point and its distance.
+    fn of(&self, p: DVec3) -> Option<(DVec3, f64)> {
+        let found = self.tree.as_ref()?.query(&p.to_array()).nearest_one::<SquaredEuclidean<f64>>().execute();
+        Some((DVec3::from_array(*self.points.get(found.item as usize)?), found.distance.sqrt()))
+    }
+}
+
 /// A surface with a value per vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Painted {
@@ -32,12 +60,8 @@ pub struct Painted {
 /// # Cost
 /// About a microsecond per vertex; some ten triangles per square millimeter near the points, none elsewhere.
 pub fn on_surface(mesh: &TriMesh, points: &[DVec3], reach_m: f64) -> Painted {
-    let finite: Vec<[f64; 3]> = points.iter().filter(|p| p.is_finite()).map(|p| p.to_array()).collect();
-    let tree = ImmutableKdTree::<f64, 3>::new_from_slice(&finite).ok().filter(|_| !finite.is_empty());
-    let nearest = |p: DVec3| {
-        let found = tree.as_ref()?.query(&p.to_array()).nearest_one::<SquaredEuclidean<f64>>().execute();
-        Some((DVec3::from_array(*finite.get(found.item as usize)?), found.distance.sqrt()))
-    };
+    let tree = Nearest::new(points);
+    let nearest = |p: DVec3| tree.of(p);
     let triangles: Vec<[DVec3; 3]> = (0..mesh.triangles.len())
         .filter(|&i| mesh.triangles[i].iter().all(|&v| (v as usize) < mesh.vertices.len()))
         .map(|i| mesh.corners(i))

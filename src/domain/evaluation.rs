@@ -7,12 +7,13 @@
 //!
 //! The intervals are 95 % bootstrap intervals: the grasps are drawn again within each tool, the tools stay.
 
+mod figure;
 mod paper;
 mod write;
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::catalog;
 use super::dataset::{PairEntry, Split};
@@ -20,8 +21,9 @@ use super::metrics::{AngleSummary, Unstretched, frechet_distance};
 use super::rig::{PadId, Rig};
 use super::sample::Scale;
 
+pub use figure::{Condition, Figure};
 pub use paper::paper_rows;
-pub use write::{Column, NOTES, columns, conventions, csv, markdown, text};
+pub use write::{Column, NOTES, columns, conventions, csv, latex, markdown, text};
 
 /// The lab's peak of the PSNR, meters.
 pub const PEAK_M: f64 = 0.0225;
@@ -29,7 +31,7 @@ pub const PEAK_M: f64 = 0.0225;
 const BOOTSTRAP_SEED: u64 = 1;
 
 /// Grasps that are averaged together: a column group of the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Group {
     /// Grasps of tools that were trained on, which were not.
@@ -89,7 +91,7 @@ impl Group {
 }
 
 /// A squared error that can be pooled.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SquaredError {
     /// Sum over the pixels, m² (or of the stretched images).
     pub sum: f64,
@@ -98,7 +100,7 @@ pub struct SquaredError {
 }
 
 /// The figures of one predicted image.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ImageScore {
     /// Which finger's; 0 right, 1 left.
     pub finger: usize,
@@ -122,7 +124,7 @@ pub struct ImageScore {
 }
 
 /// The figures of one grasp by one method.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspScore {
     /// The pair's name.
     pub pair: String,
@@ -139,40 +141,6 @@ pub struct GraspScore {
     pub angle_error_rad: Option<f64>,
     /// Time to generate one image, seconds.
     pub seconds: Option<f64>,
-}
-
-/// A figure of a grasp that grasps are ordered by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
-pub enum Figure {
-    /// Error of the in-hand angle, radians.
-    Angle,
-    /// Of the imprints against the measured ones, pooled over the fingers, dB.
-    Psnr,
-    /// Mean over the fingers.
-    Ssim,
-}
-
-impl Figure {
-    /// Whether `a` is worse than `b`. A figure that is not a number (no pose was found) is the worst.
-    pub fn worse(self, a: f64, b: f64) -> std::cmp::Ordering {
-        let badness = |v: f64| match (v.is_nan(), self) {
-            (true, _) => f64::INFINITY,
-            (false, Self::Angle) => v,
-            (false, Self::Psnr | Self::Ssim) => -v,
-        };
-        badness(b).total_cmp(&badness(a))
-    }
-}
-
-impl GraspScore {
-    /// One of its figures; `None` where it cannot be there, NaN where it failed.
-    pub fn figure(&self, figure: Figure) -> Option<f64> {
-        match figure {
-            Figure::Angle => self.angle_error_rad,
-            Figure::Psnr => psnr(&[self], |image| Some(image.error)),
-            Figure::Ssim => mean(self.images.iter().filter_map(|image| image.ssim)),
-        }
-    }
 }
 
 /// A method with its grasps.

@@ -116,6 +116,14 @@ impl LimitArgs {
     pub(super) fn spread(self, len: usize) -> Vec<usize> {
         super::spread(len, self.limit)
     }
+
+    /// The position of the pair that is named, else those that are taken of all.
+    pub(super) fn or_pair(self, dataset: &Dataset, pair: Option<&str>) -> anyhow::Result<Vec<usize>> {
+        match pair {
+            Some(name) => Ok(vec![super::find_pair(dataset, name)?.0 as usize]),
+            None => Ok(self.spread(dataset.index.pairs.len())),
+        }
+    }
 }
 
 /// Reads a number of things to do: none is a mistake, and said as one.

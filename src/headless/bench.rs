@@ -1,6 +1,5 @@
 //! `touch2touch bench`: time and error of the registration engines and of the generator, on known grasps, side by side.
 
-mod canvas;
 mod cases;
 mod dataset;
 pub(super) mod fan;

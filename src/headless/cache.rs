@@ -1,4 +1,4 @@
-//! `touch2touch cache`: the predictions that the studio and the verbs keep on the disk.
+//! `touch2touch cache`: the predictions and scores that the studio and the verbs keep on the disk.
 
 use std::path::PathBuf;
 
@@ -24,11 +24,16 @@ pub(super) struct CacheArgs {
 struct Report {
     folder: PathBuf,
     predictions: usize,
+    /// Files of scores, one per method and way to score.
+    sheets: usize,
     bytes: u64,
     budget_bytes: u64,
     /// What `--clear` removed.
     #[serde(skip_serializing_if = "Option::is_none")]
     removed: Option<usize>,
+    /// And the files of scores among it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    removed_sheets: Option<usize>,
 }
 
 /// The user's kept predictions with the budget of the studio's preferences; `None` without a folder for them.
@@ -51,21 +56,25 @@ pub(super) fn run(args: &CacheArgs) -> VerbResult {
     let report = Report {
         folder: store.folder().to_owned(),
         predictions: usage.predictions,
+        sheets: usage.sheets,
         bytes: usage.bytes,
         budget_bytes: store.budget(),
         removed: removed.map(|usage| usage.predictions),
+        removed_sheets: removed.map(|usage| usage.sheets),
     };
     let output = Output::new(args.common, "", 0);
     output.finish(&report, || {
         let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
         let mut text = String::new();
         if let Some(removed) = removed {
-            text += &format!("removed      {} ({:.1} MiB)\n", removed.predictions, mib(removed.bytes));
+            let (predictions, sheets) = (removed.predictions, removed.sheets);
+            text += &format!("removed      {predictions} and {sheets} of scores ({:.1} MiB)\n", mib(removed.bytes));
         }
         text + &format!(
-            "folder       {}\npredictions  {}\nsize         {:.1} of {:.0} MiB (Settings, \"Keep predictions\")\n",
+            "folder       {}\npredictions  {}\nscores       {} files\nsize         {:.1} of {:.0} MiB (Settings, \"Keep predictions\")\n",
             report.folder.display(),
             report.predictions,
+            report.sheets,
             mib(report.bytes),
             mib(report.budget_bytes)
         )

@@ -14,7 +14,7 @@ use crate::domain::evaluation::{self, Row, paper_rows};
 use crate::domain::pose::Registration;
 use crate::infer::bundle::{Bundle, Found, Origin, find_all};
 use crate::io::atomic;
-use crate::work::evaluate::{Evaluation, Report, Setup, evaluate, rows};
+use crate::work::evaluate::{Evaluation, Report, Setup, evaluate, export, rows};
 use crate::work::models::Models;
 
 /// Arguments of `evaluate`.
@@ -39,7 +39,7 @@ pub(super) struct EvaluateArgs {
     /// Whose images are compared. Angles always come from the contact of both fingers.
     #[arg(long, value_enum, default_value_t = Fingers::Both)]
     fingers: Fingers,
-    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
+    /// Neither look for predictions and figures that were made before (by the studio, too), nor keep those made now.
     #[arg(long)]
     no_cache: bool,
     /// Take only this many grasps of each tool, spread evenly.
@@ -75,6 +75,12 @@ pub(super) struct EvaluateArgs {
     /// Write the figures and their intervals to this file, one line per method and group.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write the table to this file as a LaTeX document in the paper's form.
+    #[arg(long, value_name = "FILE")]
+    latex: Option<PathBuf>,
+    /// Write evaluation.csv, .md, .tex and .json (with every grasp) into this folder, as the studio's button does.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Add the figures of every grasp to the JSON.
     #[arg(long)]
     pairs: bool,
@@ -109,7 +115,15 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
         output.note(&format!("{}{by}: {}", skipped.what, skipped.why));
     }
     let rows = rows(&evaluation, args.paper);
-    for (file, text) in [(&args.markdown, evaluation::markdown(&rows)), (&args.csv, evaluation::csv(&rows))] {
+    if let Some(folder) = &args.out {
+        export(&evaluation, args.paper, folder)?;
+    }
+    let texts = [
+        (&args.markdown, evaluation::markdown(&rows)),
+        (&args.csv, evaluation::csv(&rows)),
+        (&args.latex, evaluation::latex(&rows)),
+    ];
+    for (file, text) in texts {
         if let Some(file) = file {
             write(file, &text)?;
         }

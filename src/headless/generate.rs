@@ -22,7 +22,7 @@ use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::PadId;
 use crate::domain::sample::{Sample, Scale};
 use crate::domain::{metrics, resample};
-use crate::io::dataset::{Dataset, assumed_meters};
+use crate::io::dataset::Dataset;
 use crate::io::names::with_ending;
 use crate::work::compare;
 use crate::work::imprint::{self, imprint_of};
@@ -43,6 +43,9 @@ pub(super) struct GenerateArgs {
     /// Which finger's GelSlim image: right, left (or as the data set names it), both.
     #[arg(long, default_value = "right")]
     finger: FingerArg,
+    /// Only this pair, by its name or a part of it that no other has.
+    #[arg(long, conflicts_with = "limit")]
+    pair: Option<String>,
     #[command(flatten)]
     limit: LimitArgs,
     #[command(flatten)]
@@ -55,7 +58,7 @@ pub(super) struct GenerateArgs {
 
 pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
-    let ids = args.limit.spread(dataset.index.pairs.len());
+    let ids = args.limit.or_pair(&dataset, args.pair.as_deref())?;
     let fingers = args.finger.fingers(&dataset.rig)?;
     let output = Output::new(args.common, "generating", ids.len());
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
@@ -163,9 +166,9 @@ fn score(
         take(pair, &found);
     }
     if let Some(tile) = tile
-        && let Some(vqvae) = dataset.vqvae_tile(id, sample.laid)?.as_ref().map(assumed_meters)
+        && let Some(vqvae) = compare::beside(dataset, id, sample)?
     {
-        let theirs = compare::tiles(&vqvae, &tile, sample, finger)?;
+        let theirs = compare::tiles(&vqvae.tile, &tile, sample, finger)?;
         (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
         pair.vqvae = theirs.unstretched.map(Stored);
     }

@@ -185,22 +185,29 @@ fn pictures(out: &std::path::Path, ledger: &Ledger) -> anyhow::Result<()> {
     for (i, record) in ledger.stages.iter().enumerate() {
         let range = Range { lo: record.stats.min as f32, hi: record.stats.max as f32 };
         let name = record.stage.name().to_lowercase().replace(' ', "-");
-        images::write_rgb8(&out.join(format!("{:02}-{name}.png", i + 1)), &colored(&record.image, range))?;
+        images::write_rgb8(
+            &out.join(format!("{:02}-{name}.png", i + 1)),
+            &colored(&record.image, ColorMap::Viridis, range),
+        )?;
     }
     if let Some(against) = &ledger.against {
         let counts = &against.joint.counts;
         let most = counts.as_slice().iter().copied().max().unwrap_or(1).max(1);
         // Roots, so that the few deep pixels are seen beside the many shallow ones; prediction upwards.
         let shares: DepthMap = counts.map(|&c| (f64::from(c) / f64::from(most)).powf(0.25) as f32).rows_reversed();
-        images::write_rgb8(&out.join("joint-histogram.png"), &colored(&shares, Range { lo: 0.0, hi: 1.0 }))?;
+        images::write_rgb8(
+            &out.join("joint-histogram.png"),
+            &colored(&shares, ColorMap::Viridis, Range { lo: 0.0, hi: 1.0 }),
+        )?;
     }
     Ok(())
 }
 
-fn colored(image: &DepthMap, range: Range) -> RgbGrid {
+/// An image in the colors of a map; NaN is gray.
+pub(super) fn colored(image: &DepthMap, map: ColorMap, range: Range) -> RgbGrid {
     Grid::from_fn(image.width(), image.height(), |x, y| {
         let v = image[(x, y)];
-        if v.is_finite() { ColorMap::Viridis.rgb8(range.unit(v)).map(f32::from) } else { NAN_COLOR.map(|c| 255.0 * c) }
+        if v.is_finite() { map.rgb8(range.unit(v)).map(f32::from) } else { NAN_COLOR.map(|c| 255.0 * c) }
     })
 }
 

@@ -30,7 +30,7 @@ use report::{Accepted, Case, Report, summary, text};
 
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
-    let ids = args.limit.spread(dataset.index.pairs.len());
+    let ids = args.limit.or_pair(&dataset, args.pair.as_deref())?;
     let imprints: &[ImprintSource] = match args.imprint {
         Imprints::Measured => &[ImprintSource::Measured],
         Imprints::Predicted => &[ImprintSource::Predicted],

@@ -14,6 +14,7 @@ use std::time::{Duration, SystemTime};
 use serde::{Deserialize, Serialize};
 
 use super::recipe::Recipe;
+use super::sheets;
 use crate::domain::grid::Grid;
 use crate::domain::postprocess::RawPrediction;
 use crate::io::digest::sha256;
@@ -59,6 +60,8 @@ pub struct Stored {
 pub struct Usage {
     /// Predictions.
     pub predictions: usize,
+    /// Sheets of scores beside them ([`super::sheets`]).
+    pub sheets: usize,
     /// Bytes.
     pub bytes: u64,
 }
@@ -161,10 +164,11 @@ impl Store {
     /// How much there is.
     pub fn usage(&self) -> Usage {
         let files = self.files();
-        Usage { predictions: files.len(), bytes: files.iter().map(|f| f.bytes).sum() }
+        let sheets = files.iter().filter(|f| f.name.ends_with(sheets::SUFFIX)).count();
+        Usage { predictions: files.len() - sheets, sheets, bytes: files.iter().map(|f| f.bytes).sum() }
     }
 
-    /// Removes every prediction; answers what there was.
+    /// Removes every prediction and every sheet; answers what there was.
     ///
     /// # Errors
     /// With the first file that could not be removed.
@@ -213,7 +217,7 @@ impl Store {
             let Ok(name) = entry.file_name().into_string() else { continue };
             let Some(meta) = entry.metadata().ok().filter(fs::Metadata::is_file) else { continue };
             let used = meta.modified().unwrap_or(SystemTime::UNIX_EPOCH);
-            if name.ends_with(SUFFIX) {
+            if name.ends_with(SUFFIX) || name.ends_with(sheets::SUFFIX) {
                 files.push(Found { name, bytes: meta.len(), used });
             } else if name.ends_with(".part") && used.elapsed().is_ok_and(|age| age > STRAY) {
                 fs::remove_file(entry.path()).ok();
@@ -346,7 +350,9 @@ mod tests {
         nothing.put(&recipe("a", 4), &raw(4.0), 0.0).unwrap();
         Store::new(store.folder().to_owned(), 100).put(&recipe("a", 5), &raw(5.0), 0.0).unwrap();
         assert_eq!(store.usage().predictions, 2);
-        assert_eq!(store.clear().unwrap().predictions, 2);
+        fs::write(store.folder().join("a.scores"), "sheet").unwrap();
+        let all = store.clear().unwrap();
+        assert_eq!((all.predictions, all.sheets), (2, 1));
         assert_eq!(store.usage(), Usage::default());
     }
 

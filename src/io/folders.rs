@@ -1,6 +1,6 @@
 //! The user's folders for this program, by the rules of the platform.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const NAME: &str = "touch2touch";
 
@@ -31,6 +31,28 @@ pub fn program_cache() -> Option<PathBuf> {
 pub fn pictures() -> Option<PathBuf> {
     let folder = dirs::picture_dir().or_else(|| Some(dirs::home_dir()?.join(NAME)))?;
     std::fs::create_dir_all(&folder).ok().map(|()| folder)
+}
+
+/// Asks the system to show a file's folder, or a folder, in its own window; returns at once.
+///
+/// # Errors
+/// If the place is not there any more, or the system has no program for it.
+pub fn reveal(place: &Path) -> std::io::Result<()> {
+    let program = if cfg!(windows) {
+        "explorer"
+    } else if cfg!(target_os = "macos") {
+        "open"
+    } else {
+        "xdg-open"
+    };
+    let folder = if place.is_dir() { place } else { place.parent().unwrap_or(place) };
+    // A path that begins with a dash is no option.
+    let folder = std::fs::canonicalize(folder)?;
+    let null = std::process::Stdio::null;
+    let mut shown =
+        std::process::Command::new(program).arg(folder).stdin(null()).stdout(null()).stderr(null()).spawn()?;
+    // Waited for, so that nothing of it is left behind; by nobody else, because it may stay open.
+    std::thread::Builder::new().name("reveal".into()).spawn(move || shown.wait().ok()).map(drop)
 }
 
 fn local_data() -> Option<PathBuf> {

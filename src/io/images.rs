@@ -177,11 +177,23 @@ pub fn write_rgb8(path: &Path, picture: &RgbGrid) -> Result<(), PictureError> {
     encode(path, &bytes, picture.size(), ExtendedColorType::Rgb8)
 }
 
-fn encode(path: &Path, bytes: &[u8], [w, h]: [usize; 2], kind: ExtendedColorType) -> Result<(), PictureError> {
+/// A picture as the bytes of a PNG.
+///
+/// # Errors
+/// As the encoder says; an empty picture has no file.
+pub fn png_bytes(picture: &Grid<[u8; 3]>) -> Result<Vec<u8>, image::ImageError> {
+    png(picture.as_slice().as_flattened(), picture.size(), ExtendedColorType::Rgb8)
+}
+
+fn png(bytes: &[u8], [w, h]: [usize; 2], kind: ExtendedColorType) -> Result<Vec<u8>, image::ImageError> {
     let mut png = Cursor::new(Vec::new());
-    image::write_buffer_with_format(&mut png, bytes, w as u32, h as u32, kind, ImageFormat::Png)
-        .map_err(|source| PictureError::Decode { file: path.to_owned(), source })?;
-    super::atomic::write_bytes(path, png.get_ref()).map_err(|source| PictureError::Io { file: path.to_owned(), source })
+    image::write_buffer_with_format(&mut png, bytes, w as u32, h as u32, kind, ImageFormat::Png)?;
+    Ok(png.into_inner())
+}
+
+fn encode(path: &Path, bytes: &[u8], size: [usize; 2], kind: ExtendedColorType) -> Result<(), PictureError> {
+    let png = png(bytes, size, kind).map_err(|source| PictureError::Decode { file: path.to_owned(), source })?;
+    super::atomic::write_bytes(path, &png).map_err(|source| PictureError::Io { file: path.to_owned(), source })
 }
 
 #[cfg(test)]

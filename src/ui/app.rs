@@ -17,10 +17,11 @@ use super::pane::{Docking, Panes};
 use super::scene_view::Device;
 use super::screenshot::Shot;
 use super::theme::{DARK, LIGHT};
-use super::{bars, layout, log as log_pane, palette, pane, shortcuts, theme};
+use super::{bars, export, layout, log as log_pane, palette, pane, shortcuts, theme};
 use crate::app::action::Action;
 use crate::app::command::{
-    Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
+    Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest,
+    ViewCommand,
 };
 use crate::app::evaluate::EvaluateCommand;
 use crate::app::keys::ImprintSource;
@@ -292,6 +293,7 @@ impl StudioApp {
             UiRequest::PickFolder => self.shared.dialogs.open(Purpose::Folder, ctx),
             UiRequest::PickFile => self.shared.dialogs.open(Purpose::File, ctx),
             UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
+            UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
             UiRequest::PickExportFolder => self.shared.dialogs.open(Purpose::Export, ctx),
             UiRequest::Camera(preset) => {
                 // The view under the pointer turns; linked cameras turn together.
@@ -323,6 +325,11 @@ impl StudioApp {
             UiRequest::PanePicture { copied } => {
                 let part = self.panes.hovered.and_then(|pane| self.panes.places.get(&pane).copied());
                 self.shoot(ctx, part, copied);
+            }
+            UiRequest::PictureOf(pane) => {
+                if let Some(place) = self.panes.places.get(&pane).copied() {
+                    self.shoot(ctx, Some(place), true);
+                }
             }
             UiRequest::ToggleFullscreen => {
                 let full = ctx.input(|i| i.viewport().fullscreen.unwrap_or(false));
@@ -455,6 +462,7 @@ impl eframe::App for StudioApp {
             edited = bars::top(&mut cx, ui, &mut tree);
             // Drawn before the panes, so it shows the read-out of the frame before: at rest they are the same.
             bars::bottom(&mut cx, ui, self.frame_ms);
+            log_pane::notices(&mut cx, ui);
             readout = cx.shared.readout.take();
             let frame = egui::Frame::new().fill(cx.p.frame);
             egui::CentralPanel::default().frame(frame).show(ui, |ui| match self.panes.maximized {
@@ -466,7 +474,7 @@ impl eframe::App for StudioApp {
                 }
             });
             bars::hint(&mut cx, &ctx);
-            log_pane::notices(&mut cx, &ctx);
+            export::form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::sheet(&mut cx, &ctx);
             bars::drop_overlay(&cx, &ctx);
@@ -474,6 +482,7 @@ impl eframe::App for StudioApp {
                 cx.push(match purpose {
                     Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
                     Purpose::Export => Command::Labels(LabelsCommand::ExportMasks(path)),
+                    Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });
             }

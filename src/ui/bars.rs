@@ -62,11 +62,19 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.shared.dialogs.type_path(Purpose::Folder, "");
         }
         ui.separator();
-        for action in [Action::ExportMasks, Action::Save, Action::Reload, Action::Follow] {
+        for action in [
+            Action::Figure,
+            Action::ExportMeasured,
+            Action::ExportPredicted,
+            Action::ExportMasks,
+            Action::Save,
+            Action::Reload,
+            Action::Follow,
+        ] {
             let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
             let on = action == Action::Follow && cx.state.library.follow.is_some();
             let button = egui::Button::new(action.name()).shortcut_text(keys).selected(on);
-            let response = ui.add_enabled(action.command(cx.state).is_some(), button);
+            let response = ui.add_enabled(action.command(cx.state).is_some(), button).accessible_name(action.name());
             if response.on_hover_text(action.tooltip()).clicked() {
                 cx.act(action);
             }

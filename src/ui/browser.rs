@@ -10,15 +10,15 @@ use super::cx::Cx;
 use super::dialogs::Purpose;
 use super::scene::error_color;
 use super::theme::{Palette, SMALL, caption};
-use super::widget::empty;
 use super::widget::texture::depth_image;
+use super::widget::{empty, progress};
 use crate::app::action::Action;
-use crate::app::command::{Command, LibraryCommand, Pane};
+use crate::app::command::{Command, LibraryCommand, Pane, TasksCommand};
+use crate::app::evaluate::{ScoreChoice, SourceScores, Standing};
 use crate::app::labels::Review;
-use crate::app::library::{Place, Sort};
+use crate::app::library::{Place, Sort, short_name};
 use crate::domain::dataset::PairId;
 use crate::domain::evaluation::Figure;
-use crate::domain::units;
 
 /// Height of a row, points.
 const ROW: f32 = 40.0;
@@ -124,7 +124,8 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         }
         response.on_hover_text(
             "Words of the name or tool. tool:rod narrows to tools; is:todo, is:in-progress, is:flagged, is:done and \
-             is:skip to review states (Ctrl+F)",
+             is:skip to review states; angle>5, psnr<20, ssim<0.8, rms>1, named<100 to scores (of the source chosen, \
+             or measured:angle>2) in °, dB, mm and % (Ctrl+F)",
         );
         let sort = cx.state.library.sort;
         let combo = egui::ComboBox::from_id_salt("sort").width(sort_width).selected_text(sort.name());
@@ -137,6 +138,7 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         });
         response.response.accessible_name("Sort").on_hover_text("Order of the list");
     });
+    score_row(cx, ui);
     if let Some(open) = &cx.state.library.open
         && open.tools.len() > 1
     {
@@ -154,6 +156,49 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
             }
         });
         response.response.accessible_name("Tool").on_hover_text("Only pairs of one tool");
+    }
+}
+
+/// By which score the list is ordered, colored and filtered; nothing while there are no scores.
+fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let table = &cx.state.table;
+    let Some((by, figure)) = table.by() else { return };
+    let (chosen, sorted) = (table.chosen.clone(), cx.state.library.sort == Sort::Score);
+    let mut next = None;
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let direction = 56.0;
+        let width = 0.5 * (ui.available_width() - direction - 24.0).max(60.0);
+        let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(figure.name()).truncate();
+        let response = combo.show_ui(ui, |ui| {
+            for f in by.figures() {
+                if ui.selectable_label(f == figure, f.name()).on_hover_text(f.tip()).clicked() {
+                    next = Some(ScoreChoice { figure: Some(f), ..chosen.clone() });
+                }
+            }
+        });
+        let tip = "The score that the list shows, and is sorted and filtered by";
+        response.response.accessible_name("Score").on_hover_text(tip);
+        let combo = egui::ComboBox::from_id_salt("source").width(width).selected_text(by.short()).truncate();
+        let response = combo.show_ui(ui, |ui| {
+            for source in &table.scores.sources {
+                if ui.selectable_label(source.name == by.name, &*source.name).clicked() {
+                    next = Some(ScoreChoice { source: Some(source.name.clone()), ..chosen.clone() });
+                }
+            }
+        });
+        let tip = "Whose score: the measured imprints' (what no generator can beat), or a generator's";
+        response.response.accessible_name("Source of the score").on_hover_text(tip);
+        let text = if chosen.best_first { "best" } else { "worst" };
+        let button = egui::Button::new(RichText::new(text).size(SMALL)).selected(sorted);
+        let tip = "Which come first; N shows the next worst. A click turns the order round";
+        if ui.add_sized([direction, 18.0], button).accessible_name("Order of the scores").on_hover_text(tip).clicked() {
+            // The first click sorts, the next ones turn round.
+            next = Some(ScoreChoice { best_first: sorted && !chosen.best_first, ..chosen.clone() });
+        }
+    });
+    if let Some(next) = next {
+        cx.push(LibraryCommand::SetScore(next));
     }
 }
 
@@ -182,6 +227,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
             });
         }
     });
+    scoring(cx, ui);
     if let Some(failure) = &library.failure {
         ui.label(RichText::new(failure.to_string()).color(cx.p.wrong).size(SMALL));
     }
@@ -200,6 +246,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         } else if empty::show(ui, "Nothing passes the filter", "", Some(("Clear the filter", "Shows all pairs"))) {
             cx.push(LibraryCommand::SetFilter(String::new()));
             cx.push(LibraryCommand::SetToolFilter(None));
+            cx.push(LibraryCommand::Brush(None));
         }
         return;
     }
@@ -230,6 +277,58 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     });
     if output.inner != cx.state.library.rows {
         cx.push(LibraryCommand::ShowRows(output.inner));
+    }
+}
+
+/// What is brushed, and how far the scores are.
+fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
+    if let Some(brush) = &cx.state.library.brush {
+        let button = egui::Button::new(format!("{} brushed ×", brush.len())).selected(true);
+        let response = ui.add(button).accessible_name("Show all pairs again");
+        if response.on_hover_text("Only the pairs brushed in the scatter are listed. Shows all again (Esc)").clicked() {
+            cx.push(LibraryCommand::Brush(None));
+        }
+    }
+    let total = cx.state.library.pairs().len();
+    let scored = cx.state.table.by().map_or(0, |(source, _)| source.scored);
+    let possible = Action::PredictAll.command(cx.state).is_some();
+    if (possible || cx.state.evaluating().is_some()) && scored < total {
+        predict_all(cx, ui, scored);
+    }
+}
+
+/// The button that scores all pairs, or how far that is.
+pub(super) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
+    let total = cx.state.library.pairs().len();
+    ui.horizontal(|ui| match cx.state.evaluating() {
+        Some((ticket, task)) => {
+            let (fraction, cancelling) = (task.progress.fraction(), task.cancelling);
+            let text = if cancelling {
+                "stopping".to_owned()
+            } else {
+                format!("{} of {}", task.progress.done, task.progress.total)
+            };
+            progress::bar(ui, (ui.available_width() - 64.0).clamp(60.0, 260.0), fraction, &text);
+            let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
+            if cancel.on_hover_text("Stop; what was scored until then is kept").clicked() {
+                cx.push(TasksCommand::Cancel(ticket));
+            }
+        }
+        None => {
+            cx.action_button(ui, Action::PredictAll, "Predict all");
+            ui.label(caption(format!("{scored} of {total} scored"), cx.p));
+        }
+    });
+}
+
+/// The color of a score: by size where that means something on its own, else by how it stands among the others.
+pub(super) fn score_color(p: &Palette, source: &SourceScores, figure: Figure, value: f64) -> Color32 {
+    match (figure, source.standing(figure, value)) {
+        (Figure::Angle, _) if value.is_nan() => p.wrong,
+        (Figure::Angle, _) => error_color(p, value),
+        (_, Standing::Worst) => p.wrong,
+        (_, Standing::Poor) => p.caution,
+        (_, Standing::Fine) => p.text,
     }
 }
 
@@ -274,13 +373,13 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
             painter.circle_filled(dot, 4.0, color);
         }
         let mut right = rect.right() - 18.0;
-        if let Some((text, color)) = figure_text(cx, &entry.name) {
+        if let Some((text, color)) = figure_text(cx, id) {
             let at = pos2(right, rect.bottom() - 5.0);
             right = painter.text(at, Align2::RIGHT_BOTTOM, text, FontId::proportional(SMALL), color).left() - 4.0;
         }
         let clip = Rect::from_min_max(pos2(left, rect.top()), pos2(right, rect.bottom()));
         let text = ui.painter_at(clip);
-        let name = entry.name.rsplit('/').next().unwrap_or(&entry.name);
+        let name = short_name(entry);
         let (font, color) = (FontId::proportional(13.0), if selected { p.strong } else { p.text });
         let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), color).size().x;
         let name = cut_in_the_middle(name, rect.right() - 18.0 - left, width);
@@ -299,7 +398,7 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
 }
 
 /// A text that is no wider than there is room, with what had to go left out of its middle: names differ at their ends.
-fn cut_in_the_middle(text: &str, room: f32, width: impl Fn(&str) -> f32) -> String {
+pub(super) fn cut_in_the_middle(text: &str, room: f32, width: impl Fn(&str) -> f32) -> String {
     if width(text) <= room {
         return text.to_owned();
     }
@@ -313,17 +412,11 @@ fn cut_in_the_middle(text: &str, room: f32, width: impl Fn(&str) -> f32) -> Stri
     fitting.unwrap_or_else(|| "…".to_owned())
 }
 
-/// The figure of a pair in the results table that the list is ordered by, else the one that counts most.
-fn figure_text(cx: &Cx<'_>, pair: &str) -> Option<(String, Color32)> {
-    let table = &cx.state.table;
-    let figure = cx.state.library.sort.figure().or_else(|| table.worst_by())?;
-    let value = table.figure(pair, figure)?;
-    Some(match figure {
-        Figure::Angle if value.is_nan() => ("no pose".to_owned(), cx.p.wrong),
-        Figure::Angle => (units::text_deg(value), error_color(cx.p, value)),
-        Figure::Psnr => (format!("{value:.1} dB"), cx.p.text),
-        Figure::Ssim => (format!("{value:.3}"), cx.p.text),
-    })
+/// The score of a pair that the list is about.
+fn figure_text(cx: &Cx<'_>, pair: PairId) -> Option<(String, Color32)> {
+    let (source, figure) = cx.state.table.by()?;
+    let value = source.value(pair, figure)?;
+    Some((figure.text(value), score_color(cx.p, source, figure, value)))
 }
 
 /// The picture of a pair's measured imprint, if it is there.

@@ -6,13 +6,14 @@ use std::time::{Duration, Instant};
 
 use eframe::egui::{self, Key, RichText};
 
+use crate::app::export::Output;
 use crate::ui::theme::{Palette, caption};
 
 /// A dialog that ends empty sooner than a person could have closed it was never shown.
 const NEVER_SHOWN: Duration = Duration::from_millis(700);
 
 /// What is being chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Purpose {
     /// A folder with pairs, to open.
     Folder,
@@ -22,6 +23,8 @@ pub(super) enum Purpose {
     Export,
     /// The folder that the results table is written to.
     Table,
+    /// Where something is written.
+    Output(Output),
 }
 
 impl Purpose {
@@ -30,6 +33,7 @@ impl Purpose {
             Self::Folder => "Open a folder of pairs",
             Self::File => "Open a file of a data set",
             Self::Export => "Export masks to a folder",
+            Self::Output(output) => output.title(),
             Self::Table => "Write the results table to a folder",
         }
     }
@@ -76,6 +80,10 @@ impl Dialogs {
             let path = match purpose {
                 Purpose::Folder | Purpose::Export | Purpose::Table => dialog.pick_folder(),
                 Purpose::File => dialog.pick_file(),
+                Purpose::Output(output) => match output.file_name() {
+                    Some(name) => dialog.set_file_name(name).save_file(),
+                    None => dialog.pick_folder(),
+                },
             };
             // The window may be gone by now: then nobody waits for the answer.
             if sender.send((purpose, path, started.elapsed())).is_ok() {
@@ -125,7 +133,14 @@ impl Dialogs {
             if std::mem::take(&mut state.fresh) {
                 edit.request_focus();
             }
-            ui.label(caption("A folder in the lab's layout, a folder of image pairs, or any file in one.", p));
+            let what = match state.purpose {
+                Purpose::Output(output) => match output.file_name() {
+                    Some(name) => format!("A file such as {name}"),
+                    None => "A folder; it is made if it is not there.".to_owned(),
+                },
+                _ => "A folder in the lab's layout, a folder of image pairs, or any file in one.".to_owned(),
+            };
+            ui.label(caption(what, p));
             let enter = edit.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
             ui.horizontal(|ui| {
                 let text = state.text.trim();

@@ -3,6 +3,7 @@
 mod bar;
 mod link;
 mod paint;
+mod versus;
 
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use super::theme::Palette;
 use super::widget::colorbar;
 use super::widget::empty;
 use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, ViewTransform, shows_squares};
-use super::widget::texture::{Histogram, Memo, depth_image, difference_gain, rgb_image};
+use super::widget::texture::{Histogram, Memo, depth_image, picture_image};
 use crate::app::command::{Hover, Pane, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::results::Preview;
@@ -21,6 +22,7 @@ use crate::app::settings::{ColorMap as MapChoice, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::grid::{DepthMap, RgbGrid};
+use crate::domain::picture;
 use crate::domain::rig::{PadId, Sensor, SensorKind};
 use crate::domain::sample::Scale;
 use crate::domain::turn::Turn;
@@ -44,12 +46,21 @@ pub(super) struct Memory {
     painting: Option<(Pane, PadId)>,
     /// Outlines of masks.
     outlines: Memo<Vec<[[f32; 2]; 2]>>,
+    /// What the comparison of any two imprints remembers.
+    compared: versus::Compared,
 }
 
 impl Default for Memory {
     fn default() -> Self {
         let view = ViewTransform::default();
-        Self { gel_view: view, bubble_view: view, error_mm: 4.0, painting: None, outlines: Memo::default() }
+        Self {
+            gel_view: view,
+            bubble_view: view,
+            error_mm: 4.0,
+            painting: None,
+            outlines: Memo::default(),
+            compared: versus::Compared::default(),
+        }
     }
 }
 
@@ -61,7 +72,13 @@ impl Memory {
         }
         if only != Some(SensorKind::Color) {
             self.bubble_view = ViewTransform::default();
+            self.compared.fit();
         }
+    }
+
+    /// Half the range of the error's colors, meters.
+    pub(super) fn error_m(&self) -> f32 {
+        self.error_mm * 1e-3
     }
 
     /// Follows the pen no further; whether it was drawing.
@@ -119,6 +136,9 @@ fn usual_size(cx: &Cx<'_>, kind: SensorKind) -> [usize; 2] {
 
 /// The pane of one kind of image, for every finger on screen.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane) {
+    if pane == Pane::Compare {
+        return versus::show(cx, ui, memory);
+    }
     let bar = matches!(pane, Pane::Measured | Pane::Predicted | Pane::Error);
     let full = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(full);
@@ -319,11 +339,11 @@ fn gel_image(
     let recipe = cx.state.chosen(finger).filter(|_| pane == Pane::Predicted);
     let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), (touch, pane, recipe), squares, || {
         let picture = if matches!(pane, Pane::GelDifference | Pane::Predicted) {
-            rgb_image(image, difference_gain(image), 128.0)
+            picture::difference(image)
         } else {
-            rgb_image(image, 1.0, 0.0)
+            picture::plain(image)
         };
-        (picture, None)
+        (picture_image(&picture), None)
     });
     output.paint(picture.texture.id(), Color32::WHITE);
     if let Some(px) = output.hovered {

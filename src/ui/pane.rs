@@ -59,6 +59,7 @@ fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
         Kind::Form => return,
         Kind::Imprint(_) if cx.state.selection.panes.contains(&Pane::Masks) => help::PAINT,
         Kind::Color | Kind::Imprint(_) | Kind::Error => help::IMAGE,
+        Kind::Versus => help::VERSUS,
         Kind::Scene(_) => help::SCENE,
         Kind::Steps => help::STEPS,
         Kind::Map => help::BASIN,
@@ -95,6 +96,8 @@ impl Behavior<Pane> for Docking<'_, '_> {
                 if response.double_clicked() {
                     self.panes.maximized = Some(*pane);
                 }
+                let error_m = self.panes.memories.images.error_m();
+                response.context_menu(|ui| super::export::menu(self.cx, ui, *pane, error_m));
                 response.on_hover_text(format!("{}. Drag to move, double-click to maximize", pane.tip()))
             }
             _ => response,
@@ -122,6 +125,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
             self.panes.maximized = Some(*pane);
         }
         help_mark(self.cx, ui, *pane);
+        super::export::button(self.cx, ui, *pane, self.panes.memories.images.error_m());
     }
 
     fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
@@ -186,6 +190,7 @@ pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pa
                     panes.maximized = None;
                 }
                 help_mark(cx, ui, pane);
+                super::export::button(cx, ui, pane, panes.memories.images.error_m());
             });
         });
     });

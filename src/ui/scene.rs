@@ -35,6 +35,9 @@ use crate::gpu::pick::nearest_point;
 use crate::gpu::view::{Camera, Preset};
 use crate::work::cloud::Clouds;
 
+pub(super) use build::{guides, parts};
+pub(super) use layers::{DISTANCE_MAP, outline};
+pub(super) use legend::distances;
 pub(super) use overlay::{angle_text, error_color, pose_details};
 
 /// Width of the column of buttons, points.
@@ -315,8 +318,10 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
         cx.push(ViewCommand::HoverPixel(hover));
         cx.push(ViewCommand::HoverPoint(Some(point)));
     }
+    let off = distance_at(cx, source, finger, index, clouds);
+    let off = off.map_or(String::new(), |off| format!("   {} from the model", units::text_mm(off)));
     cx.shared.readout = Some(format!(
-        "3D {} ({}, {})   x {:.2}  y {:.2}  z {:.2} mm in the grasp frame",
+        "3D {} ({}, {})   x {:.2}  y {:.2}  z {:.2} mm in the grasp frame{off}",
         cx.state.finger_name(finger),
         pixel[0],
         pixel[1],
@@ -326,7 +331,17 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
     ));
 }
 
+/// How far a point lies from the registered model where distances are shown, meters; `None` of one outside the contact.
+fn distance_at(cx: &Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) -> Option<f64> {
+    let found = cx.state.deviation(source).ready().filter(|_| cx.state.shows_deviation(source))?;
+    let contact = &clouds.finger(finger)?.contact;
+    // Distances are of the contact points alone, in their order.
+    let at = contact.get(..index)?.iter().filter(|contact| **contact).count();
+    let off = contact[index].then(|| found.points[finger].as_ref()?.get(at).copied())??;
+    Some(f64::from(off)).filter(|off| off.is_finite())
+}
+
 /// A color as the renderer takes it.
-fn rgb(c: Color32) -> [f32; 3] {
+pub(super) fn rgb(c: Color32) -> [f32; 3] {
     [f32::from(c.r()) / 255.0, f32::from(c.g()) / 255.0, f32::from(c.b()) / 255.0]
 }

@@ -51,7 +51,7 @@ fn save(folder: Option<&Path>, image: &ColorImage) -> Command {
     let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| p.to_array()).collect();
     let written = image::save_buffer(&path, &bytes, width, height, image::ExtendedColorType::Rgba8);
     match written {
-        Ok(()) => Command::Tasks(TasksCommand::Notice(format!("Saved {}", path.display()))),
+        Ok(()) => Command::Tasks(TasksCommand::Saved(format!("Saved {}", path.display()), path)),
         Err(err) => Command::Tasks(TasksCommand::Report(TaskError::new(WHAT, format!("{err}: {}", path.display())))),
     }
 }
@@ -70,7 +70,10 @@ mod tests {
         let part = Some(Rect::from_min_max(pos2(4.5, 2.5), pos2(12.5, 7.5)));
         let shot = Shot { part, copied: false, scale: 2.0 };
         let said = shot.take(&ctx, Some(folder.path()), &window);
-        assert!(matches!(&said, Command::Tasks(TasksCommand::Notice(text)) if text.starts_with("Saved ")), "{said:?}");
+        assert!(
+            matches!(&said, Command::Tasks(TasksCommand::Saved(text, _)) if text.starts_with("Saved ")),
+            "{said:?}"
+        );
         let file = std::fs::read_dir(folder.path()).unwrap().next().unwrap().unwrap().path();
         let written = image::open(file).unwrap().to_rgba8();
         assert_eq!(written.dimensions(), (14, 8));

@@ -157,7 +157,8 @@ fn maps(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], ensemble: &Ense
         let most = Range::of(map.as_slice()).map_or(0.0, |r| r.hi).max(1e-5);
         Range { lo: 0.0, hi: most }
     };
-    let key = EnsembleKey { recipes: recipes.to_vec(), shift: cx.state.settings.shift };
+    let Some(touch) = recipes.first().map(|recipe| recipe.touch) else { return };
+    let key = EnsembleKey { touch, recipes: recipes.to_vec(), shift: cx.state.settings.shift };
     let spread = (ensemble.spread.count > 1).then_some(&ensemble.spread.std);
     let all = [
         ("Mean", Some(&ensemble.spread.mean), map_of(cx.state), Some(range_of(cx.state)), "No seed yet"),

@@ -1,206 +1,228 @@
-//! The figures of all pairs that were generated or aligned so far, worst first.
+//! The scores of all pairs by every source, in the order of the list.
 
-use eframe::egui::{self, Align2, Color32, FontId, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use eframe::egui::{
+    self, Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2,
+};
 
-use super::browser::review_color;
+use super::browser::{cut_in_the_middle, predict_all, review_color, score_color};
 use super::cx::Cx;
-use super::scene::error_color;
-use super::theme::{Palette, SMALL, caption};
+use super::theme::{SMALL, medium};
 use super::widget::empty;
 use crate::app::action::Action;
-use crate::app::command::{LibraryCommand, Pane, ViewCommand};
-use crate::app::labels::Review;
-use crate::app::metrics::PairMetrics;
-use crate::app::state::State;
+use crate::app::command::{LibraryCommand, Pane};
+use crate::app::evaluate::{ScoreChoice, SourceScores};
+use crate::app::library::{Sort, short_name};
 use crate::domain::dataset::PairId;
-use crate::domain::rig::PadId;
-use crate::domain::units;
+use crate::domain::evaluation::{Figure, mean};
 
 /// Height of a row, points.
 const ROW: f32 = 24.0;
-
-/// The columns: heading, share of the width, whether it is a number, tooltip.
-const COLUMNS: [(&str, f32, bool, &str); 8] = [
-    ("Pair", 1.6, false, "Name of the pair"),
-    ("Tool", 1.9, false, "Tool of the pair"),
-    ("Finger", 0.7, false, "Which finger's prediction"),
-    ("PSNR dB", 0.8, true, "Prediction against truth; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed"),
-    ("SSIM", 0.7, true, "Structural similarity; range 22.5 mm, or both scaled to 0..1 where the scale is assumed"),
-    ("Error mm", 0.8, true, "Mean absolute error of the prediction, millimeters"),
-    ("Angle° meas.", 1.0, true, "Angle error of the pose from the measured imprint, degrees"),
-    ("Angle° pred.", 1.0, true, "Angle error of the pose from the predicted imprint, degrees"),
+/// Height of the head, which has two lines.
+const HEAD: f32 = 36.0;
+/// Widths of the columns of names, points.
+const NAMES: [f32; 2] = [90.0, 110.0];
+/// The least width of a number's column, points: what finds no room is left out.
+const NUMBER: f32 = 62.0;
+/// The figures that columns are made of, the most telling first.
+const FIGURES: [Figure; 8] = [
+    Figure::Angle,
+    Figure::Psnr,
+    Figure::Ssim,
+    Figure::Rms,
+    Figure::Tool,
+    Figure::PsnrNoiseFree,
+    Figure::SsimTool,
+    Figure::SsimNoiseFree,
 ];
 
-struct Row {
-    pair: PairId,
-    name: String,
-    tool: String,
-    finger: Option<PadId>,
-    review: Review,
-    numbers: [Option<f64>; 5],
-    /// Whether the poses were set by hand.
-    by_hand: [bool; 2],
-}
+/// Nothing is kept between frames: the order is the list's.
+pub(super) type Memory = ();
 
-/// The order of the rows.
-pub(super) struct Memory {
-    /// The column sorted by, and whether downwards.
-    sort: (usize, bool),
-}
-
-impl Default for Memory {
-    fn default() -> Self {
-        Self { sort: (4, false) }
-    }
-}
+/// A column of numbers.
+type Column<'a> = (&'a SourceScores, Figure);
 
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
-        let mut rows = rows(cx.state);
-        if rows.is_empty() {
-            let action = Action::Generate.command(cx.state).map(|_| ("Generate (Ctrl+G)", Action::Generate.tooltip()));
-            if empty::show(
-                ui,
-                "No metrics yet",
-                "Pairs appear here once they were generated or aligned, the worst first",
-                action,
-            ) {
-                cx.act(Action::Generate);
+        let table = &cx.state.table;
+        let total = cx.state.library.pairs().len();
+        let scored = table.scores.sources.iter().map(|source| source.scored).min().unwrap_or(0);
+        if scored < total || cx.state.evaluating().is_some() {
+            predict_all(cx, ui, scored);
+        }
+        if table.scores.sources.is_empty() {
+            if cx.state.evaluating().is_none() {
+                let action = Action::PredictAll.command(cx.state);
+                let action = action.map(|_| ("Predict all", Action::PredictAll.tooltip()));
+                let why = "Every pair by every source appears here: measured imprints and the chosen generators";
+                if empty::show(ui, "No scores yet", why, action) {
+                    cx.act(Action::PredictAll);
+                }
             }
             return;
         }
-        let (column, down) = memory.sort;
-        sort(&mut rows, column, down);
-        summary(cx, ui, &rows);
-        header(cx.p, ui, memory);
+        let columns = columns(&table.scores.sources, ui.available_width());
+        let note = super::images::scale_note(cx.state);
+        if !note.is_empty() {
+            ui.label(RichText::new(note).size(SMALL).color(cx.p.caution));
+        }
+        head(cx, ui, &columns);
+        means(cx, ui, &columns);
         ui.spacing_mut().item_spacing.y = 0.0;
-        let n = rows.len();
+        let n = cx.state.library.order.len();
         ScrollArea::vertical().auto_shrink(false).id_salt("table").show_rows(ui, ROW, n, |ui, range| {
-            for row in rows.get(range).unwrap_or_default() {
-                row_ui(cx, ui, row);
+            for row in range {
+                if let Some(pair) = cx.state.library.order.get(row).copied() {
+                    row_ui(cx, ui, pair, &columns);
+                }
             }
         });
     });
 }
 
-/// The rows, in the order of the results.
-fn rows(state: &State) -> Vec<Row> {
-    let row = |f: &PairMetrics<'_>| {
-        let entry = state.library.entry(f.pair)?;
-        let [measured, predicted] = f.poses.map(|pose| pose.error_rad.map(f64::to_degrees));
-        let c = f.comparison;
-        Some(Row {
-            pair: f.pair,
-            name: entry.name.rsplit('/').next().unwrap_or(&entry.name).to_owned(),
-            tool: entry.tool.as_deref().unwrap_or("").trim_start_matches("pattern_").replace('_', " "),
-            finger: f.finger,
-            review: state.document.review(&entry.name),
-            numbers: [
-                c.and_then(|c| c.psnr_db),
-                c.and_then(|c| c.ssim),
-                c.map(|c| units::mm(c.mae_m)),
-                measured,
-                predicted,
-            ],
-            by_hand: f.poses.map(|pose| pose.by_hand),
-        })
+/// The columns that there is room for, each source's together: the most telling figures of all sources first.
+fn columns(sources: &[SourceScores], width: f32) -> Vec<Column<'_>> {
+    let room = ((width - NAMES.iter().sum::<f32>() - 20.0) / NUMBER).max(1.0) as usize;
+    let telling = FIGURES.iter().flat_map(|figure| sources.iter().map(move |source| (source, *figure)));
+    let taken: Vec<Column<'_>> = telling.filter(|(source, figure)| source.has(*figure)).take(room).collect();
+    let of = |source: &SourceScores| {
+        let name = source.name.clone();
+        taken.iter().copied().filter(move |(taken, _)| taken.name == name).collect::<Vec<_>>()
     };
-    state.metrics_so_far().iter().filter_map(row).collect()
+    sources.iter().flat_map(of).collect()
 }
 
-/// Sorts by a column; rows without a number come last either way.
-fn sort(rows: &mut [Row], column: usize, down: bool) {
-    rows.sort_by(|a, b| {
-        let order = match column {
-            0 => a.pair.cmp(&b.pair),
-            1 => a.tool.cmp(&b.tool).then(a.pair.cmp(&b.pair)),
-            2 => a.finger.cmp(&b.finger).then(a.pair.cmp(&b.pair)),
-            c => match (a.numbers[c - 3], b.numbers[c - 3]) {
-                (Some(x), Some(y)) => x.total_cmp(&y),
-                (Some(_), None) => return std::cmp::Ordering::Less,
-                (None, Some(_)) => return std::cmp::Ordering::Greater,
-                (None, None) => a.pair.cmp(&b.pair),
-            },
-        };
-        if down { order.reverse() } else { order }
-    });
+/// Where the names and the numbers stand.
+fn cells(rect: Rect, numbers: usize) -> ([Rect; 2], Vec<Rect>) {
+    let cell = |left: f32, width: f32| Rect::from_min_size(pos2(left, rect.top()), vec2(width, rect.height()));
+    let [pair, tool] = NAMES;
+    let start = rect.left() + pair + tool;
+    let width = (rect.right() - 20.0 - start) / numbers.max(1) as f32;
+    let names = [cell(rect.left(), pair), cell(rect.left() + pair, tool)];
+    (names, (0..numbers).map(|at| cell(start + at as f32 * width, width)).collect())
 }
 
-fn summary(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
-    let mean = |i: usize| {
-        let values: Vec<f64> = rows.iter().filter_map(|r| r.numbers[i]).collect();
-        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-    };
-    let text = |name: &str, v: Option<f64>, decimals: usize| v.map(|v| format!("{name} {v:.decimals$}"));
-    let parts: Vec<String> = [
-        Some(format!("{} rows so far", rows.len())),
-        text("mean PSNR", mean(0), 1),
-        text("SSIM", mean(1), 3),
-        text("error mm", mean(2), 2),
-        text("angle° measured", mean(3), 1),
-        text("predicted", mean(4), 1),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    let note = super::images::scale_note(cx.state);
-    ui.horizontal(|ui| {
-        ui.label(caption(parts.join("   "), cx.p));
-        if !note.is_empty() {
-            ui.label(RichText::new(note).size(SMALL).color(cx.p.caution));
-        }
-    });
-}
-
-/// Left end and width of each column.
-fn columns(left: f32, width: f32) -> [(f32, f32); 8] {
-    let total: f32 = COLUMNS.iter().map(|c| c.1).sum();
-    let mut x = left;
-    COLUMNS.map(|(_, share, _, _)| {
-        let w = (width - 20.0) * share / total;
-        let start = x;
-        x += w;
-        (start, w)
-    })
-}
-
-fn header(p: &Palette, ui: &mut Ui, memory: &mut Memory) {
-    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+fn head(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
+    let p = cx.p;
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), HEAD), Sense::hover());
     ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, p.line));
-    let (column, down) = memory.sort;
-    for (i, ((name, _, number, tip), (x, w))) in COLUMNS.iter().zip(columns(rect.left(), rect.width())).enumerate() {
-        let cell = egui::Rect::from_min_size(pos2(x, rect.top()), vec2(w, ROW));
-        let response = ui.interact(cell, ui.scope_id().with(("column", i)), Sense::click());
+    let lower = Rect::from_min_max(pos2(rect.left(), rect.center().y), rect.max);
+    let (names, numbers) = cells(lower, columns.len());
+    let font = FontId::new(SMALL, medium());
+    for (cell, (name, sort)) in names.iter().zip([("Pair", Sort::Natural), ("Tool", Sort::Tool)]) {
+        let response = ui.interact(*cell, ui.scope_id().with(name), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Sort by {name}")));
-        let color = if i == column || response.hovered() { p.strong } else { p.weak };
-        let font = FontId::new(SMALL, super::theme::medium());
-        let (at, anchor) = if *number {
-            (pos2(cell.right() - 14.0, cell.center().y), Align2::RIGHT_CENTER)
-        } else {
-            (pos2(cell.left() + 6.0, cell.center().y), Align2::LEFT_CENTER)
+        let color = if cx.state.library.sort == sort || response.hovered() { p.strong } else { p.weak };
+        let left = pos2(cell.left() + 6.0, cell.center().y);
+        ui.painter_at(*cell).text(left, Align2::LEFT_CENTER, name, font.clone(), color);
+        if response.on_hover_text("Sorts the list").clicked() {
+            cx.push(LibraryCommand::SetSort(sort));
+        }
+    }
+    let by = cx.state.table.by().filter(|_| cx.state.library.sort == Sort::Score);
+    let best_first = cx.state.table.chosen.best_first;
+    let mut above: Option<(&SourceScores, Rect)> = None;
+    for ((source, figure), cell) in columns.iter().zip(numbers) {
+        above = match above {
+            Some((before, place)) if before.name == source.name => Some((before, place.union(cell))),
+            before => {
+                source_name(cx, ui, before, rect);
+                Some((source, cell))
+            }
         };
-        let place = ui.painter_at(cell).text(at, anchor, name, font, color);
-        if i == column {
+        let sorted = by.is_some_and(|(s, f)| s.name == source.name && f == *figure);
+        let response = ui.interact(cell, ui.scope_id().with((&source.name, figure)), Sense::click());
+        let name = format!("Sort by {} of {}", figure.name(), source.short());
+        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &name));
+        let color = if sorted || response.hovered() { p.strong } else { p.weak };
+        let text = match figure.unit() {
+            "" => heading(*figure).to_owned(),
+            unit => format!("{} {unit}", heading(*figure)),
+        };
+        let right = pos2(cell.right() - 14.0, cell.center().y);
+        let place = ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), color);
+        if sorted {
+            // Down: from bad to good.
             let c = pos2(place.right() + 7.0, cell.center().y);
-            let s = if down { 1.0 } else { -1.0 };
+            let s = if best_first { -1.0 } else { 1.0 };
             let points = vec![c + vec2(-3.0, -2.0 * s), c + vec2(3.0, -2.0 * s), c + vec2(0.0, 2.5 * s)];
             ui.painter().add(egui::Shape::convex_polygon(points, color, egui::Stroke::NONE));
         }
-        if response.on_hover_text(format!("{tip}. Click to sort; again to turn round")).clicked() {
-            // Worst first: small PSNR and SSIM, large errors.
-            memory.sort = if i == column { (i, !down) } else { (i, i >= 5) };
+        let tip = format!(
+            "{}: {}\n{}. A click sorts the list, the worst first; another turns it round",
+            source.name,
+            figure.name(),
+            figure.tip()
+        );
+        if response.on_hover_text(tip).clicked() {
+            cx.push(LibraryCommand::SetScore(ScoreChoice {
+                source: Some(source.name.clone()),
+                figure: Some(*figure),
+                best_first: sorted && !best_first,
+            }));
         }
+    }
+    source_name(cx, ui, above, rect);
+}
+
+/// The name of a source above its columns.
+fn source_name(cx: &Cx<'_>, ui: &Ui, source: Option<(&SourceScores, Rect)>, rect: Rect) {
+    let Some((source, place)) = source else { return };
+    let color = if source.upper_bound { cx.p.truth } else { cx.p.prediction };
+    let font = FontId::new(SMALL, medium());
+    let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), color).size().x;
+    let name = cut_in_the_middle(&source.name, place.width() - 16.0, width);
+    let right = pos2(place.right() - 14.0, rect.top() + 0.25 * rect.height());
+    ui.painter().text(right, Align2::RIGHT_CENTER, name, font.clone(), color);
+}
+
+/// A figure in a word.
+fn heading(figure: Figure) -> &'static str {
+    match figure {
+        Figure::Angle => "angle",
+        Figure::Rms => "RMS",
+        Figure::Tool => "tool",
+        Figure::PsnrNoiseFree => "clean",
+        Figure::SsimNoiseFree => "SSIM cl.",
+        Figure::SsimTool => "SSIM t.",
+        Figure::Psnr | Figure::Ssim | Figure::Seconds => figure.name(),
     }
 }
 
-fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: &Row) {
+/// The means over the pairs of the list.
+fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
+    ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, cx.p.line));
+    let (names, numbers) = cells(rect, columns.len());
+    let order = &cx.state.library.order;
+    let left = pos2(names[0].left() + 6.0, rect.center().y);
+    let what = format!("mean of the {} listed", order.len());
+    ui.painter().text(left, Align2::LEFT_CENTER, what, FontId::proportional(SMALL), cx.p.weak);
+    for ((source, figure), cell) in columns.iter().zip(numbers) {
+        let values = order.iter().filter_map(|pair| source.value(*pair, *figure)).filter(|v| v.is_finite());
+        let text = mean(values).map_or("–".to_owned(), |mean| number(*figure, mean));
+        put(ui, cell, &text, cx.p.strong);
+    }
+    response.on_hover_text("Means over the pairs of the list that have a number; grasps without a pose are left out");
+}
+
+/// A value without its unit, which the heading says.
+fn number(figure: Figure, value: f64) -> String {
+    if value.is_nan() { figure.text(value) } else { format!("{:.*}", figure.decimals(), figure.shown(value)) }
+}
+
+fn put(ui: &Ui, cell: Rect, text: &str, color: Color32) {
+    let right = pos2(cell.right() - 14.0, cell.center().y);
+    ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, FontId::proportional(12.0), color);
+}
+
+fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, pair: PairId, columns: &[Column<'_>]) {
     let p = cx.p;
-    let selected =
-        cx.state.selection.pair == Some(row.pair) && row.finger.is_none_or(|f| f == cx.state.selection.finger);
+    let Some(entry) = cx.state.library.entry(pair) else { return };
+    let selected = cx.state.selection.pair == Some(pair);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
-    response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, format!("Row {}", row.name)));
+    response.widget_info(|| WidgetInfo::selected(Role::Button, true, selected, format!("Row {}", entry.name)));
     let fill = if selected {
         p.selected
     } else if response.hovered() {
@@ -209,73 +231,25 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, row: &Row) {
         Color32::TRANSPARENT
     };
     ui.painter().rect_filled(rect, 3.0, fill);
-    let finger = row.finger.map_or("both".into(), |finger| cx.state.finger_name(finger));
-    for (i, (x, w)) in columns(rect.left(), rect.width()).into_iter().enumerate() {
-        let cell = egui::Rect::from_min_size(pos2(x, rect.top()), vec2(w, ROW));
-        let painter = ui.painter_at(cell);
-        let text = |text: &str, color: Color32| {
-            painter.text(
-                pos2(cell.left() + 6.0, cell.center().y),
-                Align2::LEFT_CENTER,
-                text,
-                FontId::proportional(12.0),
-                color,
-            )
-        };
-        match i {
-            0 => text(&row.name, p.strong),
-            1 => text(&row.tool, p.text),
-            2 => text(&finger, p.text),
-            i => {
-                let v = row.numbers[i - 3];
-                let decimals = [1, 3, 2, 1, 1][i - 3];
-                let (text, color) = match v {
-                    Some(v) if i >= 6 => {
-                        let hand = if row.by_hand[i - 6] { "by hand " } else { "" };
-                        (format!("{hand}{v:.decimals$}"), error_color(p, v.to_radians()))
-                    }
-                    Some(v) => (format!("{v:.decimals$}"), p.strong),
-                    None => ("–".to_owned(), p.weak),
-                };
-                painter.text(
-                    pos2(cell.right() - 14.0, cell.center().y),
-                    Align2::RIGHT_CENTER,
-                    text,
-                    FontId::proportional(12.0),
-                    color,
-                )
-            }
-        };
+    let (names, numbers) = cells(rect, columns.len());
+    let tool = entry.tool.as_deref().unwrap_or("");
+    let tool = tool.strip_prefix("pattern_").unwrap_or(tool).replace('_', " ");
+    let font = FontId::proportional(12.0);
+    for (cell, text, color) in [(names[0], short_name(entry), p.strong), (names[1], &tool, p.text)] {
+        let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), color).size().x;
+        let text = cut_in_the_middle(text, cell.width() - 10.0, width);
+        let left = pos2(cell.left() + 6.0, cell.center().y);
+        ui.painter_at(cell).text(left, Align2::LEFT_CENTER, text, font.clone(), color);
     }
-    ui.painter().circle_filled(pos2(rect.right() - 10.0, rect.center().y), 3.5, review_color(p, row.review));
-    if response.on_hover_text("Show this pair").clicked() {
-        cx.push(LibraryCommand::Select(row.pair));
-        if let Some(finger) = row.finger {
-            cx.push(ViewCommand::SelectFinger(finger));
+    for ((source, figure), cell) in columns.iter().zip(numbers) {
+        match source.value(pair, *figure) {
+            Some(value) => put(ui, cell, &number(*figure, value), score_color(p, source, *figure, value)),
+            None => put(ui, cell, "–", p.weak),
         }
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_without_a_number_come_last_either_way() {
-        let row = |pair: u32, v: Option<f64>| Row {
-            pair: PairId(pair),
-            name: String::new(),
-            tool: String::new(),
-            finger: None,
-            review: Review::Todo,
-            numbers: [v, None, None, None, None],
-            by_hand: [false; 2],
-        };
-        for down in [false, true] {
-            let mut rows = vec![row(0, None), row(1, Some(2.0)), row(2, Some(1.0))];
-            sort(&mut rows, 3, down);
-            let order: Vec<u32> = rows.iter().map(|r| r.pair.0).collect();
-            assert_eq!(order, if down { [1, 2, 0] } else { [2, 1, 0] });
-        }
+    let review = cx.state.document.review(&entry.name);
+    ui.painter().circle_filled(pos2(rect.right() - 10.0, rect.center().y), 3.5, review_color(p, review));
+    if response.on_hover_text(format!("{}, {}. Click to show it", entry.name, review.name())).clicked() {
+        cx.push(LibraryCommand::Select(pair));
     }
 }

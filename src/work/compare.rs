@@ -114,6 +114,26 @@ pub fn tile_of(dataset: &Dataset, id: PairId, sample: &Sample) -> Result<Option<
     Ok(dataset.bubble_tile(id, sample.laid).map_err(fail)?.as_ref().map(assumed_meters))
 }
 
+/// The prediction of another program that lies beside a pair as a picture, in the assumed meters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Beside {
+    /// As the file has it.
+    pub tile: DepthMap,
+    /// As large and turned as the measured imprint.
+    pub imprint: DepthMap,
+}
+
+/// The prediction that lies beside a pair as a picture; `None` where there is none.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn beside(dataset: &Dataset, id: PairId, sample: &Sample) -> Result<Option<Beside>, TaskError> {
+    let fail = |err: LoadError| TaskError::from_error("Stored picture", &err).with_hint(err.hint());
+    let tile = dataset.vqvae_tile(id, sample.laid).map_err(fail)?.as_ref().map(assumed_meters);
+    let imprint = dataset.vqvae_imprint(id, sample.laid).map_err(fail)?;
+    Ok(tile.zip(imprint).map(|(tile, imprint)| Beside { tile, imprint }))
+}
+
 /// An imprint as the picture of its sensor shows it: turned as that lies, and as large (`[width, height]`).
 pub fn as_tile(imprint: &DepthMap, rig: &Rig, [width, height]: [usize; 2]) -> DepthMap {
     bilinear(&turned(imprint, rig), width, height)
@@ -153,7 +173,7 @@ impl<'a> Depicted<'a> {
         sample: &Sample,
         pad: PadId,
         tile: Option<&DepthMap>,
-    ) -> Result<Self, TaskError> {
+    ) -> Result<Depicted<'a>, TaskError> {
         let tile = match (tile, drawn) {
             (None, _) => None,
             (Some(tile), Some((prediction, shift))) => Some(picture_of(prediction, shift, sample, pad, tile.size())?),

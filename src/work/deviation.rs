@@ -1,8 +1,9 @@
-//! How far the contact points lie from the registered model: [`deviation`].
+//! How far the contact points lie from the registered model: [`deviation`]; and one cloud from another: [`apart`].
 
 use super::cloud::Clouds;
-use crate::domain::deviation::{Painted, of_points, on_surface};
+use crate::domain::deviation::{Painted, of_points, on_surface, to_cloud};
 use crate::domain::frames::PlanarPose;
+use crate::domain::grid::DepthMap;
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::PerPad;
 
@@ -26,6 +27,47 @@ impl Deviation {
         let points: usize = self.points.iter().flatten().map(Vec::len).sum();
         4 * points + 28 * self.surface.mesh.vertices.len() + 12 * self.surface.mesh.triangles.len()
     }
+}
+
+/// How far the points of a cloud lie from another of the same cameras.
+#[derive(Clone, Debug)]
+pub struct Apart {
+    /// Of each point, in the order of the first cloud, meters: positive where its imprint is the deeper one; NaN of a
+    /// finger that the other cloud lacks.
+    pub points: PerPad<Vec<f32>>,
+    /// Root mean square over the contact points of the first cloud, meters; NaN without one.
+    pub contact_rms_m: f64,
+}
+
+impl Apart {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        4 * self.points.iter().flatten().map(Vec::len).sum::<usize>()
+    }
+}
+
+/// Measures the points of `a` against those of `b`. `imprints` are those that the two clouds were made of: they say which
+/// is deeper.
+pub fn apart(a: &Clouds, b: &Clouds, imprints: &PerPad<[&DepthMap; 2]>) -> Apart {
+    let (mut squares, mut count) = (0.0, 0usize);
+    let mut points = PerPad::default();
+    for (pad, cloud) in a.fingers.entries() {
+        let others = b.finger(pad).map_or(&[][..], |cloud| &cloud.points);
+        let mut found = to_cloud(&cloud.points, others);
+        for ((d, pixel), contact) in found.iter_mut().zip(&cloud.pixels).zip(&cloud.contact) {
+            let at = |depth: &DepthMap| depth.get(pixel[0].into(), pixel[1].into()).copied();
+            let deeper = imprints[pad].as_ref().and_then(|[a, b]| Some(at(a)? - at(b)?));
+            if deeper.is_some_and(|deeper| deeper < 0.0) {
+                *d = -*d;
+            }
+            if *contact && d.is_finite() {
+                squares += f64::from(*d).powi(2);
+                count += 1;
+            }
+        }
+        points[pad] = Some(found);
+    }
+    Apart { points, contact_rms_m: if count == 0 { f64::NAN } else { (squares / count as f64).sqrt() } }
 }
 
 /// Measures the contact points of both fingers against the model at a pose.

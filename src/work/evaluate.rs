@@ -3,11 +3,12 @@
 //! studio's Evaluate pane both call [`evaluate`].
 
 mod export;
+mod kept;
 mod load;
 mod methods;
 mod tool;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
 
 use serde::Serialize;
@@ -26,7 +27,8 @@ use crate::work::error::TaskError;
 use crate::work::job::JobCx;
 use crate::work::mask::MaskChoice;
 use crate::work::models;
-use methods::{Method, Models};
+use kept::Kept;
+use methods::Models;
 
 pub use export::{Report, export, rows};
 
@@ -132,8 +134,8 @@ pub struct Evaluation {
     pub scores: Vec<Scores>,
 }
 
-/// Scores every grasp of `dataset` by every method of `setup`. Predictions that are kept beside `models` are not made
-/// again. Stops early when told to, with what was scored so far.
+/// Scores every grasp of `dataset` by every method of `setup`. Figures that are kept beside `models` are not computed
+/// again, nor are predictions. Stops early when told to, with what was scored so far.
 ///
 /// # Errors
 /// If a bundle cannot be used, nothing could be scored, or it was told to stop before anything was. Pairs and
@@ -146,27 +148,31 @@ pub fn evaluate(
 ) -> Result<Evaluation, TaskError> {
     let start = Instant::now();
     cx.progress(0, 0, "loading the models");
+    let sheets = models.sheets().clone();
     let mut models = Models::open(setup, dataset, models)?;
     let work = load::plan(dataset, setup);
     let total: usize = work.iter().map(|tool| tool.ids.len()).sum();
     if total == 0 {
         return Err(TaskError::new(WHAT, "the data set has no pairs"));
     }
+    let book = Kept::open(dataset, setup, &models, &sheets, &work, false);
+    let missing = |tool: &ToolWork| ToolWork {
+        tool: tool.tool.clone(),
+        ids: tool.ids.iter().copied().filter(|id| !book.is_whole(*id)).collect(),
+    };
+    let todo: Vec<ToolWork> = work.iter().map(missing).collect();
+    let fresh: usize = todo.iter().map(|tool| tool.ids.len()).sum();
+    if fresh > 0 {
+        models.load(setup)?;
+    }
     let mut skipped = Vec::new();
-    let mut scores: Vec<Scores> = models
-        .methods
-        .iter()
-        .map(|method| Scores {
-            method: method.name().to_owned(),
-            upper_bound: matches!(method, Method::Measured),
-            grasps: Vec::new(),
-            measured_features: Vec::new(),
-        })
-        .collect();
+    let mut scores = models.empty_scores();
     let mut findings = Findings::default();
-    let (mut done, mut scale) = (0, Scale::Measured);
-    load::ahead(dataset, setup, &work, cx, |batch| {
-        let mut tool = tool::Tool::new(dataset, batch.tool.clone(), &mut skipped);
+    let (mut done, mut scale) = (total - fresh, Scale::Measured);
+    let mut whole = work.iter();
+    load::ahead(dataset, setup, &todo, cx, |batch| {
+        let name = batch.work.tool.as_deref().unwrap_or("pictures");
+        let mut tool = tool::Tool::new(dataset, batch.work, &mut skipped);
         for cases in batch.cases {
             if cx.cancel.is_cancelled() {
                 break;
@@ -180,18 +186,26 @@ pub fn evaluate(
             };
             let loaded = cases.good.len() + cases.bad.len();
             skipped.extend(cases.bad);
-            findings.extend(cases.good.iter().flat_map(|case| case.sample.notes.iter().cloned()));
-            if let Some(case) = cases.good.first() {
-                scale = case.sample.scale;
-            }
-            tool.score(&cases.good, setup, &mut models, &mut skipped, cx, &mut |method| {
-                let name = batch.tool.as_deref().unwrap_or("pictures");
+            tool.score(&cases.good, setup, &mut models, &book, &mut skipped, cx, &mut |method| {
                 cx.progress(done as u64, total as u64, format!("{name}, {method}"));
             });
             done += loaded;
-            cx.progress(done as u64, total as u64, batch.tool.clone().unwrap_or_default());
+            cx.progress(done as u64, total as u64, name);
         }
-        tool.finish(&mut scores, &mut skipped);
+        let ids = whole.next().map_or(&[][..], |tool| &tool.ids);
+        let mut again = |at: usize, ids: &[PairId]| tool::again(dataset, setup, &mut models.methods[at], ids, cx);
+        let entries = tool.finish(&book, ids, &mut again, &mut scores, &mut skipped);
+        // Of each grasp once, whatever the number of methods.
+        let mut noted = BTreeSet::new();
+        for (at, entry) in entries {
+            if noted.insert(entry.score.pair.clone()) {
+                findings.extend(entry.notes);
+            }
+            scale = entry.score.scale;
+            for (why, count) in entry.otherwise {
+                *models.made_otherwise.entry((scores[at].method.clone(), why)).or_insert(0) += count;
+            }
+        }
     });
     let groups = evaluation::groups_of(scores.iter().flat_map(|s| &s.grasps));
     if groups.is_empty() {
@@ -221,6 +235,24 @@ pub fn evaluate(
         seconds: start.elapsed().as_secs_f64(),
         scores,
     })
+}
+
+/// The figures that are kept of the grasps of `dataset` by the methods of `setup`, without computing any. Their lab SSIM
+/// is in the range of the tool's predictions at the time.
+///
+/// # Errors
+/// If a bundle cannot be opened.
+pub fn known(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Result<Vec<Scores>, TaskError> {
+    let sheets = models.sheets().clone();
+    let models = Models::open(setup, dataset, models)?;
+    let work = load::plan(dataset, setup);
+    let book = Kept::open(dataset, setup, &models, &sheets, &work, true);
+    let mut scores = models.empty_scores();
+    for (at, scores) in scores.iter_mut().enumerate() {
+        let entries = work.iter().flat_map(|tool| book.of(at, &tool.ids));
+        scores.grasps = entries.map(|(_, entry)| entry.score).collect();
+    }
+    Ok(scores)
 }
 
 /// The pairs of one tool.

@@ -234,6 +234,12 @@ pub fn without_model(
     Ok(contact::settled(imprint, mask))
 }
 
+/// What the masks of a pair are made of, from the keys of each pad in turn; see [`Contact::made_of`].
+pub fn made_of(mut keys: Vec<&'static str>, source: &'static str) -> String {
+    keys.dedup();
+    if keys.is_empty() { source.to_owned() } else { keys.join(", ") }
+}
+
 /// The imprints of a pair with their contact masks.
 #[derive(Clone, Debug)]
 pub struct Contact {
@@ -256,10 +262,8 @@ impl Contact {
     /// What the masks are made of: the key of the source; `hand` where one was drawn, `depth` where the model found
     /// nothing, `flat` where there is no contact; of the pads in turn where they differ.
     pub fn made_of(&self) -> String {
-        let mut keys: Vec<&'static str> =
-            self.masks.iter().flatten().map(|m| m.basis.key(self.source().key())).collect();
-        keys.dedup();
-        if keys.is_empty() { self.source().key().to_owned() } else { keys.join(", ") }
+        let source = self.source().key();
+        made_of(self.masks.iter().flatten().map(|m| m.basis.key(source)).collect(), source)
     }
 
     /// In words, by pad, why masks are not of the source that was asked.

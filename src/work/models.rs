@@ -24,6 +24,7 @@ use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
 use crate::infer::mask::MaskModel;
 use crate::infer::recipe::{Recipe, input_digest};
+use crate::infer::sheets::Sheets;
 use crate::infer::store::Store;
 
 /// Predictions of one touch that are read back; older ones stay on the disk.
@@ -58,6 +59,8 @@ type Loaded<T> = Option<((Arc<str>, EngineChoice), T)>;
 #[derive(Debug, Default)]
 pub struct Models {
     store: Option<Mutex<Store>>,
+    /// Scores beside the predictions.
+    sheets: Arc<Sheets>,
     generator: Mutex<Loaded<Generator>>,
     mask_model: Mutex<Loaded<MaskModel>>,
     ways: Mutex<BTreeMap<Arc<str>, Ways>>,
@@ -65,6 +68,11 @@ pub struct Models {
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Where sheets lie: beside what the store keeps, if it keeps anything.
+fn folder_of(store: &Store) -> Option<std::path::PathBuf> {
+    (store.budget() > 0).then(|| store.folder().to_owned())
 }
 
 /// What becomes of a bundle's pictures: ways to meters, steps to a color picture, and how large its condition is.
@@ -103,7 +111,8 @@ fn ready<T>(
 impl Models {
     /// Nothing is loaded yet. Predictions are kept in `store` and taken from it; `None` keeps none.
     pub fn new(store: Option<Store>) -> Self {
-        Self { store: store.map(Mutex::new), ..Self::default() }
+        let sheets = Arc::new(Sheets::new(store.as_ref().and_then(folder_of)));
+        Self { store: store.map(Mutex::new), sheets, ..Self::default() }
     }
 
     /// Further models, with the same kept predictions.
@@ -113,14 +122,21 @@ impl Models {
             let store = lock(store);
             Store::new(store.folder().to_owned(), store.budget())
         };
-        Self::new(self.store.as_ref().map(again))
+        Self { store: self.store.as_ref().map(again).map(Mutex::new), sheets: self.sheets.clone(), ..Self::default() }
     }
 
     /// Sets what kept predictions may take, bytes.
     pub fn keep_at_most(&self, bytes: u64) {
         if let Some(store) = &self.store {
-            lock(store).set_budget(bytes);
+            let mut store = lock(store);
+            store.set_budget(bytes);
+            self.sheets.set_folder(folder_of(&store));
         }
+    }
+
+    /// Scores that were computed before.
+    pub(in crate::work) fn sheets(&self) -> &Arc<Sheets> {
+        &self.sheets
     }
 
     /// The ways to meters that a generator's bundle offers; none for another kind.

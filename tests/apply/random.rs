@@ -11,10 +11,12 @@ use proptest::strategy::Union;
 use strum::IntoEnumIterator;
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, FollowCommand, Hover, InspectCommand, LabelsCommand,
-    LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
-    WorkbenchCommand,
+    AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, Hover, InspectCommand,
+    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest,
+    ViewCommand, WorkbenchCommand,
 };
+use touch2touch::app::evaluate::ScoreChoice;
+use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Request, Revision, ShiftMode, TouchKey,
@@ -26,13 +28,14 @@ use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::{
     ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
-    SceneLayer, SceneLook, Settings, Theme, Workspace,
+    SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::tasks::Ticket;
 use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};
 use touch2touch::domain::align::basin::Plane;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::diffusion::GenerateConfig;
+use touch2touch::domain::evaluation::Figure;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::hand::{HandAxis, HandPose};
@@ -42,7 +45,9 @@ use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::work::adapt::{Adapted, Scored};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::evaluate::{Evaluation, Setup};
+use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
+use touch2touch::work::subject::Subject;
 
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;
@@ -121,6 +126,23 @@ fn scene() -> impl Strategy<Value = SceneLook> {
     })
 }
 
+fn subject() -> impl Strategy<Value = Subject> {
+    let texts = [
+        "measured",
+        "prediction",
+        "prediction:seed=7",
+        "prediction:bundle=gen,steps=3,shift=raw",
+        "prediction:bundle=missing",
+        "mean:seeds=2",
+        "stored",
+    ];
+    select(texts.map(|text| text.parse().expect("a subject")).to_vec())
+}
+
+fn versus() -> impl Strategy<Value = Versus> {
+    (subject(), subject(), any_of::<VersusMode>()).prop_map(|(a, b, mode)| Versus { a, b, mode })
+}
+
 fn planar() -> impl Strategy<Value = PlanarPose> {
     point().prop_map(|p| PlanarPose { theta_rad: p.x, y_m: p.y * 1e-3, z_m: p.z * 1e-3 })
 }
@@ -159,6 +181,21 @@ fn mask() -> impl Strategy<Value = MaskSettings> {
         let choice = MaskChoice { source, top_percent: percent, ..MaskChoice::default() };
         MaskSettings { tool, radius_px, choice, ..MaskSettings::default() }
     })
+}
+
+fn form() -> impl Strategy<Value = FigureForm> {
+    let panes = proptest::collection::vec(any_of::<FigurePane>(), 0..9);
+    (proptest::option::of(any::<usize>()), panes, any::<u8>(), number())
+        .prop_map(|(first, panes, scale, error_m)| FigureForm { first, panes, scale, error_m, ..FigureForm::default() })
+}
+
+fn output() -> impl Strategy<Value = Output> {
+    let picture = (any_of::<Pane>(), proptest::option::of(any::<u8>()), number());
+    prop_oneof![
+        Just(Output::Figure),
+        source().prop_map(Output::Pair),
+        picture.prop_map(|(pane, scale, error_m)| Output::Picture { pane, scale, error_m }),
+    ]
 }
 
 fn statistics() -> ShiftStatistics {
@@ -230,9 +267,15 @@ draws! {
         1 Open(place()),
         1 Reload,
         1 ForgetRecent(place()),
-        1 SetFilter(select(vec![String::new(), "tool_a".into(), "is:todo".into(), "nothing like it".into()])),
+        1 SetFilter(select(vec![String::new(), "tool_a".into(), "is:todo".into(), "angle>5".into(), "nothing like it".into()])),
         1 SetToolFilter(proptest::option::of(Just("tool_b".to_owned()))),
         1 SetSort(any_of::<Sort>()),
+        1 SetScore((any::<bool>(), proptest::option::of(any_of::<Figure>())).prop_map(|(best_first, figure)| ScoreChoice {
+            figure,
+            best_first,
+            ..ScoreChoice::default()
+        })),
+        1 Brush(proptest::option::of(pair().prop_map(|pair| Arc::new([pair].into())))),
         1 ShowRows((0usize..20, 0usize..40).prop_map(|(a, b)| a..b)),
         4 Select(pair()),
         1 Step(any::<i64>()),
@@ -321,7 +364,14 @@ draws! {
         1 Grasps(proptest::option::of(0usize..3)),
         1 Published(any::<bool>()),
         1 Start,
+        1 All,
         1 Export(Just(PathBuf::from("table"))),
+    }
+    export: ExportCommand {
+        1 Ask(any::<bool>()),
+        1 SetForm(form()),
+        1 Place(output()),
+        1 Write(output(), Just(PathBuf::from("no/such/folder/picture.png"))),
     }
     adapt: AdaptCommand {
         1 Choose(any_of::<AdaptPairs>()),
@@ -353,6 +403,7 @@ draws! {
         1 SetCacheBudget(any::<u32>()),
         1 SetCamerasLinked(any::<bool>()),
         1 SetScene(scene()),
+        1 SetVersus(versus()),
         1 SetWorkspace(any_of::<Workspace>()),
         1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
         1 DismissHint,
@@ -366,6 +417,8 @@ draws! {
         1 LogSeen(any::<u64>()),
         1 Report(error()),
         1 Notice(Just("Something".to_owned())),
+        1 Saved(Just("Something".to_owned()), Just(PathBuf::from("no/such/folder"))),
+        1 Reveal(Just(PathBuf::from("no/such/folder"))),
     }
     // Answers that nobody waits for, or that come too late.
     answers: Answer {
@@ -385,6 +438,8 @@ draws! {
         1 Refitted(ticket(), Just(()).prop_map(|()| Box::new(statistics())), Just(None)),
         1 Progressed(ticket(), Just(Progress { done: 3, total: 4, text: "step".into(), ..Progress::default() })),
         1 Finished(ticket(), Just(None)),
+        1 Saved(ticket(), Just("Something".to_owned()), Just(PathBuf::from("no/such/folder"))),
+        1 Revealed,
         1 TaskFailed(ticket(), error()),
         1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Request::Sample(t.pair)), error()),
         1 LabelsSaved(Just("tool_a/data_0".to_owned()), Just(Revision(u64::MAX))),
@@ -427,6 +482,7 @@ fn command() -> impl Strategy<Value = Command> {
         (3, inspect().boxed()),
         (4, workbench().boxed()),
         (2, evaluate().boxed()),
+        (1, export().boxed()),
         (1, adapt().boxed()),
         (8, settings().boxed()),
         (2, tasks().boxed()),
@@ -440,6 +496,7 @@ fn command() -> impl Strategy<Value = Command> {
             | Command::Inspect(_)
             | Command::Workbench(_)
             | Command::Evaluate(_)
+            | Command::Export(_)
             | Command::Adapt(_) => {}
             Command::Settings(_) | Command::Tasks(_) | Command::Answer(_) => {}
         }

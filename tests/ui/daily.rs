@@ -2,11 +2,13 @@
 
 use eframe::egui::vec2;
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, TasksCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
+use touch2touch::app::tasks::Level;
 use touch2touch::domain::rig::lab;
+use touch2touch::work::error::TaskError;
 
 use super::rig::Rig;
 
@@ -73,11 +75,7 @@ fn a_mask_without_contact_offers_the_threshold() {
     mask.choice.top_percent = 0.0;
     rig.send(SettingsCommand::SetMask(mask));
     rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
-    assert!(
-        matches!(state(&rig).pose(MEASURED), Lookup::Absent(Absent::NoContact)),
-        "{:?}",
-        state(&rig).pose(MEASURED)
-    );
+    assert!(matches!(state(&rig).pose(MEASURED), Lookup::Failed(_)), "{:?}", state(&rig).pose(MEASURED));
     rig.shoot("daily-no-contact");
     rig.harness.get_all_by_label("Use threshold").next().unwrap().click();
     rig.harness.step();
@@ -85,4 +83,33 @@ fn a_mask_without_contact_offers_the_threshold() {
     assert_eq!(state(&rig).settings.mask.choice.source, MaskSource::Threshold);
     assert!(state(&rig).pose(MEASURED).ready().is_some(), "{:?}", state(&rig).pose(MEASURED));
     assert!(rig.harness.query_by_label("Use threshold").is_none());
+}
+
+#[test]
+fn notes_cover_nothing_and_only_errors_stay() {
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    let dismiss = |rig: &Rig| rig.harness.query_all_by_label("Dismiss").next().map(|button| button.rect());
+    // That there is no mask model is a warning: it goes by itself, and stays in the log.
+    for _ in 0..60 {
+        rig.harness.step();
+    }
+    assert!(state(&rig).log.unseen().any(|entry| entry.level == Level::Warning));
+    assert!(dismiss(&rig).is_none());
+    rig.send(TasksCommand::Report(TaskError::new("Read the cup", "the handle is missing")));
+    let note = dismiss(&rig).expect("an error is said");
+    let view = rig.harness.get_by_label("3D view, measured").rect();
+    let panes = rig.harness.get_by_label("Filter samples").rect();
+    assert!(note.top() >= view.bottom() && note.top() >= panes.bottom(), "{note:?} {view:?}");
+    rig.shoot("daily-note");
+    // A minute of the window's clock: the error stands.
+    for _ in 0..240 {
+        rig.harness.step();
+    }
+    assert!(dismiss(&rig).is_some());
+    rig.harness.get_by_label("Dismiss").click();
+    rig.harness.step();
+    rig.settle();
+    assert!(dismiss(&rig).is_none());
 }

@@ -2,7 +2,8 @@
 
 use eframe::egui::{Key, Modifiers, PointerButton, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::SettingsCommand;
+use touch2touch::app::command::{LibraryCommand, SettingsCommand};
+use touch2touch::app::results::Results;
 use touch2touch::app::settings::{Theme, Workspace};
 
 use super::rig::Rig;
@@ -130,4 +131,17 @@ fn an_idle_window_paints_nothing_and_a_pointer_on_the_move_little() {
     }
     let share = (painted(&rig) - rested) as f64 / frames as f64 / f64::from(SIZE[0] * SIZE[1]);
     assert!(share < 0.25, "a move of the pointer paints {:.0} % of the window", share * 100.0);
+}
+
+#[test]
+fn what_is_computed_stays_within_its_budget() {
+    // What the documentation says of memory.
+    const { assert!(Results::BUDGET <= 1400 << 20) };
+    let Some(mut rig) = Rig::new(SIZE, 4) else { return };
+    let first = rig.harness.state().state().results.bytes();
+    for _ in 0..7 {
+        rig.send(LibraryCommand::Step(1));
+    }
+    let bytes = rig.harness.state().state().results.bytes();
+    assert!(bytes > first && bytes <= Results::BUDGET, "{first} {bytes}");
 }

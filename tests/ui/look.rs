@@ -1,16 +1,19 @@
 //! Nothing to see is an error, and pictures for people.
 
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{Command, LibraryCommand, PredictCommand, SettingsCommand};
+use touch2touch::app::command::{
+    Command, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
+};
 use touch2touch::app::inspect::{BasinColor, InspectCommand};
 use touch2touch::app::library::Place;
-use touch2touch::app::settings::{LayerLook, MaskSource, SceneLayer, SceneLook, Theme, Workspace};
+use touch2touch::app::settings::{LayerLook, MaskSource, SceneLayer, SceneLook, Theme, Versus, VersusMode, Workspace};
 use touch2touch::app::workbench::{Layer, SceneTool, Section, SectionAxis, WorkbenchCommand};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::hand::HandAxis;
 use touch2touch::domain::sim::Fault;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch::work::subject::Subject;
 
 use super::rig::Rig;
 
@@ -155,5 +158,29 @@ fn pictures_of_the_3d_views() {
         rig.shoot(&format!("{name}-3d-section"));
         rig.send(SettingsCommand::SetTheme(Theme::Light));
         rig.shoot(&format!("{name}-3d-light"));
+    }
+}
+
+/// Any two imprints against each other, for looking at.
+#[test]
+#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
+fn pictures_of_the_comparison() {
+    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
+        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
+        rig.send(SettingsCommand::DismissHint);
+        rig.send(LibraryCommand::Select(PairId(30)));
+        rig.send(PredictCommand::Generate);
+        for workspace in [Workspace::Inspect, Workspace::Align] {
+            rig.send(SettingsCommand::SetWorkspace(workspace));
+            rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Compare)));
+            for mode in VersusMode::iter() {
+                let (a, b) = ("prediction:seed=7,steps=8".parse().unwrap(), "prediction".parse().unwrap());
+                let b = if mode.is_3d() { Subject::Measured } else { b };
+                rig.send(SettingsCommand::SetVersus(Versus { a, b, mode }));
+                rig.shoot(&format!("{name}-compare-{workspace:?}-{mode:?}").to_lowercase());
+            }
+        }
+        rig.send(SettingsCommand::SetTheme(Theme::Light));
+        rig.shoot(&format!("{name}-compare-light"));
     }
 }

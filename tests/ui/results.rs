@@ -1,11 +1,12 @@
 //! The results table of the Evaluate workspace, with the shipped models on a few simulated grasps.
 
-use eframe::egui::{Key, Modifiers};
+use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::Workspace;
+use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::evaluation::Figure;
 
 use super::rig::{Rig, write_dataset};
@@ -45,26 +46,105 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     assert_eq!(json["pairs"].as_array().unwrap().len(), table.rows.len());
     assert!(out.join("evaluation.md").is_file());
 
-    // The worst first: by key, and the list says the figure.
-    let scored: Vec<f64> = {
-        let found = &rig.harness.state().state().table;
-        found.scored().iter().map(|grasp| grasp.angle_error_rad.unwrap()).collect()
+    // The scores of all pairs are those of the table.
+    let value = |rig: &Rig, source: usize, pair: u32, figure: Figure| {
+        rig.harness.state().state().table.scores.sources[source].value(PairId(pair), figure)
     };
-    let mut errors = scored.clone();
+    for (source, scores) in table.scores.iter().enumerate() {
+        for grasp in &scores.grasps {
+            let index = &rig.harness.state().state().library.open.as_ref().unwrap().source.clone();
+            let pair = index.index().pairs.iter().position(|entry| entry.name == grasp.pair).unwrap() as u32;
+            assert_eq!(value(&rig, source, pair, Figure::Angle), grasp.angle_error_rad);
+            assert_eq!(value(&rig, source, pair, Figure::Psnr), grasp.figure(Figure::Psnr));
+        }
+    }
+    // The worst first: by key, and the list says the figure.
+    let mut errors: Vec<f64> = (0..4).map(|pair| value(&rig, 1, pair, Figure::Angle).unwrap()).collect();
     errors.sort_by(|a, b| b.total_cmp(a));
     for wanted in &errors[..2] {
         rig.harness.key_press_modifiers(Modifiers::NONE, Key::N);
         rig.harness.step();
         rig.settle();
         let state = rig.harness.state().state();
-        assert_eq!(state.library.sort, Sort::WorstAngle);
-        assert_eq!(state.table.figure(state.pair_name(), Figure::Angle), Some(*wanted));
+        assert_eq!(state.library.sort, Sort::Score);
+        assert_eq!(state.table.value(state.selection.pair.unwrap()), Some(*wanted));
     }
     rig.shoot("results-worst");
+
+    // By another score, the other way round, from the table's heading.
+    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Table)));
+    let generator = rig.harness.state().state().table.scores.sources[1].short().to_owned();
+    let heading = format!("Sort by PSNR of {generator}");
+    let listed = |rig: &Rig| {
+        let state = rig.harness.state().state();
+        state.library.order.iter().map(|pair| value(rig, 1, pair.0, Figure::Psnr).unwrap()).collect::<Vec<f64>>()
+    };
+    for best_first in [false, true] {
+        rig.harness.get_by_label(&heading).click();
+        rig.harness.step();
+        rig.settle();
+        let found = listed(&rig);
+        assert!(found.windows(2).all(|pair| (pair[0] >= pair[1]) == best_first || pair[0] == pair[1]), "{found:?}");
+    }
+    // Only what is worse than a bound: a condition in the filter.
+    let psnr = listed(&rig);
+    let bound = 0.5 * (psnr[1] + psnr[2]);
+    rig.send(LibraryCommand::SetFilter(format!("psnr<{bound}")));
+    assert_eq!(listed(&rig), psnr[2..]);
+    rig.send(LibraryCommand::SetFilter(String::new()));
+    // A rectangle around all points of the scatter lists those, Escape all again; a click on a bar lists a tool's.
+    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Scatter)));
+    rig.shoot("results-scatter");
+    let area = rig.harness.get_by_label_contains("Scatter of 4 points").rect();
+    let half = egui::Rect::from_min_max(area.min, egui::pos2(area.right(), area.center().y));
+    rig.harness.drag_at(half.min + egui::vec2(2.0, 2.0));
+    rig.harness.step();
+    rig.harness.hover_at(half.max - egui::vec2(2.0, 0.0));
+    rig.harness.step();
+    rig.harness.drop_at(half.max - egui::vec2(2.0, 0.0));
+    rig.harness.step();
+    rig.settle();
+    let brushed = rig.harness.state().state().library.brush.clone().expect("something is brushed");
+    assert!((1..4).contains(&brushed.len()), "{brushed:?}");
+    assert_eq!(rig.harness.state().state().library.order.len(), brushed.len());
+    rig.shoot("results-brushed");
+    rig.harness.key_press_modifiers(Modifiers::NONE, Key::Escape);
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(rig.harness.state().state().library.order.len(), 4);
+    rig.harness.get_by_label("histograms").click();
+    rig.harness.step();
+    rig.shoot("results-histograms");
+    assert_eq!(rig.harness.get_all_by_label_contains("Histogram of").count(), 2);
 
     // A table is of one data set.
     rig.send(LibraryCommand::Open(Place::Demo));
     assert!(rig.harness.state().state().table.result.is_none());
+    assert!(rig.harness.state().state().table.scores.sources.is_empty());
+}
+
+/// Opening a data set nobody scored, and looking at its worst pair: what a person does, one by one.
+#[test]
+fn the_worst_pair_is_found_in_a_few_actions() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("grasps");
+    write_dataset(&data, 3);
+    let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data)) else { return };
+    let mut actions = 0;
+    let mut act = |rig: &mut Rig, what: &dyn Fn(&mut Rig)| {
+        what(rig);
+        rig.harness.step();
+        rig.settle();
+        actions += 1;
+    };
+    act(&mut rig, &|rig| rig.harness.get_by_label("Predict all").click());
+    act(&mut rig, &|rig| rig.harness.key_press_modifiers(Modifiers::NONE, Key::N));
+    let state = rig.harness.state().state();
+    let (source, figure) = state.table.by().expect("everything is scored");
+    assert_eq!((source.scored, source.upper_bound, figure), (6, false, Figure::Angle));
+    let worst = (0..6).map(|pair| source.value(PairId(pair), figure).unwrap()).fold(0.0, f64::max);
+    assert_eq!(state.table.value(state.selection.pair.unwrap()), Some(worst));
+    assert!(actions <= 8, "{actions} actions");
 }
 
 /// Pictures of the test set's table, for looking at.

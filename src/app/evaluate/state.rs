@@ -7,7 +7,8 @@ use strum::IntoEnumIterator as _;
 
 use super::super::state::State;
 use super::super::tasks::state::{Task, Ticket};
-use crate::domain::evaluation::{Figure, GraspScore, Row, paper_rows};
+use crate::domain::dataset::{Index, PairId};
+use crate::domain::evaluation::{Condition, Figure, GraspScore, Row, Scores, paper_rows};
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::evaluate::{Evaluation, Setup};
 
@@ -27,8 +28,14 @@ pub struct TableState {
     pub running: Option<Ticket>,
     /// The last table of the open data set.
     pub result: Option<Arc<Evaluation>>,
-    /// The place of each pair in [`TableState::scored`], by name.
-    places: BTreeMap<String, usize>,
+    /// The scores that are kept of the open data set.
+    pub scores: Arc<ScoreTable>,
+    /// How often scores were computed: what is kept is looked up again then.
+    pub(in crate::app) round: u64,
+    /// Grasps of the evaluation under way at which that is done next.
+    pub(in crate::app) next_look: u64,
+    /// The score that the list is ordered by, as it was chosen.
+    pub chosen: ScoreChoice,
 }
 
 impl Default for TableState {
@@ -39,33 +46,154 @@ impl Default for TableState {
             published: false,
             running: None,
             result: None,
-            places: BTreeMap::new(),
+            scores: Arc::default(),
+            round: 0,
+            next_look: 0,
+            chosen: ScoreChoice::default(),
         }
     }
 }
 
+/// Which score the list is ordered, colored and filtered by.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ScoreChoice {
+    /// The source, by name; `None` for the first generator.
+    pub source: Option<Arc<str>>,
+    /// The figure; `None` for the first that is there: the angle, if any is known.
+    pub figure: Option<Figure>,
+    /// Whether the best come first.
+    pub best_first: bool,
+}
+
+/// The scores of the pairs of a data set by each source.
+#[derive(Debug, Default)]
+pub struct ScoreTable {
+    /// The measured imprints first, where they are scored; each has scores.
+    pub sources: Vec<SourceScores>,
+}
+
+/// The scores of the pairs by one source.
+#[derive(Debug)]
+pub struct SourceScores {
+    /// Its name.
+    pub name: Arc<str>,
+    /// Whether these are the measured imprints themselves.
+    pub upper_bound: bool,
+    /// Pairs that were scored.
+    pub scored: usize,
+    /// By pair.
+    grasps: Vec<Option<GraspScore>>,
+    /// The figures that some pair has, each with the badness beyond which a value is among the worst tenth, and beyond
+    /// which among the next two.
+    figures: BTreeMap<Figure, [f64; 2]>,
+}
+
+/// How a value stands among those of all pairs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// Among the better seven tenths.
+    Fine,
+    /// Among the three worst tenths.
+    Poor,
+    /// Among the worst tenth.
+    Worst,
+}
+
+impl SourceScores {
+    /// The name without what is said in parentheses.
+    pub fn short(&self) -> &str {
+        self.name.split(" (").next().unwrap_or(&self.name)
+    }
+
+    /// The figures that some pair has.
+    pub fn figures(&self) -> impl Iterator<Item = Figure> {
+        self.figures.keys().copied()
+    }
+
+    /// Whether some pair has a figure.
+    pub fn has(&self, figure: Figure) -> bool {
+        self.figures.contains_key(&figure)
+    }
+
+    /// A figure of a pair; `None` where it was not scored.
+    pub fn value(&self, pair: PairId, figure: Figure) -> Option<f64> {
+        self.grasps.get(pair.0 as usize)?.as_ref()?.figure(figure)
+    }
+
+    /// How a value of a figure stands among those of all pairs.
+    pub fn standing(&self, figure: Figure, value: f64) -> Standing {
+        let bad = figure.badness(value);
+        match self.figures.get(&figure) {
+            _ if value.is_nan() => Standing::Worst,
+            Some([worst, _]) if bad > *worst => Standing::Worst,
+            Some([_, poor]) if bad > *poor => Standing::Poor,
+            _ => Standing::Fine,
+        }
+    }
+}
+
+impl ScoreTable {
+    /// Of the pairs of an index, by name.
+    pub fn new(index: &Index, scores: Vec<Scores>) -> Self {
+        let places: BTreeMap<&str, usize> = index.pairs.iter().map(|entry| entry.name.as_str()).zip(0..).collect();
+        let source = |scores: Scores| {
+            let mut grasps = vec![None; index.pairs.len()];
+            for mut grasp in scores.grasps {
+                // Nobody looks at these, and they are most of it.
+                grasp.images.iter_mut().for_each(|image| image.features = Vec::new());
+                if let Some(place) = places.get(grasp.pair.as_str()) {
+                    grasps[*place] = Some(grasp);
+                }
+            }
+            let figures = Figure::iter().filter_map(|figure| {
+                let values = grasps.iter().flatten().filter_map(|grasp| grasp.figure(figure));
+                let mut badness: Vec<f64> = values.map(|value| figure.badness(value)).collect();
+                badness.sort_by(f64::total_cmp);
+                let at = |tenths: usize| badness.get((badness.len() * tenths / 10).checked_sub(1)?).copied();
+                (!badness.is_empty()).then(|| (figure, [9, 7].map(|tenths| at(tenths).unwrap_or(f64::INFINITY))))
+            });
+            let (name, upper_bound, figures) = (scores.method.as_str().into(), scores.upper_bound, figures.collect());
+            let scored = grasps.iter().flatten().count();
+            SourceScores { name, upper_bound, scored, grasps, figures }
+        };
+        Self { sources: scores.into_iter().map(source).filter(|source| source.scored > 0).collect() }
+    }
+
+    /// Bytes that it holds, about.
+    pub(in crate::app) fn bytes(&self) -> usize {
+        self.sources.iter().map(|source| source.grasps.len() * 768).sum()
+    }
+
+    /// The source of a name, or whose name has a word in it, whatever its case.
+    pub fn source(&self, name: &str) -> Option<&SourceScores> {
+        let part = |source: &&SourceScores| source.name.to_lowercase().contains(&name.to_lowercase());
+        self.sources.iter().find(|source| *source.name == *name).or_else(|| self.sources.iter().find(part))
+    }
+}
+
 impl TableState {
-    /// Takes a table over, or gives the last one up.
-    pub(in crate::app) fn set_result(&mut self, result: Option<Arc<Evaluation>>) {
-        self.result = result;
-        let names = self.scored().iter().enumerate().map(|(at, grasp)| (grasp.pair.clone(), at));
-        self.places = names.collect();
+    /// The source and the figure that the list is ordered by; `None` while nothing is scored.
+    pub fn by(&self) -> Option<(&SourceScores, Figure)> {
+        let sources = &self.scores.sources;
+        let named = self.chosen.source.as_ref().and_then(|name| sources.iter().find(|source| source.name == *name));
+        let source = named.or_else(|| sources.iter().find(|source| !source.upper_bound)).or(sources.first())?;
+        let chosen = self.chosen.figure.filter(|figure| source.has(*figure));
+        Some((source, chosen.or_else(|| source.figures().next())?))
     }
 
-    /// The figures of every grasp by the first generator of the table.
-    pub fn scored(&self) -> &[GraspScore] {
-        let first = self.result.as_ref().and_then(|found| found.scores.iter().find(|scores| !scores.upper_bound));
-        first.map_or(&[], |scores| &scores.grasps)
+    /// The value of a pair that the list is ordered by.
+    pub fn value(&self, pair: PairId) -> Option<f64> {
+        let (source, figure) = self.by()?;
+        source.value(pair, figure)
     }
 
-    /// A figure of a pair, by its name; `None` where it was not scored.
-    pub fn figure(&self, pair: &str, figure: Figure) -> Option<f64> {
-        self.scored().get(*self.places.get(pair)?)?.figure(figure)
-    }
-
-    /// The figure that pairs are called worst by where nobody chose one: the angle, if any is known.
-    pub fn worst_by(&self) -> Option<Figure> {
-        Figure::iter().find(|figure| self.scored().iter().any(|grasp| grasp.figure(*figure).is_some()))
+    /// Whether a pair meets a condition; one that was not scored does not.
+    pub(in crate::app) fn meets(&self, pair: PairId, condition: &Condition) -> bool {
+        let source = match condition.source.as_str() {
+            "" => self.by().map(|(source, _)| source),
+            name => self.scores.source(name),
+        };
+        source.and_then(|source| source.value(pair, condition.figure)).is_some_and(|value| condition.passes(value))
     }
 }
 

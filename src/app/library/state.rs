@@ -1,6 +1,6 @@
 //! The open data set, and the list of pairs as the browser shows it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use super::super::labels::state::Review;
 use super::super::services::DataSource;
 use super::super::state::State;
 use crate::domain::dataset::{Index, PairEntry, PairId};
-use crate::domain::evaluation::Figure;
+use crate::domain::evaluation::Condition;
 use crate::domain::rig::Rig;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
@@ -51,12 +51,8 @@ pub enum Sort {
     Tool,
     /// Unfinished first, then position.
     Review,
-    /// Largest error of the angle in the results table first; what was not scored last.
-    WorstAngle,
-    /// Smallest PSNR first.
-    WorstPsnr,
-    /// Smallest SSIM first.
-    WorstSsim,
+    /// By the chosen score, the worst first unless chosen otherwise; what was not scored last.
+    Score,
 }
 
 impl Sort {
@@ -67,28 +63,7 @@ impl Sort {
             Self::Name => "Name",
             Self::Tool => "Tool",
             Self::Review => "Review state",
-            Self::WorstAngle => "Worst angle",
-            Self::WorstPsnr => "Worst PSNR",
-            Self::WorstSsim => "Worst SSIM",
-        }
-    }
-
-    /// The figure that pairs are ordered by.
-    pub fn figure(self) -> Option<Figure> {
-        match self {
-            Self::Natural | Self::Name | Self::Tool | Self::Review => None,
-            Self::WorstAngle => Some(Figure::Angle),
-            Self::WorstPsnr => Some(Figure::Psnr),
-            Self::WorstSsim => Some(Figure::Ssim),
-        }
-    }
-
-    /// The order with the worst by a figure first.
-    pub fn worst(figure: Figure) -> Self {
-        match figure {
-            Figure::Angle => Self::WorstAngle,
-            Figure::Psnr => Self::WorstPsnr,
-            Figure::Ssim => Self::WorstSsim,
+            Self::Score => "Score",
         }
     }
 }
@@ -148,8 +123,11 @@ pub struct Library {
     pub last_seq: DatasetSeq,
     /// What was seen of the folder while it is followed; `None` while it is not.
     pub follow: Option<Follow>,
-    /// Shows only pairs whose name or tool contains every word (any case). `tool:`, `is:` narrow a word.
+    /// Shows only pairs whose name or tool contains every word (any case). `tool:`, `is:` narrow a word; `angle>5` is a
+    /// [`Condition`] on a score.
     pub filter: String,
+    /// Shows only these pairs: those brushed in a picture of the scores.
+    pub brush: Option<Arc<BTreeSet<PairId>>>,
     /// Shows only this tool.
     pub tool: Option<String>,
     /// The order.
@@ -198,7 +176,13 @@ impl Library {
 
     /// Recomputes `order` from filter, tool and sort. `reviews` holds the states that are not "todo", by name.
     pub(in crate::app) fn reorder(&mut self, reviews: &BTreeMap<String, Review>, table: &TableState) {
-        let words: Vec<String> = self.filter.split_whitespace().map(str::to_lowercase).collect();
+        let mut words: Vec<String> = self.filter.split_whitespace().map(str::to_lowercase).collect();
+        let conditions: Vec<Condition> = words.iter().filter_map(|word| Condition::parse(word)).collect();
+        words.retain(|word| Condition::parse(word).is_none());
+        let scored = |id: PairId| {
+            self.brush.as_ref().is_none_or(|brush| brush.contains(&id))
+                && conditions.iter().all(|condition| table.meets(id, condition))
+        };
         let review = |entry: &PairEntry| reviews.get(&entry.name).copied().unwrap_or_default();
         let passes = |entry: &PairEntry| {
             let name = entry.name.to_lowercase();
@@ -216,18 +200,20 @@ impl Library {
         };
         let pairs = self.pairs();
         let mut order: Vec<PairId> =
-            (0u32..).zip(pairs).filter(|(_, entry)| passes(entry)).map(|(id, _)| PairId(id)).collect();
+            (0u32..).map(PairId).zip(pairs).filter(|(id, e)| passes(e) && scored(*id)).map(|(id, _)| id).collect();
         let entry = |id: &PairId| &pairs[id.0 as usize];
         match self.sort {
-            Sort::Natural | Sort::WorstAngle | Sort::WorstPsnr | Sort::WorstSsim => {}
+            Sort::Natural | Sort::Score => {}
             Sort::Name => order.sort_by(|a, b| entry(a).name.cmp(&entry(b).name)),
             Sort::Tool => order.sort_by(|a, b| entry(a).tool.cmp(&entry(b).tool)),
             Sort::Review => order.sort_by_key(|id| review(entry(id))),
         }
-        if let Some(figure) = self.sort.figure() {
+        if let Some((source, figure)) = table.by().filter(|_| self.sort == Sort::Score) {
             let mut scored: Vec<(Option<f64>, PairId)> =
-                order.iter().map(|id| (table.figure(&entry(id).name, figure), *id)).collect();
+                order.iter().map(|id| (source.value(*id, figure), *id)).collect();
+            let best_first = table.chosen.best_first;
             scored.sort_by(|(a, _), (b, _)| match (a, b) {
+                (Some(a), Some(b)) if best_first => figure.worse(*b, *a),
                 (Some(a), Some(b)) => figure.worse(*a, *b),
                 _ => b.is_some().cmp(&a.is_some()),
             });
@@ -235,6 +221,13 @@ impl Library {
         }
         self.order = order;
     }
+}
+
+/// A pair's name without its folder and without its tool, which is said beside it.
+pub fn short_name(entry: &PairEntry) -> &str {
+    let name = entry.name.rsplit('/').next().unwrap_or(&entry.name);
+    let rest = entry.tool.as_deref().and_then(|tool| name.strip_prefix(tool)).map(|rest| rest.trim_start_matches('_'));
+    rest.filter(|rest| !rest.is_empty()).unwrap_or(name)
 }
 
 impl State {

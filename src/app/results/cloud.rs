@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::Latest;
 use super::imprint::{Imprint, ImprintKey};
-use super::mask::MaskVersion;
+use super::mask::{MaskKey, MaskVersion};
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State, Wanted};
 use crate::domain::grid::Mask;
-use crate::domain::rig::PerPad;
+use crate::domain::rig::{PadId, PerPad};
 use crate::work::cloud::{Clouds, clouds};
 
 /// A cloud of both fingers: imprint and (where one can be had) mask of each finger.
@@ -21,11 +21,7 @@ impl CloudKey {
     /// The pair and imprint it belongs to.
     pub fn place(&self) -> Option<(PairKey, ImprintSource)> {
         let (imprint, _) = self.parts.iter().flatten().next()?;
-        let source = match imprint {
-            ImprintKey::Measured(_) => ImprintSource::Measured,
-            ImprintKey::Predicted(..) => ImprintSource::Predicted,
-        };
-        Some((imprint.touch().pair, source))
+        Some((imprint.touch().pair, imprint.side()))
     }
 }
 
@@ -104,6 +100,28 @@ impl State {
             parts[finger] = Some((key, version));
         }
         if parts.is_empty() { Err(reason) } else { Ok(Some(CloudKey { parts })) }
+    }
+
+    /// The cloud of imprints with the automatic masks; `Err` holds the masks that are missing for it, none while an
+    /// imprint is.
+    pub(crate) fn automatic_cloud(
+        &self,
+        imprints: impl Iterator<Item = (PadId, ImprintKey)>,
+    ) -> Result<CloudKey, Vec<MaskKey>> {
+        let (mut parts, mut missing) = (PerPad::default(), Vec::new());
+        for (finger, imprint) in imprints {
+            let camera = self.touch(finger).ready().is_some_and(|t| t.camera().is_some());
+            let (Ok(recipe), true) = (self.mask_recipe(finger), camera) else { continue };
+            if self.imprint_of(imprint.clone()).ready().is_none() {
+                return Err(Vec::new());
+            }
+            let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
+            if !self.results.masks.contains(&key) {
+                missing.push(key);
+            }
+            parts[finger] = Some((imprint, Some(MaskVersion::Auto(recipe))));
+        }
+        if missing.is_empty() && !parts.is_empty() { Ok(CloudKey { parts }) } else { Err(missing) }
     }
 
     /// The surface points of an imprint, both fingers.

@@ -1,20 +1,11 @@
 //! Mean and spreads of several predictions of one touch.
 
-use super::super::keys::ShiftMode;
+pub use super::imprint::EnsembleKey;
 use super::imprint::MetersKey;
 use super::prediction::PredictionKey;
 use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State};
 use crate::domain::rig::PadId;
 use crate::work::ensemble::{Ensemble, ensemble};
-
-/// Several predictions of one touch, as far as they are there.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct EnsembleKey {
-    /// At least one; they differ in their seeds.
-    pub recipes: Vec<PredictionKey>,
-    /// How they become meters.
-    pub shift: ShiftMode,
-}
 
 impl Computes for EnsembleKey {
     type Value = Ensemble;
@@ -25,7 +16,7 @@ impl Computes for EnsembleKey {
         let predictions: Option<Vec<_>> = self.recipes.iter().map(|r| results.predictions.get(r).cloned()).collect();
         let imprints: Option<Vec<_>> = self.recipes.iter().map(meters).collect();
         let (predictions, imprints) = (predictions?, imprints?);
-        let touch = self.recipes.first()?.touch;
+        let touch = self.touch;
         let sample = results.samples.get(&touch.pair)?.clone();
         Some(Job::new(Lane::Compute, "Spread of the seeds", move |_| {
             ensemble(&predictions, &imprints, shift, (&sample, touch.finger))
@@ -42,7 +33,8 @@ impl State {
     pub(crate) fn ensemble_key(&self, finger: PadId) -> Option<EnsembleKey> {
         let there = |r: &PredictionKey| self.results.predictions.contains(r) && self.seed_imprint(r).is_some();
         let recipes: Vec<PredictionKey> = self.seed_recipes(finger).ok()?.into_iter().filter(there).collect();
-        (!recipes.is_empty()).then_some(EnsembleKey { recipes, shift: self.settings.shift })
+        let touch = self.touch_key(finger)?;
+        (!recipes.is_empty()).then_some(EnsembleKey { touch, recipes, shift: self.settings.shift })
     }
 
     /// Mean and spreads of the seeds that are there; the ensemble before while the next is computed.

@@ -3,11 +3,14 @@
 use std::sync::Arc;
 
 use super::super::keys::ShiftMode;
+use super::picture::PictureKey;
 use super::prediction::PredictionKey;
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::rig::{PadId, SensorKind};
 use crate::domain::sample::Sample;
+use crate::work::compare::Beside;
+use crate::work::ensemble::Ensemble;
 use crate::work::error::TaskError;
 use crate::work::imprint;
 
@@ -52,6 +55,17 @@ impl Computes for ColorKey {
     }
 }
 
+/// Several predictions of one touch, as far as they are there.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct EnsembleKey {
+    /// The touch.
+    pub touch: TouchKey,
+    /// At least one; they differ in their seeds.
+    pub recipes: Vec<PredictionKey>,
+    /// How they become meters.
+    pub shift: ShiftMode,
+}
+
 /// One imprint in meters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum ImprintKey {
@@ -59,14 +73,27 @@ pub enum ImprintKey {
     Measured(TouchKey),
     /// Derived from a prediction.
     Predicted(PredictionKey, ShiftMode),
+    /// The mean of several predictions.
+    Mean(EnsembleKey),
+    /// The prediction of another program that lies beside the pair.
+    Picture(TouchKey),
 }
 
 impl ImprintKey {
     /// The touch it belongs to.
     pub fn touch(&self) -> TouchKey {
         match self {
-            Self::Measured(touch) => *touch,
+            Self::Measured(touch) | Self::Picture(touch) => *touch,
             Self::Predicted(recipe, _) => recipe.touch,
+            Self::Mean(key) => key.touch,
+        }
+    }
+
+    /// The side that it is shown on where there are two.
+    pub fn side(&self) -> ImprintSource {
+        match self {
+            Self::Measured(_) => ImprintSource::Measured,
+            Self::Predicted(..) | Self::Mean(_) | Self::Picture(_) => ImprintSource::Predicted,
         }
     }
 }
@@ -79,6 +106,8 @@ impl ImprintKey {
             Self::Predicted(recipe, shift) => {
                 Imprint::Predicted(state.results.imprints.get(&MetersKey(recipe.clone(), *shift))?.clone())
             }
+            Self::Mean(key) => Imprint::Mean(state.results.ensembles.get(key)?.clone()),
+            Self::Picture(touch) => Imprint::Picture(state.results.pictures.get(&PictureKey(*touch))?.clone()),
         })
     }
 }
@@ -87,6 +116,8 @@ impl ImprintKey {
 pub(crate) enum Imprint {
     Measured(Arc<Sample>, TouchKey),
     Predicted(Arc<DepthMap>),
+    Mean(Arc<Ensemble>),
+    Picture(Arc<Beside>),
 }
 
 impl Imprint {
@@ -101,6 +132,8 @@ impl Imprint {
                 bubble.map(|bubble| &bubble.imprint).ok_or_else(gone)
             }
             Self::Predicted(depth) => Ok(depth),
+            Self::Mean(found) => Ok(&found.spread.mean),
+            Self::Picture(found) => Ok(&found.imprint),
         }
     }
 }
@@ -137,10 +170,16 @@ impl State {
 
     /// The imprint shown for one finger, meters, raw bubble orientation.
     pub fn imprint(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
-        match self.imprint_key(source, finger) {
-            Err(absent) => Lookup::Absent(absent),
-            Ok(ImprintKey::Measured(_)) => self.bubble(finger).and_then(Absent::NoBubble, |b| Some(&b.imprint)),
-            Ok(ImprintKey::Predicted(recipe, shift)) => self.look(MetersKey(recipe, shift)).value(),
+        self.imprint_key(source, finger).map_or_else(Lookup::Absent, |key| self.imprint_of(key))
+    }
+
+    /// An imprint of the selected pair by its recipe, meters, raw bubble orientation.
+    pub fn imprint_of(&self, key: ImprintKey) -> Lookup<'_, DepthMap> {
+        match key {
+            ImprintKey::Measured(touch) => self.bubble(touch.finger).and_then(Absent::NoBubble, |b| Some(&b.imprint)),
+            ImprintKey::Predicted(recipe, shift) => self.look(MetersKey(recipe, shift)).value(),
+            ImprintKey::Mean(key) => self.look(key).map(|found| &found.spread.mean),
+            ImprintKey::Picture(touch) => self.look(PictureKey(touch)).map(|found| &found.imprint),
         }
     }
 

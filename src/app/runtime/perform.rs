@@ -1,5 +1,6 @@
 //! From effects to jobs.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::super::answers::Answer;
@@ -14,11 +15,21 @@ use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
 use crate::domain::dataset::PairId;
 use crate::domain::mesh::sampling::spread;
+use crate::domain::rig::PerPad;
+use crate::domain::sample::Sample;
+use crate::infer::bundle::Ends;
+use crate::io::folders;
 use crate::work::error::TaskError;
 use crate::work::evaluate;
+use crate::work::figure::figure;
 use crate::work::job::{Cancel, JobCx};
 use crate::work::models::Wanted;
 use crate::work::statistics::{STUDIO_PAIRS, StatisticsSetup, statistics};
+
+/// A place as the system knows it, whatever folder the program was started in: what a note says must be found again.
+fn absolute(place: PathBuf) -> PathBuf {
+    std::path::absolute(&place).unwrap_or(place)
+}
 
 impl Runtime {
     pub(super) fn perform(&mut self, effect: Effect, ui: &mut Vec<UiRequest>) {
@@ -147,14 +158,67 @@ impl Runtime {
             Effect::ExportTable { ticket, evaluation, published, folder } => {
                 let body = Box::new(move |_: &JobCx| {
                     let folder = evaluate::export(&evaluation, published, &folder)?;
-                    let line = format!("Wrote evaluation.csv, .md and .json to {}", folder.display());
-                    Ok(Answer::Finished(ticket, Some(line)))
+                    let line = format!("Wrote evaluation.csv, .md, .tex and .json to {}", folder.display());
+                    Ok(Answer::Saved(ticket, line, folder))
                 });
                 self.task(Lane::Files, ticket, "Export the table".into(), body);
             }
+            Effect::Figure { ticket, source, setup, recipes, file } => {
+                let (services, file) = (self.services.clone(), absolute(file));
+                let body = Box::new(move |cx: &JobCx| {
+                    let dataset = source.as_dataset().ok_or_else(|| {
+                        TaskError::new("Figure", "this kind of source cannot be read outside the studio")
+                    })?;
+                    let predict = |pair: PairId, sample: &Arc<Sample>, cx: &JobCx| {
+                        let mut made = PerPad::default();
+                        for (key, bundle) in recipes.iter().filter(|(of, _)| *of == pair).flat_map(|(_, list)| list) {
+                            let finger = key.touch.finger;
+                            let ends = bundle.ends(&sample.rig).and_then(Result::ok);
+                            let input = |end: Ends| sample.pad(finger)?.picture(end.input).map(drop);
+                            if ends.and_then(input).is_none() {
+                                continue;
+                            }
+                            let one = vec![key.clone()];
+                            let found = generate(&*services, one, bundle, &*source, Some(sample.clone()), cx, None)?;
+                            made[finger] = found.into_iter().next().map(|(_, made)| Arc::unwrap_or_clone(made));
+                        }
+                        Ok(made)
+                    };
+                    let written = figure(dataset, &setup, predict, cx)?.write(&file)?;
+                    let [width, height] = written.size_px;
+                    let text = format!("Saved {} ({width} x {height} pixels)", file.display());
+                    Ok(Answer::Saved(ticket, text, file))
+                });
+                self.task(Lane::Models, ticket, "Figure".into(), body);
+            }
+            Effect::ExportPair { ticket, pair, folder } => {
+                let body = Box::new(move |_: &JobCx| {
+                    let files = pair.write(&absolute(folder))?;
+                    let names = files.iter().filter_map(|file| file.file_name()).map(|name| name.to_string_lossy());
+                    let text = format!("Saved {}", names.collect::<Vec<_>>().join(", "));
+                    let first = files.into_iter().next().unwrap_or_default();
+                    Ok(Answer::Saved(ticket, text, first))
+                });
+                self.task(Lane::Compute, ticket, "Export the pair".into(), body);
+            }
+            Effect::Reveal(place) => {
+                self.unwatched(
+                    Lane::Files,
+                    JobId::Reveal,
+                    "Show the folder",
+                    Box::new(move |_| {
+                        folders::reveal(&place).map_err(|err| {
+                            TaskError::new("Show the folder", format!("{err} ({})", place.display()))
+                                .with_hint("Copy the path instead.")
+                        })?;
+                        Ok(Answer::Revealed)
+                    }),
+                );
+            }
             Effect::ExportMasks { ticket, source, labels, folder } => {
                 let body = Box::new(move |cx: &JobCx| {
-                    Ok(Answer::Finished(ticket, Some(source.export_masks(&labels, &folder, cx)?)))
+                    let line = source.export_masks(&labels, &folder, cx)?;
+                    Ok(Answer::Saved(ticket, line, folder))
                 });
                 self.task(Lane::Compute, ticket, "Export masks".into(), body);
             }

@@ -1,13 +1,13 @@
 //! Several seeds of one touch: which, what is there of them, and what is missing.
 
-use super::super::keys::{CloudKey, ImprintKey, MaskKey, MaskVersion, MetersKey, PoseKey, PredictionKey, Request};
+use super::super::keys::{CloudKey, ImprintKey, MaskKey, MetersKey, PoseKey, PredictionKey, Request};
 use super::super::pane::Need;
 use super::super::results::prediction::SeedKey;
 use super::super::state::{Absent, State};
 use super::super::wanted::Wanted;
 use crate::domain::ensemble::seeds;
 use crate::domain::grid::DepthMap;
-use crate::domain::rig::{PadId, PerPad};
+use crate::domain::rig::PadId;
 use crate::work::pose::PoseResult;
 
 /// Fewest and most seeds of an ensemble.
@@ -83,25 +83,11 @@ impl State {
 
     /// The cloud of one seed with the automatic masks; `Err` holds what is missing for it.
     fn seed_cloud(&self, at: usize) -> Result<CloudKey, Vec<MaskKey>> {
-        let mut parts = PerPad::default();
-        let mut missing = Vec::new();
-        for finger in self.seed_fingers() {
-            let camera = self.touch(finger).ready().is_some_and(|t| t.camera().is_some());
-            let (Ok(recipes), Ok(mask), true) = (self.seed_recipes(finger), self.mask_recipe(finger), camera) else {
-                continue;
-            };
-            let Some(recipe) = recipes.get(at) else { continue };
-            if self.seed_imprint(recipe).is_none() {
-                return Err(Vec::new());
-            }
-            let imprint = ImprintKey::Predicted(recipe.clone(), self.settings.shift);
-            let key = MaskKey { imprint: imprint.clone(), recipe: mask.clone() };
-            if !self.results.masks.contains(&key) {
-                missing.push(key);
-            }
-            parts[finger] = Some((imprint, Some(MaskVersion::Auto(mask))));
-        }
-        if missing.is_empty() && !parts.is_empty() { Ok(CloudKey { parts }) } else { Err(missing) }
+        let imprint = |finger| {
+            let recipe = self.seed_recipes(finger).ok()?.get(at)?.clone();
+            Some(ImprintKey::Predicted(recipe, self.settings.shift))
+        };
+        self.automatic_cloud(self.seed_fingers().into_iter().filter_map(|finger| Some((finger, imprint(finger)?))))
     }
 
     fn seed_pose_key(&self, at: usize) -> Option<PoseKey> {

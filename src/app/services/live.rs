@@ -16,6 +16,7 @@ use super::{DataSource, Following, Services};
 use crate::domain::contact::ContactMask;
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
+use crate::domain::evaluation::Scores;
 use crate::domain::grid::{DepthMap, RgbGrid};
 use crate::domain::mesh::TriMesh;
 use crate::domain::rig::Rig;
@@ -209,6 +210,10 @@ impl Services for LiveServices {
 
     fn evaluate(&self, dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
         evaluate::evaluate(dataset, setup, &self.models, cx)
+    }
+
+    fn known_scores(&self, dataset: &Dataset, setup: &Setup) -> Result<Vec<Scores>, TaskError> {
+        evaluate::known(dataset, setup, &self.models)
     }
 
     fn adapt(

@@ -1,6 +1,7 @@
 //! What a person prefers. Kept between runs; never part of undo.
 
 pub mod scene;
+pub mod versus;
 
 use std::path::PathBuf;
 
@@ -16,6 +17,7 @@ use crate::infer::engine::EngineChoice;
 use crate::work::bundles::BundleInfo;
 pub use crate::work::mask::{MaskChoice, MaskSource};
 use scene::SceneLook;
+use versus::Versus;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
 pub const SETTINGS_VERSION: u32 = 1;
@@ -62,6 +64,8 @@ pub struct Settings {
     pub cameras_linked: bool,
     /// How the 3D views look.
     pub scene: SceneLook,
+    /// What is compared with what, per workspace.
+    pub versus: std::collections::BTreeMap<Workspace, Versus>,
     /// Whether the mask is drawn over imprints.
     pub mask_visible: bool,
     /// Whether only the outline of the mask is drawn.
@@ -119,6 +123,7 @@ impl Default for Settings {
             cache_mib: 512,
             cameras_linked: true,
             scene: SceneLook::default(),
+            versus: std::collections::BTreeMap::new(),
             mask_visible: true,
             mask_outline: false,
             mask_opacity: 0.35,

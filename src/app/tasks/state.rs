@@ -1,6 +1,7 @@
 //! Running jobs as the status bar shows them, and the log.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
 
 use super::super::keys::{DatasetSeq, PredictionKey, Request};
 use crate::work::error::{TaskError, TaskErrorKind};
@@ -86,6 +87,8 @@ pub struct Entry {
     pub detail: Option<String>,
     /// What to do.
     pub hint: Option<String>,
+    /// What was written, if it says so.
+    pub place: Option<PathBuf>,
     /// How often the same line came in a row.
     pub count: u32,
 }
@@ -116,7 +119,7 @@ impl Log {
             return;
         }
         self.last += 1;
-        self.entries.push_back(Entry { number: self.last, level, text, detail, hint, count: 1 });
+        self.entries.push_back(Entry { number: self.last, level, text, detail, hint, place: None, count: 1 });
         if self.entries.len() > MAX_ENTRIES {
             self.entries.pop_front();
         }
@@ -125,6 +128,14 @@ impl Log {
     /// Adds a notice.
     pub fn info(&mut self, text: impl Into<String>) {
         self.push(Level::Info, text, None, None);
+    }
+
+    /// Adds a notice of something that was written to a place.
+    pub fn saved(&mut self, text: impl Into<String>, place: PathBuf) {
+        self.info(text);
+        if let Some(entry) = self.entries.back_mut() {
+            entry.place = Some(place);
+        }
     }
 
     /// Adds a failure. Being told to stop is only a notice.

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
+use super::super::export::state::Output;
 use super::super::pane::Pane;
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
@@ -62,6 +63,8 @@ pub enum UiRequest {
     PickTableFolder,
     /// Ask for the folder to export masks to; answer with `LabelsCommand::ExportMasks`.
     PickExportFolder,
+    /// Ask where something is to be written; answer with `ExportCommand::Write`.
+    PickOutput(Output),
     /// Turn the 3D cameras.
     Camera(CameraPreset),
     /// Write the camera of the 3D view under the pointer to the clipboard.
@@ -77,6 +80,8 @@ pub enum UiRequest {
         /// To the clipboard instead of a file.
         copied: bool,
     },
+    /// Copy a picture of a pane.
+    PictureOf(Pane),
     /// Fill the screen, or stop it.
     ToggleFullscreen,
     /// Let one pane fill the window, or stop it.

@@ -1,4 +1,4 @@
-//! The table as text, Markdown and CSV.
+//! The table as text, Markdown, LaTeX and CSV.
 
 use super::{Estimate, Group, Row, TableMetrics};
 use crate::domain::sample::Scale;
@@ -214,6 +214,74 @@ pub fn markdown(rows: &[Row]) -> String {
     out
 }
 
+/// The paper's columns, as far as some row fills them.
+const IN_PAPER: [&str; 7] = ["psnr_db", "ssim", "frechet_classifier", "fid", "angle_deg", "success_5", "success_10"];
+
+/// Text for LaTeX: what it takes for commands is escaped, signs that its fonts lack are written out.
+fn tex(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        match c {
+            '%' | '&' | '#' | '$' | '_' | '{' | '}' => out.extend(['\\', c]),
+            '\\' => out.push_str("\\textbackslash{}"),
+            '~' => out.push_str("\\textasciitilde{}"),
+            '^' => out.push_str("\\textasciicircum{}"),
+            '<' | '>' | '|' => out.push_str(&format!("${c}$")),
+            '°' => out.push_str("$^\\circ$"),
+            '≤' => out.push_str("$\\le$"),
+            '–' | '—' => out.push_str("--"),
+            c if c.is_ascii_control() => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// The table in the paper's form as a LaTeX document that compiles by itself: its columns side by side for each group,
+/// the best of what was computed here in bold. The lines between `tabular` can be taken into another document.
+pub fn latex(rows: &[Row]) -> String {
+    let columns: Vec<&Column> = columns(rows).into_iter().filter(|c| IN_PAPER.contains(&c.key)).collect();
+    let groups = groups(rows);
+    let mut out = String::from(
+        "\\documentclass{article}\n\\usepackage[utf8]{inputenc}\n\\usepackage[T1]{fontenc}\n\
+         \\usepackage[landscape,margin=1.5cm]{geometry}\n\\begin{document}\n\\pagestyle{empty}\n\\small\n\
+         \\setlength{\\tabcolsep}{4pt}\n\\noindent\n",
+    );
+    out += &format!(
+        "\\begin{{tabular}}{{l{}}}\n\\hline\n",
+        format!("|{}", "r".repeat(columns.len())).repeat(groups.len())
+    );
+    for (i, group) in groups.iter().enumerate() {
+        let side = if i + 1 < groups.len() { "c|" } else { "c" };
+        out += &format!(" & \\multicolumn{{{}}}{{{side}}}{{{}}}", columns.len(), tex(group.label()));
+    }
+    out += " \\\\\nMethod";
+    for column in groups.iter().flat_map(|_| &columns) {
+        let arrow = if column.larger_is_better { "$\\uparrow$" } else { "$\\downarrow$" };
+        out += &format!(" & {} {arrow}", tex(column.heading));
+    }
+    out += " \\\\\n\\hline\n";
+    let figure = |row: &Row, group: Group, column: &Column| of(row, group).and_then(column.get);
+    let best = |group: Group, column: &Column| {
+        let ours = rows.iter().filter(|row| !row.published && !row.upper_bound);
+        let values = ours.filter_map(|row| figure(row, group, column)).map(|e| e.value).filter(|v| v.is_finite());
+        let sign = if column.larger_is_better { 1.0 } else { -1.0 };
+        values.max_by(|a, b| (sign * a).total_cmp(&(sign * b)))
+    };
+    for row in rows {
+        out += &tex(&row.method);
+        for (group, column) in groups.iter().flat_map(|group| columns.iter().map(move |column| (*group, *column))) {
+            let found = figure(row, group, column);
+            let text = number(found, column.decimals);
+            let own = !row.published && !row.upper_bound;
+            let bold = own && found.is_some_and(|e| Some(e.value) == best(group, column));
+            out += &if bold { format!(" & \\textbf{{{text}}}") } else { format!(" & {text}") };
+        }
+        out += " \\\\\n";
+    }
+    out + "\\hline\n\\end{tabular}\n\\end{document}\n"
+}
+
 /// One line per method and column group with every figure and its interval.
 pub fn csv(rows: &[Row]) -> String {
     let mut out = String::from("method,published,group,tools,grasps,images,without_pose");
@@ -262,6 +330,20 @@ mod tests {
         assert_eq!(lines.len(), 2 + rows.len());
         let bars = |line: &str| line.matches('|').count();
         assert!(lines.iter().all(|l| bars(l) == bars(lines[0])), "{markdown}");
+        let latex = latex(&rows);
+        let body: Vec<&str> = latex.lines().filter(|line| line.ends_with("\\\\")).collect();
+        assert_eq!(body.len(), 2 + rows.len(), "{latex}");
+        // Two groups of as many columns, in each line; the group's names span them.
+        let cells = |line: &str| line.matches(" & ").count();
+        assert!(body[1..].iter().all(|l| cells(l) == cells(body[1])) && cells(body[1]) % 2 == 0, "{latex}");
+        assert!(body[0].contains(&format!("\\multicolumn{{{}}}", cells(body[1]) / 2)), "{latex}");
+        assert!(
+            body[2].starts_with("odd \"name\" $|$ with, signs & ") && latex.contains("$\\le$5$^\\circ$ \\%"),
+            "{latex}"
+        );
+        // Braces close, and every bare percent sign would begin a comment.
+        assert_eq!(latex.matches('{').count(), latex.matches('}').count());
+        assert_eq!(latex.matches('%').count(), latex.matches("\\%").count());
         let csv = csv(&rows);
         assert_eq!(csv.lines().count(), 1 + 2 * rows.len());
         assert!(csv.contains("\"odd \"\"name\"\" | with, signs\",true,unseen grasps,9,414,828,0,26.1,,"), "{csv}");

@@ -4,14 +4,14 @@
 //! even a simulator's own imprint without camera noise reaches no more than 20 dB. What a prediction is worth shows
 //! beside it: as it is (`raw`), and after the straight line that fits best (`line`, the worth of its shape alone).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::image::{MetricError, check_size, psnr_of_mse};
 use super::{SsimRange, psnr, ssim};
 use crate::domain::grid::Grid;
 
 /// Metrics that do not stretch.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Unstretched {
     /// PSNR of the pictures as they are, dB; `None` for equal ones.
     pub psnr_raw_db: Option<f64>,

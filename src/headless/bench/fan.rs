@@ -3,10 +3,10 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::canvas::{Drawing, Drawn, Paper, pixels};
 use crate::domain::ensemble::{AngleFan, Dial};
 use crate::domain::grid::RgbGrid;
 use crate::domain::units;
+use crate::work::canvas::{Drawing, Drawn, Paper, pixels};
 
 const SEED: RGBColor = RGBColor(0xc2, 0x54, 0x00);
 const TRUTH: RGBColor = RGBColor(0x1c, 0x84, 0x47);
@@ -21,10 +21,12 @@ struct Picture<'a> {
 }
 
 impl Drawing for Picture<'_> {
-    const SIZE: [u32; 2] = [360, 240];
+    fn size(&self) -> [u32; 2] {
+        [360, 240]
+    }
 
     fn draw<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
-        let (dial, [width, height]) = (&self.dial, Self::SIZE.map(f64::from));
+        let (dial, [width, height]) = (&self.dial, self.size().map(f64::from));
         let pivot = [width / 2.0, height - 20.0];
         let toward = |off: f64, share: f64| {
             let lean = dial.lean(off);

@@ -4,8 +4,8 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
 
-use super::canvas::{Drawing, Drawn, Paper};
 use super::rows::EngineRow;
+use crate::work::canvas::{Drawing, Drawn, Paper};
 
 /// An engine as a point of the picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -114,7 +114,9 @@ impl Picture<'_> {
 }
 
 impl Drawing for Picture<'_> {
-    const SIZE: [u32; 2] = [1000, 620];
+    fn size(&self) -> [u32; 2] {
+        [1000, 620]
+    }
 
     fn draw<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
         self.heading(paper)?;
@@ -264,7 +266,7 @@ mod tests {
         }
         let text = |points: &[FrontPoint]| {
             let axis = Axis { title: "t", time: "ms", unit: " mm", legend: &PEERS };
-            super::super::canvas::svg(&Picture { axis, points, default: "one" }).unwrap()
+            crate::work::canvas::svg(&Picture { axis, points, default: "one" }).unwrap()
         };
         let svg = text(&pareto(vec![point("one", 0.1, 0.7), point("two", 200.0, 5.0)]));
         assert_eq!(labels.place([50, 12], (100, 100))[1], 94, "beside its point, where nothing is in the way");

@@ -13,7 +13,6 @@ use strum::IntoEnumIterator as _;
 use self::cases::{Case, Judge, Score};
 use self::timing::{First, Overhead, timed_run};
 use super::Machine;
-use super::canvas;
 use super::figures::quantile;
 use super::front::{self, Axis, FrontPoint, Picture};
 use crate::domain::diffusion::{GenerateConfig, Sampler, Spacing};
@@ -26,6 +25,7 @@ use crate::infer::generator::Generator;
 use crate::infer::mask::MaskModel;
 use crate::io::atomic;
 use crate::work::bundles::{self, BundleKind};
+use crate::work::canvas;
 
 /// What everything is measured against.
 const REFERENCE: (Sampler, u32) = (Sampler::Ddim, 200);

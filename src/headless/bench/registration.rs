@@ -10,7 +10,6 @@ use glam::DVec3;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
-use super::canvas;
 use super::figures::{Outcome, Summary, quantile};
 use super::front::{self, Axis, FrontPoint, Picture};
 use super::rows::{EngineRow, Prepared, offset, position_error_mm};
@@ -26,6 +25,7 @@ use crate::headless::output::says;
 use crate::headless::{Output, VerbResult, spread};
 use crate::io::atomic;
 use crate::io::cases::{Case, CaseSet};
+use crate::work::canvas;
 
 /// Repetitions of one case go on until this much time is spent, milliseconds, or there are [`MAX_REPETITIONS`].
 const REPEAT_MS: f64 = 8.0;

@@ -40,6 +40,9 @@ pub(in crate::headless) struct PoseArgs {
     /// Repeat for several.
     #[arg(long = "paper-trap", value_name = "TRAP", value_parser = parse_trap)]
     pub(super) paper_traps: Vec<PaperTrap>,
+    /// Only this pair, by its name or a part of it that no other has.
+    #[arg(long, conflicts_with = "limit")]
+    pub(super) pair: Option<String>,
     #[command(flatten)]
     pub(super) limit: LimitArgs,
     /// Add the whole registration report to each case of the JSON: every start and iteration, and each point's

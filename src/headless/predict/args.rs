@@ -9,6 +9,8 @@ use super::super::args::keyed;
 use crate::domain::diffusion::{GUIDANCE, Preset, Sampler};
 use crate::domain::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use crate::infer::engine::EngineChoice;
+use crate::work::bundles::{self, BundleKind};
+use crate::work::subject::{Mapping, Wish};
 
 /// Which models, and how they are run.
 #[derive(Debug, Clone, Args)]
@@ -58,6 +60,29 @@ pub(in crate::headless) struct ModelArgs {
     /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
     #[arg(long)]
     pub(super) no_cache: bool,
+}
+
+impl ModelArgs {
+    /// The same with what a subject of a comparison wants otherwise. A bundle is named by its folder, or as it calls
+    /// itself.
+    pub(in crate::headless) fn with(&self, wish: &Wish) -> Self {
+        let mut args = self.clone();
+        if let Some(name) = &wish.bundle {
+            let found = bundles::find(&[]);
+            let named = found.bundles.iter().find(|b| b.kind == BundleKind::Generator && b.name == *name);
+            args.bundle = Some(named.map_or_else(|| PathBuf::from(name), |bundle| bundle.origin.path()));
+        }
+        args.steps = wish.steps.or(args.steps);
+        args.seed = wish.seed.or(args.seed);
+        match wish.shift {
+            None => {}
+            Some(Mapping::Raw) => args.shift = AnyShiftArg::Raw,
+            Some(Mapping::Paper) => args.shift = AnyShiftArg::Paper,
+            Some(Mapping::Exact) => (args.shift, args.fit_parts) = (AnyShiftArg::Exact, CorrectionParts::ALL),
+            Some(Mapping::Unfitted) => (args.shift, args.fit_parts) = (AnyShiftArg::Exact, CorrectionParts::NONE),
+        }
+        args
+    }
 }
 
 fn fit_parts(text: &str) -> Result<CorrectionParts, String> {

@@ -183,6 +183,11 @@ impl Pictures {
         files.into_iter().flat_map(|files| kinds.iter().filter_map(|&kind| files[kind].clone())).collect()
     }
 
+    /// The file of a stored prediction.
+    pub(super) fn stored(&self, id: PairId) -> Option<PathBuf> {
+        self.pairs.get(id.0 as usize)?[VQVAE].clone()
+    }
+
     /// A gray picture that lay this way in its file, upright.
     pub(super) fn tile(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         let Some(path) = self.file(id, kind)? else { return Ok(None) };

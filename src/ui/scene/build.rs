@@ -69,16 +69,19 @@ pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSour
     if held.as_ref().is_some_and(|h| h.key == key) {
         return;
     }
+    memory.revision += 1;
+    *held = Some(SceneCloud { key, revision: memory.revision, fingers: parts(clouds), window: window(cx, clouds) });
+}
+
+/// The points of each finger apart: membrane and contact.
+pub(in crate::ui) fn parts(clouds: &Clouds) -> PerPad<[Arc<[DVec3]>; 2]> {
     let part = |f: &FingerCloud, contact: bool| {
         let indices: Vec<usize> = (0..f.points.len()).filter(|i| f.contact.get(*i) == Some(&contact)).collect();
         // The membrane only has to be seen, and seen through: every other pixel of every other row.
         let kept = |i: &usize| contact || f.pixels.get(*i).is_some_and(|p| p[0] % 2 == 0 && p[1] % 2 == 0);
         indices.into_iter().filter(kept).filter_map(|i| f.points.get(i).copied()).collect::<Arc<[DVec3]>>()
     };
-    let convert = |f: &FingerCloud| [part(f, false), part(f, true)];
-    memory.revision += 1;
-    let fingers = clouds.fingers.as_ref().map(|cloud| cloud.map(convert));
-    *held = Some(SceneCloud { key, revision: memory.revision, fingers, window: window(cx, clouds) });
+    clouds.fingers.as_ref().map(|cloud| cloud.map(|f| [part(f, false), part(f, true)]))
 }
 
 /// The box around the points that the color sensors see; x is left open.
@@ -344,7 +347,7 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64, sce
 }
 
 /// Floor grid and axes.
-fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
+pub(in crate::ui) fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
     scene.lines.push(LinesItem {
         name: "grid".into(),
         revision: u64::from(*cx.p == theme::DARK),

@@ -42,7 +42,7 @@ pub(super) struct LayerColors {
 }
 
 /// The colors of distances: blue inside, red outside.
-pub(super) const DISTANCE_MAP: ColorMap = ColorMap::Diverging;
+pub(in crate::ui) const DISTANCE_MAP: ColorMap = ColorMap::Diverging;
 
 /// Makes the colors of a side's contact points, where a layer is on and its figures are there.
 pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
@@ -135,7 +135,7 @@ pub(super) fn paint(memory: &Memory, source: ImprintSource, finger: PadId, item:
 }
 
 /// The look of a model that another one is compared with: its outline alone.
-pub(super) fn outline(world_from_mesh: DAffine3, color: Color32, look: LayerLook) -> MeshStyle {
+pub(in crate::ui) fn outline(world_from_mesh: DAffine3, color: Color32, look: LayerLook) -> MeshStyle {
     let width_px = match look.size {
         LayerSize::Px(px) | LayerSize::Mm(px) => px,
     };

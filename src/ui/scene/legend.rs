@@ -54,7 +54,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: Imprin
         Layer::Residuals if memory.layer_colors[source as usize].is_some() => {
             residuals(cx, &ui.painter_at(rect), source, rect)
         }
-        Layer::Distance if memory.layer_colors[source as usize].is_some() => distances(cx, ui, source, rect),
+        Layer::Distance if memory.layer_colors[source as usize].is_some() => {
+            distances(cx, ui, &source.name().to_lowercase(), "inside ", rect);
+        }
         _ => {}
     }
 }
@@ -228,26 +230,23 @@ fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) 
     }
 }
 
-/// Which color is which signed distance; the reach is one for both views, and can be changed.
-fn distances(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
+/// Which color is which signed distance, `below` being what negative ones are called; the reach is one for all views, and can be changed.
+pub(in crate::ui) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, below: &str, rect: Rect) {
     let bar = bar(rect);
     let painter = ui.painter_at(rect);
     colors(&painter, bar, layers::DISTANCE_MAP);
     let look: &SceneLook = &cx.state.settings.scene;
     let mut mm = units::mm(f64::from(look.distance_m));
-    let texts = [format!("inside -{mm:.2}"), "0".into(), format!("+{mm:.2} mm")];
+    let texts = [format!("{below}-{mm:.2}"), "0".into(), format!("+{mm:.2} mm")];
     ends(&painter, bar, texts, cx.p.text);
     let place = Rect::from_min_max(pos2(bar.left(), bar.top() - 20.0), pos2(bar.right(), bar.top() - 2.0));
-    let builder = UiBuilder::new().max_rect(place).id_salt(("distances", source as usize));
+    let builder = UiBuilder::new().max_rect(place).id_salt(("distances", view));
     ui.scope_builder(builder, |ui| {
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let drag =
                 DragValue::new(&mut mm).speed(0.02).range(0.01..=50.0).fixed_decimals(2).prefix("± ").suffix(" mm");
-            let drag =
-                ui.add(drag).accessible_name(format!("Reach of the distances, {}", source.name().to_lowercase()));
-            let drag = drag.on_hover_text(
-                "Signed distance to the model that has the last color, in both views; double-click: 1 mm",
-            );
+            let drag = ui.add(drag).accessible_name(format!("Reach of the distances, {view}"));
+            let drag = drag.on_hover_text("Signed distance that has the last color, in all views; double-click: 1 mm");
             let mut changed = drag.changed();
             if drag.double_clicked() {
                 (mm, changed) = (1.0, true);

@@ -45,19 +45,6 @@ pub enum Asked {
     Lock(bool),
 }
 
-/// Ticks at round numbers, at most `most` of them.
-fn ticks(range: Range, most: usize) -> Vec<f32> {
-    let span = range.hi - range.lo;
-    if !(span > 0.0 && span.is_finite()) || most == 0 {
-        return Vec::new();
-    }
-    let raw = span / most as f32;
-    let base = 10f32.powf(raw.log10().floor());
-    let step = [1.0, 2.0, 5.0, 10.0].map(|m| m * base).into_iter().find(|s| *s >= raw).unwrap_or(base * 10.0);
-    let first = (range.lo / step).ceil() as i64;
-    (0..=most as i64 + 1).map(|i| (first + i) as f32 * step).take_while(|v| *v <= range.hi + step * 1e-3).collect()
-}
-
 impl Colorbar<'_> {
     /// Shows the bar over the width of `ui`; `range` is in millimeters.
     pub fn show(self, ui: &mut Ui, range: Range) -> Option<Asked> {
@@ -154,7 +141,7 @@ impl Colorbar<'_> {
                 p,
             );
         }
-        for v in ticks(range, (width / 44.0) as usize) {
+        for v in range.ticks((width / 44.0) as usize) {
             let x = bar.left() + range.unit(v) * bar.width();
             painter.vline(x, bar.bottom()..=bar.bottom() + 2.0, Stroke::new(1.0, p.weak));
             let text = if v.fract().abs() < 1e-3 { format!("{v:.0}") } else { format!("{v:.1}") };
@@ -242,17 +229,4 @@ pub(in crate::ui) fn gradient(painter: &Painter, bar: Rect, steps: u32, color: i
         }
     }
     painter.add(Shape::mesh(mesh));
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ticks_are_round_and_inside() {
-        assert_eq!(ticks(Range { lo: 0.0, hi: 18.0 }, 4), vec![0.0, 5.0, 10.0, 15.0]);
-        assert_eq!(ticks(Range { lo: -4.0, hi: 4.0 }, 4), vec![-4.0, -2.0, 0.0, 2.0, 4.0]);
-        assert!(ticks(Range { lo: 1.0, hi: 1.0 }, 4).is_empty());
-        assert!(ticks(Range { lo: f32::NAN, hi: 1.0 }, 4).is_empty());
-    }
 }

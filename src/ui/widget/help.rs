@@ -12,6 +12,17 @@ pub const IMAGE: &[(&str, &str)] = &[
     ("Hover", "cross-hair in every image and point in 3D"),
 ];
 
+/// Controls of the comparison of any two imprints.
+pub const VERSUS: &[(&str, &str)] = &[
+    ("Click on A or B", "choose what it is"),
+    ("Shift + R", "swap A and B"),
+    ("Shift + F", "side by side, wipe, difference, 3D"),
+    ("Hold F", "B in the place of A"),
+    ("Drag the line", "wipe"),
+    ("Hover", "both values and their difference, in the status bar"),
+    ("Wheel, drag, double-click", "zoom, move, fit; in 3D zoom, orbit, fit"),
+];
+
 /// Mouse controls of an image that can be painted on.
 pub const PAINT: &[(&str, &str)] = &[
     ("Drag", "paint with the tool in hand"),

@@ -6,7 +6,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions};
 
 use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::picture::{self, Rgb8};
 
 /// Bars in a histogram.
 pub const BINS: usize = 64;
@@ -160,34 +161,12 @@ fn hash(value: impl Hash) -> u64 {
 
 /// A depth map through a color map.
 pub fn depth_image(depth: &DepthMap, map: ColorMap, range: Range) -> ColorImage {
-    let table = map.table();
-    let nan = map.rgb8(f32::NAN);
-    let pixel = |v: &f32| {
-        let unit = range.unit(*v);
-        let [r, g, b] = if unit.is_nan() { nan } else { table[(unit * 255.0 + 0.5) as usize] };
-        Color32::from_rgb(r, g, b)
-    };
-    ColorImage::new(depth.size(), depth.as_slice().iter().map(pixel).collect())
+    picture_image(&picture::colored(depth, map, range))
 }
 
-/// A color image on the 0..255 scale. `center` is added: 128 shows a signed difference around mid gray.
-pub fn rgb_image(image: &RgbGrid, gain: f32, center: f32) -> ColorImage {
-    let byte = |v: f32| (v * gain + center).round().clamp(0.0, 255.0) as u8;
-    let pixel = |p: &[f32; 3]| Color32::from_rgb(byte(p[0]), byte(p[1]), byte(p[2]));
-    ColorImage::new(image.size(), image.as_slice().iter().map(pixel).collect())
-}
-
-/// The gain that spreads a difference over the gray levels: 1 at the usual contrast, more for faint touches, and for
-/// values on a 0..1 scale. 1 for an empty or constant image.
-pub fn difference_gain(image: &Grid<[f32; 3]>) -> f32 {
-    let mut sizes: Vec<f32> =
-        image.as_slice().iter().flat_map(|p| p.iter().map(|v| v.abs())).filter(|v| v.is_finite()).collect();
-    if sizes.is_empty() {
-        return 1.0;
-    }
-    let at = (sizes.len() - 1) * 995 / 1000;
-    let (_, p99, _) = sizes.select_nth_unstable_by(at, f32::total_cmp);
-    if *p99 > 1e-6 { 120.0 / *p99 } else { 1.0 }
+/// A picture as the graphics card takes it.
+pub fn picture_image(picture: &Rgb8) -> ColorImage {
+    ColorImage::new(picture.size(), picture.as_slice().iter().map(|[r, g, b]| Color32::from_rgb(*r, *g, *b)).collect())
 }
 
 /// A mask as a transparent layer.
@@ -274,12 +253,5 @@ mod tests {
         let h = Histogram::of(&[0.0, f32::NAN, 1.0, 1.0, f32::INFINITY]).unwrap();
         assert_eq!((h.counts[0], h.counts[BINS - 1]), (1, 2));
         assert_eq!(Histogram::of(&[f32::NAN]), None);
-    }
-
-    #[test]
-    fn nan_has_its_own_color() {
-        let depth = DepthMap::from_vec(2, 1, vec![f32::NAN, 0.0]).unwrap();
-        let image = depth_image(&depth, ColorMap::Viridis, Range { lo: 0.0, hi: 1.0 });
-        assert_ne!(image.pixels[0], image.pixels[1]);
     }
 }

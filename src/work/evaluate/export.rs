@@ -32,7 +32,7 @@ pub fn rows(evaluation: &Evaluation, published: bool) -> Vec<Row> {
     rows
 }
 
-/// Writes `evaluation.csv`, `.md` and `.json` (with every grasp) into a folder, which is made if missing; returns it.
+/// Writes `evaluation.csv`, `.md`, `.tex` and `.json` (with every grasp) into a folder, which is made if missing; returns it.
 ///
 /// # Errors
 /// If one cannot be written.
@@ -49,6 +49,7 @@ pub fn export(evaluation: &Evaluation, published: bool, folder: &Path) -> Result
     for (name, bytes) in [
         ("evaluation.csv", evaluation::csv(&rows).into_bytes()),
         ("evaluation.md", evaluation::markdown(&rows).into_bytes()),
+        ("evaluation.tex", evaluation::latex(&rows).into_bytes()),
         ("evaluation.json", json),
     ] {
         atomic::write_bytes(&folder.join(name), &bytes).map_err(|err| fail(err.to_string()))?;

@@ -10,13 +10,17 @@ use crate::domain::evaluation::Group;
 use crate::domain::grid::Grid;
 use crate::domain::sample::{Sample, Scale};
 use crate::io::dataset::{Dataset, SourceKind};
+use crate::work::error::TaskError;
 use crate::work::job::JobCx;
 use crate::work::labels::{Labels, PairLabels};
 
 /// A loaded pair.
 pub(super) struct Case {
+    pub(super) id: PairId,
     pub(super) name: String,
     pub(super) group: Group,
+    /// Whether its GelSlim picture is clipped, of pictures.
+    pub(super) clipped: Option<bool>,
     pub(super) sample: Sample,
     /// What people drew, where that is to be taken.
     pub(super) labels: Option<PairLabels>,
@@ -33,8 +37,26 @@ pub(super) struct Cases {
 
 /// The pairs of a tool, as they arrive.
 pub(super) struct Batch<'a> {
-    pub(super) tool: Option<String>,
+    pub(super) work: &'a ToolWork,
     pub(super) cases: Box<dyn Iterator<Item = Result<Cases, Vec<Skipped>>> + 'a>,
+}
+
+/// What people drew, where that is to be taken.
+pub(super) struct Labeled(Option<Labels>);
+
+impl Labeled {
+    pub(super) fn of(dataset: &Dataset, setup: &Setup) -> Self {
+        Self(setup.hand.then(|| Labels::of(dataset)))
+    }
+
+    /// Nobody's.
+    pub(super) fn none() -> Self {
+        Self(None)
+    }
+
+    pub(super) fn load(&self, name: &str) -> Result<Option<PairLabels>, TaskError> {
+        self.0.as_ref().map(|labels| labels.load(name)).transpose()
+    }
 }
 
 /// What is to be scored, tool by tool.
@@ -49,7 +71,7 @@ pub(super) fn plan(dataset: &Dataset, setup: &Setup) -> Vec<ToolWork> {
 pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &JobCx, mut score: impl FnMut(Batch<'_>)) {
     // Both fingers of a grasp go through the generator together.
     let grasps = setup.batch.div_ceil(2).max(1);
-    let labels = &setup.hand.then(|| Labels::of(dataset));
+    let labels = &Labeled::of(dataset, setup);
     std::thread::scope(|scope| {
         let (sender, receiver) = sync_channel(1);
         scope.spawn(move || {
@@ -57,8 +79,7 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
                 if cx.cancel.is_cancelled() {
                     return;
                 }
-                let loaded: Vec<Result<Case, Skipped>> =
-                    ids.par_iter().map(|&id| load(dataset, labels.as_ref(), id)).collect();
+                let loaded: Vec<Result<Case, Skipped>> = ids.par_iter().map(|&id| load(dataset, labels, id)).collect();
                 let mut cases = Cases { good: Vec::new(), bad: Vec::new() };
                 for one in loaded {
                     match one {
@@ -82,7 +103,7 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
                 }]
             };
             let cases = (0..chunks).map(|_| receiver.recv().map_err(|_| lost()));
-            score(Batch { tool: tool.tool.clone(), cases: Box::new(cases) });
+            score(Batch { work: tool, cases: Box::new(cases) });
             if cx.cancel.is_cancelled() {
                 break;
             }
@@ -90,7 +111,8 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
     });
 }
 
-fn load(dataset: &Dataset, labels: Option<&Labels>, id: PairId) -> Result<Case, Skipped> {
+/// Reads one pair.
+pub(super) fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<Case, Skipped> {
     let Some(entry) = dataset.index.get(id) else {
         return Err(Skipped { what: format!("pair {}", id.0), method: String::new(), why: "no such pair".into() });
     };
@@ -100,7 +122,7 @@ fn load(dataset: &Dataset, labels: Option<&Labels>, id: PairId) -> Result<Case, 
     if sample.pads.iter().flatten().all(|t| t.color().is_none() || t.depth().is_none()) {
         return Err(skip("no finger has both a GelSlim image and a measured imprint".into()));
     }
-    let labels = labels.map(|labels| labels.load(&entry.name)).transpose().map_err(|err| skip(err.to_string()))?;
+    let labels = labels.load(&entry.name).map_err(|err| skip(err.to_string()))?;
     let pictures = sample.scale == Scale::Assumed;
     let (tile, lab, clipped) = if pictures {
         let clipped = dataset.gelslim_is_clipped(id).map_err(fail)?;
@@ -110,5 +132,5 @@ fn load(dataset: &Dataset, labels: Option<&Labels>, id: PairId) -> Result<Case, 
         (None, None, None)
     };
     let group = Group::of(entry, dataset.kind == SourceKind::Demo, clipped);
-    Ok(Case { name: entry.name.clone(), group, sample, labels, tile, lab })
+    Ok(Case { id, name: entry.name.clone(), group, clipped, sample, labels, tile, lab })
 }

@@ -7,6 +7,7 @@ use super::load::Case;
 use super::{Setup, WHAT};
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
+use crate::domain::evaluation::Scores;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::{PadId, PerPad, SensorId, SensorKind};
@@ -69,10 +70,13 @@ pub(super) struct Models {
     /// Where the mask model is run.
     pub(super) masks: models::Models,
     pub(super) mask_bundle: Option<BundleInfo>,
+    /// The classifier's bundle; the model once it was needed.
+    classifier_bundle: Option<Bundle>,
     pub(super) classifier: Option<ToolClassifier>,
+    runtime: EngineChoice,
     engine: String,
     /// How many masks were not made of the source that was asked, by row and reason.
-    pub(super) made_otherwise: BTreeMap<(String, &'static str), usize>,
+    pub(super) made_otherwise: BTreeMap<(String, String), usize>,
 }
 
 fn open(origin: &Origin) -> Result<Bundle, TaskError> {
@@ -85,7 +89,7 @@ fn found(origin: &Origin, kind: BundleKind) -> Result<BundleInfo, TaskError> {
 }
 
 impl Models {
-    /// Loads everything that the setup names.
+    /// Finds everything that the setup names; [`Self::load`] loads it.
     pub(super) fn open(setup: &Setup, dataset: &Dataset, models: &models::Models) -> Result<Self, TaskError> {
         let mut methods = Vec::new();
         let pictures = dataset.kind == SourceKind::Pictures;
@@ -111,7 +115,6 @@ impl Models {
             let name = if names.contains(&name) { format!("{name} ({})", origin.short_name()) } else { name };
             names.push(name.clone());
             let (models, engine) = (models.beside(), setup.runtime);
-            models.load(&bundle, engine)?;
             methods.push(Method::Generator(Box::new(GeneratorMethod { name, bundle, models, engine, config, input })));
         }
         let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id), Turn::default()), Ok(Some(_)));
@@ -122,17 +125,50 @@ impl Models {
             Some(origin) if !pictures => Some(found(origin, BundleKind::Mask)?),
             _ => None,
         };
-        let masks = models.beside();
-        if let (Some(bundle), MaskSource::Auto | MaskSource::Unet) = (&mask_bundle, setup.mask.source) {
-            masks.load(bundle, setup.runtime)?;
-        }
-        let classifier = match &setup.classifier {
-            Some(origin) if !pictures => {
-                Some(ToolClassifier::open(&open(origin)?, setup.runtime).map_err(|err| fail(&err))?)
+        let classifier_bundle = setup.classifier.as_ref().filter(|_| !pictures).map(open).transpose()?;
+        Ok(Self {
+            methods,
+            masks: models.beside(),
+            mask_bundle,
+            classifier_bundle,
+            classifier: None,
+            runtime: setup.runtime,
+            engine,
+            made_otherwise: BTreeMap::new(),
+        })
+    }
+
+    /// Loads all models, so that one that cannot be used is known before the first touch.
+    pub(super) fn load(&mut self, setup: &Setup) -> Result<(), TaskError> {
+        for method in &self.methods {
+            if let Method::Generator(method) = method {
+                method.models.load(&method.bundle, method.engine)?;
             }
-            _ => None,
+        }
+        if let (Some(bundle), MaskSource::Auto | MaskSource::Unet) = (&self.mask_bundle, setup.mask.source) {
+            self.masks.load(bundle, setup.runtime)?;
+        }
+        if let Some(bundle) = &self.classifier_bundle {
+            let opened = ToolClassifier::open(bundle, self.runtime);
+            self.classifier = Some(opened.map_err(|err| TaskError::from_error(WHAT, &err))?);
+        }
+        Ok(())
+    }
+
+    /// The methods without grasps.
+    pub(super) fn empty_scores(&self) -> Vec<Scores> {
+        let empty = |method: &Method| Scores {
+            method: method.name().to_owned(),
+            upper_bound: matches!(method, Method::Measured),
+            grasps: Vec::new(),
+            measured_features: Vec::new(),
         };
-        Ok(Self { methods, masks, mask_bundle, classifier, engine, made_otherwise: BTreeMap::new() })
+        self.methods.iter().map(empty).collect()
+    }
+
+    /// The identity of the classifier's bundle.
+    pub(super) fn classifier_hash(&self) -> Option<&str> {
+        self.classifier_bundle.as_ref().map(Bundle::hash)
     }
 
     /// The engine's name.
@@ -142,7 +178,7 @@ impl Models {
 
     /// Masks that were not made of the source that was asked, in words.
     pub(super) fn masks_made_otherwise(&self) -> Vec<String> {
-        let line = |((method, why), count): (&(String, &'static str), &usize)| format!("{method}: {count} masks {why}");
+        let line = |((method, why), count): (&(String, String), &usize)| format!("{method}: {count} masks {why}");
         self.made_otherwise.iter().map(line).collect()
     }
 
@@ -185,7 +221,7 @@ impl Models {
                 format!("contact masks: the deepest {:.1} % of each imprint", percent.get())
             }
         });
-        if self.classifier.is_none() {
+        if self.classifier_bundle.is_none() {
             notes.push("no tool classifier: no tool accuracy and no Fréchet distance".into());
         }
         notes
@@ -202,11 +238,26 @@ impl Method {
         }
     }
 
+    /// Everything that decides what it makes of a touch, as text.
+    pub(super) fn recipe(&self, setup: &Setup) -> String {
+        match self {
+            Self::Measured => "measured".into(),
+            Self::Stored => "stored".into(),
+            Self::Generator(method) => {
+                // The input is the touch's: the key of the line has it.
+                let kind = resolve(method.engine).map_or_else(|err| err.to_string(), |kind| format!("{kind:?}"));
+                let (bundle, config, fit) = (&method.bundle.id, method.config, &method.bundle.generator);
+                let fit = fit.as_ref().and_then(|info| info.fit.as_ref());
+                format!("{bundle} {kind} {config:?} {:?} {fit:?}", setup.shift)
+            }
+        }
+    }
+
     /// What it makes of each touch, or why not; `None` once it was told to stop.
-    pub(super) fn make(&mut self, cases: &[Case], setup: &Setup, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
+    pub(super) fn make(&mut self, cases: &[&Case], setup: &Setup, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
         Some(match self {
             Self::Measured => cases.iter().map(|case| Ok(measured(case))).collect(),
-            Self::Stored => cases.iter().map(stored).collect(),
+            Self::Stored => cases.iter().map(|case| stored(case)).collect(),
             Self::Generator(method) => return method.make(cases, setup.shift, cx),
         })
     }
@@ -229,7 +280,7 @@ fn stored(case: &Case) -> Result<Made, String> {
 }
 
 impl GeneratorMethod {
-    fn make(&mut self, cases: &[Case], shift: ShiftMode, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
+    fn make(&mut self, cases: &[&Case], shift: ShiftMode, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
         let input = self.input;
         let touches: Vec<(usize, PadId, Cow<'_, RgbGrid>)> = cases
             .iter()

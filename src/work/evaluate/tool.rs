@@ -1,16 +1,18 @@
 //! Scoring the grasps of one tool: image figures wait until all its predictions are there, because the lab's SSIM takes
 //! its range from them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::load::Case;
+use super::kept::{Entry, Kept};
+use super::load::{Case, Labeled, load};
 use super::methods::{Made, Method, Models};
-use super::{Setup, Skipped};
+use super::{Setup, Skipped, ToolWork};
 use crate::domain::align::Ask;
 use crate::domain::catalog::pattern_of;
 use crate::domain::contact::{ContactMask, MaskBasis};
+use crate::domain::dataset::PairId;
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
 use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
 use crate::domain::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ssim_ranges, unit_range};
@@ -42,23 +44,29 @@ struct Image {
 
 /// A grasp that waits for its image figures.
 struct Pending {
-    score: GraspScore,
+    id: PairId,
+    entry: Entry,
     images: Vec<Image>,
+    /// Whether something about it failed, so that it is tried again the next time.
+    failed: bool,
 }
 
 /// The grasps of one tool, by method.
 pub(super) struct Tool {
     /// Its pattern's name.
     pattern: Option<String>,
+    /// Whether its CAD model could not be used: what is scored without it is not kept.
+    broken: bool,
     model: Option<ToolModel>,
     class: Option<usize>,
     pending: BTreeMap<usize, Vec<Pending>>,
 }
 
 impl Tool {
-    /// Reads the CAD model.
-    pub(super) fn new(dataset: &Dataset, tool: Option<String>, skipped: &mut Vec<Skipped>) -> Self {
-        let model = tool.as_deref().and_then(|name| {
+    /// Reads the CAD model, if there is anything to score.
+    pub(super) fn new(dataset: &Dataset, work: &ToolWork, skipped: &mut Vec<Skipped>) -> Self {
+        let tool = &work.tool;
+        let model = tool.as_deref().filter(|_| !work.ids.is_empty()).and_then(|name| {
             let skip = |err: TaskError| {
                 let why = err.hint.map_or(err.why.clone(), |hint| format!("{} ({hint})", err.why));
                 skipped.push(Skipped { what: name.into(), method: String::new(), why });
@@ -66,32 +74,37 @@ impl Tool {
             load_tool(dataset, name).map(|(model, _)| model).map_err(skip).ok()
         });
         let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
-        Self { pattern, model, class: None, pending: BTreeMap::new() }
+        let broken = tool.is_some() && !work.ids.is_empty() && model.is_none();
+        Self { pattern, broken, model, class: None, pending: BTreeMap::new() }
     }
 
-    /// Takes some of its grasps through every method. `say` is told which.
+    /// Takes some of its grasps through every method that they are not known by. `say` is told which.
     pub(super) fn score(
         &mut self,
         cases: &[Case],
         setup: &Setup,
         models: &mut Models,
+        book: &Kept,
         skipped: &mut Vec<Skipped>,
         cx: &JobCx,
         say: &mut dyn FnMut(&str),
     ) {
-        let Models { methods, masks: by_models, mask_bundle, classifier, made_otherwise, .. } = models;
+        let Models { methods, masks: by_models, mask_bundle, classifier, .. } = models;
         let by = Masking { choice: setup.mask, model: mask_bundle.as_ref(), engine: setup.runtime };
         let with_masks = by.recipe().is_ok();
         self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
             let upper = matches!(method, Method::Measured);
-            let Some(made) = method.make(cases, setup, cx) else { return };
+            let cases: Vec<&Case> = cases.iter().filter(|case| !book.has(at, case.id)).collect();
+            let Some(made) = method.make(&cases, setup, cx) else { return };
+            let mut failed: BTreeSet<PairId> = BTreeSet::new();
             let mut skip = |case: &Case, why: String| {
+                failed.insert(case.id);
                 skipped.push(Skipped { what: case.name.clone(), method: method.name().to_owned(), why });
             };
-            let mut kept: Vec<(&Case, Made, PerPad<Mask>)> = Vec::new();
-            for (case, made) in cases.iter().zip(made) {
+            let mut kept: Vec<(&Case, Made, PerPad<Mask>, Vec<(String, usize)>)> = Vec::new();
+            for (case, made) in cases.into_iter().zip(made) {
                 let made = match made {
                     Ok(made) => made,
                     Err(why) => {
@@ -99,6 +112,7 @@ impl Tool {
                         continue;
                     }
                 };
+                let mut otherwise: Vec<(String, usize)> = Vec::new();
                 let masks = case.sample.rig.pads().map(|f| {
                     if self.model.is_none() || case.sample.grasp_from_object.is_none() {
                         return None;
@@ -118,22 +132,25 @@ impl Tool {
                             "are by depth: the mask model found no contact in imprints that have some"
                         }
                     };
-                    *made_otherwise.entry((method.name().to_owned(), why)).or_insert(0) += 1;
+                    match otherwise.iter_mut().find(|(known, _)| known == why) {
+                        Some((_, count)) => *count += 1,
+                        None => otherwise.push((why.to_owned(), 1)),
+                    }
                     Some(mask)
                 });
                 let masks = masks.collect();
-                kept.push((case, made, masks));
+                kept.push((case, made, masks, otherwise));
             }
             // Poses on all cores; the models run one by one.
             let angles: Vec<Result<Option<f64>, String>> = kept
                 .par_iter()
-                .map(|(case, made, masks)| {
+                .map(|(case, made, masks, _)| {
                     // A color picture has no depth, so there is nothing that could fail.
                     let posed = with_masks && made.colors.is_empty();
                     guarded(|| Ok(posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()))
                 })
                 .collect();
-            for ((case, made, _), angle) in kept.into_iter().zip(angles) {
+            for ((case, made, _, otherwise), angle) in kept.into_iter().zip(angles) {
                 let scored = angle.and_then(|angle| Ok((angle, guarded(|| Ok(images(case, &made, setup, upper)))?)));
                 let (angle_error_rad, mut images) = match scored {
                     Ok(scored) => scored,
@@ -161,7 +178,12 @@ impl Tool {
                     angle_error_rad,
                     seconds: made.seconds,
                 };
-                self.pending.entry(at).or_default().push(Pending { score, images });
+                let entry = Entry::new(score, case.clipped, case.sample.notes.clone(), otherwise);
+                let pending = Pending { id: case.id, entry, images, failed: false };
+                self.pending.entry(at).or_default().push(pending);
+            }
+            for pending in self.pending.get_mut(&at).into_iter().flatten() {
+                pending.failed |= self.broken || failed.contains(&pending.id);
             }
         }
     }
@@ -177,51 +199,137 @@ impl Tool {
         Some(found.ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN))
     }
 
-    /// The image figures, now that all predictions of the tool are there.
-    pub(super) fn finish(self, scores: &mut [Scores], skipped: &mut Vec<Skipped>) {
-        let class = self.class;
+    /// The image figures, now that all predictions of the tool are there; with what was known of `ids` before, in their
+    /// order. What is new is kept in the book.
+    pub(super) fn finish(
+        mut self,
+        book: &Kept,
+        ids: &[PairId],
+        again: &mut dyn FnMut(usize, &[PairId]) -> Vec<Again>,
+        scores: &mut [Scores],
+        skipped: &mut Vec<Skipped>,
+    ) -> Vec<(usize, Entry)> {
         let mut measured_features = Vec::new();
-        for (at, pending) in self.pending {
-            let range = spread(pending.iter().flat_map(|p| &p.images).map(|i| &i.prediction));
-            let done: Vec<Result<GraspScore, Skipped>> = pending
-                .into_par_iter()
-                .map(|Pending { mut score, images }| {
-                    let assumed = score.scale == Scale::Assumed;
-                    let ranges = if assumed {
-                        [SsimRange::Explicit(1.0); 2]
-                    } else {
-                        [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)]
-                    };
-                    let scored =
-                        || Ok(images.into_iter().map(|image| finished(image, class, ranges, assumed)).collect());
-                    match guarded(scored) {
-                        Ok(images) => {
-                            score.images = images;
-                            Ok(score)
-                        }
-                        Err(why) => Err(Skipped { what: score.pair, method: scores[at].method.clone(), why }),
-                    }
-                })
-                .collect();
-            let mut kept = Vec::new();
+        let mut all = Vec::new();
+        for at in 0..scores.len() {
+            let pending = self.pending.remove(&at).unwrap_or_default();
+            let known = book.of(at, ids);
+            let spans = known.iter().flat_map(|(_, entry)| entry.spans.iter().copied().flatten());
+            let range = width(pending.iter().flat_map(|p| &p.images).filter_map(|i| span(&i.prediction)).chain(spans));
+            let (mut kept, stale): (Vec<_>, Vec<_>) =
+                known.into_iter().partition(|(_, entry)| entry.is_of_range(range));
+            // The lab's SSIM takes its range from all predictions of the tool: with others beside them it is another.
+            let mut fresh = redone(stale, range, at, again);
+            let class = self.class;
+            let done: Vec<_> = pending.into_par_iter().map(|pending| ended(pending, class, range)).collect();
             for one in done {
                 match one {
-                    Ok(score) => kept.push(score),
-                    Err(bad) => skipped.push(bad),
+                    Ok((one, true)) => kept.push(one),
+                    Ok((one, false)) => fresh.push(one),
+                    Err((what, why)) => skipped.push(Skipped { what, method: scores[at].method.clone(), why }),
                 }
             }
+            book.put(at, &fresh);
+            kept.append(&mut fresh);
+            let place: BTreeMap<PairId, usize> = ids.iter().copied().zip(0..).collect();
+            kept.sort_by_key(|(id, _)| place.get(id));
             // The measured imprints come first: what the others' features are compared with.
             if at == 0 {
                 measured_features = kept
                     .iter()
-                    .flat_map(|g| g.images.iter().map(move |i| (g.group, i.features.clone())))
+                    .flat_map(|(_, e)| e.score.images.iter().map(move |i| (e.score.group, i.features.clone())))
                     .filter(|(_, f)| !f.is_empty())
                     .collect();
-            } else {
+            } else if !kept.is_empty() {
                 scores[at].measured_features.extend(measured_features.iter().cloned());
             }
-            scores[at].grasps.extend(kept);
+            scores[at].grasps.extend(kept.iter().map(|(_, entry)| entry.score.clone()));
+            all.extend(kept.into_iter().map(|(_, entry)| (at, entry)));
         }
+        all
+    }
+}
+
+/// The images of a grasp, made once more.
+pub(super) struct Again {
+    id: PairId,
+    images: Vec<Image>,
+}
+
+/// The images of some grasps by a method; those that fail now are left out.
+fn images_again(cases: &[&Case], method: &mut Method, setup: &Setup, cx: &JobCx) -> Vec<Again> {
+    let upper = matches!(method, Method::Measured);
+    let made = method.make(cases, setup, cx).unwrap_or_default();
+    let one = |(case, made): (&&Case, Result<Made, String>)| {
+        let images = guarded(|| Ok(images(case, &made?, setup, upper))).ok()?;
+        Some(Again { id: case.id, images })
+    };
+    cases.iter().zip(made).filter_map(one).collect()
+}
+
+/// The images of some grasps by a method, made once more.
+pub(super) fn again(dataset: &Dataset, setup: &Setup, method: &mut Method, ids: &[PairId], cx: &JobCx) -> Vec<Again> {
+    // Images need no labels.
+    let unlabeled = Labeled::none();
+    let mut all = Vec::new();
+    for ids in ids.chunks(setup.batch.div_ceil(2).max(1)) {
+        if cx.cancel.is_cancelled() {
+            break;
+        }
+        let cases: Vec<Case> = ids.par_iter().filter_map(|&id| load(dataset, &unlabeled, id).ok()).collect();
+        all.extend(images_again(&cases.iter().collect::<Vec<_>>(), method, setup, cx));
+    }
+    all
+}
+
+/// Known figures with their SSIM in another range. A grasp whose images cannot be made any more is left out.
+fn redone(
+    stale: Vec<(PairId, Entry)>,
+    range: f64,
+    at: usize,
+    again: &mut dyn FnMut(usize, &[PairId]) -> Vec<Again>,
+) -> Vec<(PairId, Entry)> {
+    if stale.is_empty() {
+        return Vec::new();
+    }
+    let ids: Vec<PairId> = stale.iter().map(|(id, _)| *id).collect();
+    let mut known: BTreeMap<PairId, Entry> = stale.into_iter().collect();
+    let matched: Vec<(PairId, Entry, Vec<Image>)> = again(at, &ids)
+        .into_iter()
+        .filter_map(|Again { id, images }| Some((id, known.remove(&id)?, images)))
+        .filter(|(_, entry, images)| entry.score.images.len() == images.len())
+        .collect();
+    let anew = |(id, mut entry, images): (PairId, Entry, Vec<Image>)| {
+        let found =
+            guarded(|| Ok(images.into_iter().map(|i| finished(i, None, ranges(range, false), false)).collect()));
+        let found: Vec<ImageScore> = found.ok()?;
+        for (known, new) in entry.score.images.iter_mut().zip(found) {
+            (known.ssim, known.ssim_noise_free) = (new.ssim, new.ssim_noise_free);
+        }
+        entry.range = range;
+        Some((id, entry))
+    };
+    matched.into_par_iter().filter_map(anew).collect()
+}
+
+/// The ranges of the SSIM: the lab's, and the fixed one.
+fn ranges(range: f64, assumed: bool) -> [SsimRange; 2] {
+    if assumed { [SsimRange::Explicit(1.0); 2] } else { [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)] }
+}
+
+/// A grasp with its image figures, and whether it is only for this table; else its pair and what failed.
+fn ended(pending: Pending, class: Option<usize>, range: f64) -> Result<((PairId, Entry), bool), (String, String)> {
+    let Pending { id, mut entry, images, failed } = pending;
+    let assumed = entry.score.scale == Scale::Assumed;
+    entry.spans = images.iter().map(|image| span(&image.prediction)).collect();
+    entry.range = range;
+    let scored = || Ok(images.into_iter().map(|i| finished(i, class, ranges(range, assumed), assumed)).collect());
+    match guarded(scored) {
+        Ok(images) => {
+            entry.score.images = images;
+            Ok(((id, entry), failed))
+        }
+        Err(why) => Err((entry.score.pair, why)),
     }
 }
 
@@ -281,13 +389,17 @@ fn in_assumed_meters(prediction: &Grid<f32>, made: &Made) -> Grid<f32> {
     if made.tile.is_some() { assumed_meters(prediction) } else { prediction.clone() }
 }
 
+/// Least and largest value of an image; `None` without one that is finite.
+fn span(image: &Grid<f32>) -> Option<[f32; 2]> {
+    let finite = image.as_slice().iter().copied().filter(|v| v.is_finite());
+    let [low, high] = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
+    (low <= high).then_some([low, high])
+}
+
 /// Largest minus smallest value of some images.
-fn spread<'a>(images: impl Iterator<Item = &'a Grid<f32>>) -> f64 {
-    let (lo, hi) = images
-        .flat_map(|i| i.as_slice())
-        .filter(|v| v.is_finite())
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
-    f64::from(hi) - f64::from(lo)
+fn width(spans: impl Iterator<Item = [f32; 2]>) -> f64 {
+    let [low, high] = spans.fold([f32::INFINITY, f32::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+    f64::from(high) - f64::from(low)
 }
 
 fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed: bool) -> ImageScore {

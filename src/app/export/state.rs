@@ -1,0 +1,286 @@
+//! What is chosen of a figure before it is drawn, and what it then is of.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use strum::IntoEnumIterator as _;
+
+use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, Registration};
+use super::super::pane::{Kind, Pane};
+use super::super::settings::state::ColorMap as MapChoice;
+use super::super::state::State;
+use crate::domain::colormap::{ColorMap, Range};
+use crate::domain::contact::MaskBasis;
+use crate::domain::dataset::PairId;
+use crate::domain::frames::PlanarPose;
+use crate::domain::rig::Rig;
+use crate::work::bundles::BundleInfo;
+use crate::work::cloud::Clouds;
+use crate::work::error::TaskError;
+use crate::work::figure::{FigureLook, FigurePane, FigureSetup, FigureTheme, note};
+use crate::work::mask::made_of;
+use crate::work::pair_files::{PairFile, PairParts, write};
+use crate::work::pose::PoseResult;
+use crate::work::tool::NamedTool;
+
+/// Pairs of the list that a figure may take.
+pub const MOST_PAIRS: usize = 50;
+/// Scales that are offered.
+pub const SCALES: [u8; 4] = [1, 2, 4, 8];
+
+/// What a person chose about the next figure. Not kept between runs of the program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureForm {
+    /// How many pairs of the list, from the first; `None` = the selected pair alone.
+    pub first: Option<usize>,
+    /// Whether all fingers get a row, or only the active one.
+    pub both_fingers: bool,
+    /// The columns.
+    pub panes: Vec<FigurePane>,
+    /// Pixels of a PNG per pixel of an imprint.
+    pub scale: u8,
+    /// Ground and ink.
+    pub theme: FigureTheme,
+    /// Half the range of the colors of errors, meters.
+    pub error_m: f32,
+}
+
+impl Default for FigureForm {
+    fn default() -> Self {
+        let look = FigureLook::default();
+        Self {
+            first: Some(4),
+            both_fingers: false,
+            panes: look.panes,
+            scale: 2,
+            theme: FigureTheme::Light,
+            error_m: look.error_m,
+        }
+    }
+}
+
+impl FigureForm {
+    /// Numbers brought into range.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        self.first = self.first.map(|n| n.clamp(1, MOST_PAIRS));
+        self.scale = self.scale.clamp(SCALES[0], SCALES[3]);
+        self.error_m = crate::domain::units::clamp_or(self.error_m, 5e-5, 0.1, FigureLook::default().error_m);
+        self.panes.sort_unstable();
+        self.panes.dedup();
+        self
+    }
+}
+
+/// The room's state.
+#[derive(Clone, Debug, Default)]
+pub struct ExportState {
+    /// Whether the form is open.
+    pub asking: bool,
+    /// What it says.
+    pub form: FigureForm,
+}
+
+/// Something to be written once the place is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Output {
+    /// The figure that the form describes.
+    Figure,
+    /// One pane as a picture.
+    Picture {
+        /// The pane.
+        pane: Pane,
+        /// Pixels per pixel of an imprint; `None` for an SVG.
+        scale: Option<u8>,
+        /// Half the range of the colors of errors, meters.
+        error_m: f32,
+    },
+    /// Cloud, pose and mesh of an imprint of the selected pair, into a folder.
+    Pair(ImprintSource),
+}
+
+impl Output {
+    /// What is asked for, as the title of a dialog.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Figure => "Save the figure (.png or .svg)",
+            Self::Pair(_) => "Export cloud, pose and mesh to a folder",
+            Self::Picture { scale: Some(_), .. } => "Save the picture (.png)",
+            Self::Picture { scale: None, .. } => "Save the picture (.svg)",
+        }
+    }
+
+    /// The name that a file is offered under; `None` where a folder is asked for.
+    pub fn file_name(self) -> Option<String> {
+        match self {
+            Self::Figure => Some("figure.png".into()),
+            Self::Picture { pane, scale, .. } => Some(pane.picture_name(scale.is_some())),
+            Self::Pair(_) => None,
+        }
+    }
+}
+
+/// What is written of the selected pair for other programs, gathered for a job.
+#[derive(Clone, Debug)]
+pub struct PairExport {
+    name: String,
+    source: ImprintSource,
+    rig: Arc<Rig>,
+    clouds: Arc<Clouds>,
+    mask: String,
+    engine: Registration,
+    pose: Option<Arc<PoseResult>>,
+    truth: Option<PlanarPose>,
+    tool: Option<Arc<NamedTool>>,
+}
+
+impl PairExport {
+    /// Writes the files that there can be: without a pose only the cloud.
+    ///
+    /// # Errors
+    /// As [`write`].
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, TaskError> {
+        let files: Vec<PairFile> =
+            PairFile::iter().filter(|file| *file == PairFile::Cloud || self.pose.is_some()).collect();
+        let parts = PairParts {
+            name: &self.name,
+            source: self.source,
+            rig: &self.rig,
+            clouds: &self.clouds,
+            mask: &self.mask,
+            engine: self.engine,
+            pose: self.pose.as_deref(),
+            truth: self.truth,
+            tool: self.tool.as_ref().map(|tool| (tool.name.as_str(), &tool.model)),
+        };
+        write(&parts, &files, folder)
+    }
+}
+
+/// A pair of a figure with the predictions that it needs.
+pub type Recipes = Vec<(PairId, Vec<(PredictionKey, BundleInfo)>)>;
+
+impl Pane {
+    /// The name that a picture of it is offered under.
+    pub(in crate::app) fn picture_name(self, pixels: bool) -> String {
+        let name = self.title().to_lowercase().replace(' ', "-");
+        format!("{name}.{}", if pixels { "png" } else { "svg" })
+    }
+
+    /// The column of a figure that shows the same; `None` for panes that are no pictures.
+    pub fn in_figure(self) -> Option<FigurePane> {
+        Some(match (self, self.kind()) {
+            (Self::GelDifference, _) => FigurePane::GelSlim,
+            (Self::GelRaw, _) => FigurePane::Raw,
+            (Self::GelReference, _) => FigurePane::Reference,
+            (_, Kind::Imprint(ImprintSource::Measured)) => FigurePane::Measured,
+            (_, Kind::Imprint(ImprintSource::Predicted)) => FigurePane::Predicted,
+            (Self::Error, _) => FigurePane::Error,
+            _ => return None,
+        })
+    }
+}
+
+impl State {
+    /// How figures look, in the colors of the panes.
+    fn figure_look(&self, panes: Vec<FigurePane>, error_m: f32, theme: FigureTheme, scale: f64) -> FigureLook {
+        let (range, window) = (self.settings.range, self.settings.footprint_visible);
+        let map = match self.settings.color_map {
+            MapChoice::Viridis => ColorMap::Viridis,
+            MapChoice::Gray => ColorMap::Gray,
+        };
+        FigureLook { panes, map, range: Range { lo: range.min_m, hi: range.max_m }, error_m, theme, window, scale }
+    }
+
+    /// What the form describes, before anything is drawn.
+    pub fn figure_setup(&self) -> FigureSetup {
+        let form = &self.export.form;
+        let pairs = match form.first {
+            Some(n) => self.library.order.iter().copied().take(n).collect(),
+            None => self.selection.pair.into_iter().collect(),
+        };
+        let fingers = if form.both_fingers { self.rig().pad_list() } else { vec![self.selection.finger] };
+        let look = self.figure_look(form.panes.clone(), form.error_m, form.theme, f64::from(form.scale));
+        self.with_note(FigureSetup { pairs, fingers, shift: self.settings.shift, look, note: String::new() })
+    }
+
+    /// One pane of the selected pair, with the fingers that it shows.
+    pub fn picture_setup(&self, pane: Pane, scale: Option<u8>, error_m: f32) -> Option<FigureSetup> {
+        let shown = self.fingers();
+        let fingers = self.rig().pads().filter(|finger| shown.contains(finger)).collect();
+        let scale = f64::from(scale.unwrap_or(1));
+        let look = self.figure_look(vec![pane.in_figure()?], error_m, FigureTheme::Light, scale);
+        let pairs = vec![self.selection.pair?];
+        Some(self.with_note(FigureSetup { pairs, fingers, shift: self.settings.shift, look, note: String::new() }))
+    }
+
+    fn with_note(&self, setup: FigureSetup) -> FigureSetup {
+        let recipes = self.figure_recipes(&setup);
+        let mut said: Vec<String> = Vec::new();
+        for (recipe, bundle) in recipes.iter().flat_map(|(_, list)| list) {
+            let text = note(&bundle.name, &recipe.config(), setup.shift);
+            if !said.contains(&text) {
+                said.push(text);
+            }
+        }
+        // Pairs whose shown predictions were made in different ways are said so, not listed.
+        let note = match said.as_slice() {
+            [] => String::new(),
+            [one] => one.clone(),
+            several => format!("{} and {} other ways", several[0], several.len() - 1),
+        };
+        FigureSetup { note, ..setup }
+    }
+
+    /// The predictions that a figure shows: the one shown for a touch, else what the settings would make of it.
+    pub fn figure_recipes(&self, setup: &FigureSetup) -> Recipes {
+        let predicted = setup.look.panes.iter().any(|pane| pane.is_predicted());
+        let Some(open) = self.library.open.as_ref().filter(|_| predicted) else { return Vec::new() };
+        let of = |pair: &PairId| {
+            let touches = setup.fingers.iter().map(|finger| open.key(*pair).finger(*finger));
+            let recipes = touches.filter_map(|touch| {
+                let recipe = self.results.chosen.get(&touch).cloned().or_else(|| self.recipe(touch))?;
+                let bundle = self.library.bundle(&recipe.bundle)?.clone();
+                Some((recipe, bundle))
+            });
+            (*pair, recipes.collect())
+        };
+        setup.pairs.iter().map(of).collect()
+    }
+
+    /// What the contact masks of a cloud are made of, as the verbs say it.
+    fn masks_made_of(&self, cloud: &CloudKey) -> String {
+        let source = self.settings.mask.choice.source.key();
+        let keys = cloud.parts.iter().flatten().filter_map(|(imprint, version)| match version.as_ref()? {
+            MaskVersion::Hand(_) => Some(MaskBasis::Hand.key(source)),
+            MaskVersion::Auto(recipe) => {
+                let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
+                Some(self.results.masks.get(&key)?.basis.key(recipe.source().key()))
+            }
+        });
+        made_of(keys.collect(), source)
+    }
+
+    /// What can be written of the selected pair; `None` while its cloud is not there.
+    pub fn pair_export(&self, source: ImprintSource) -> Option<PairExport> {
+        let cloud = self.cloud_key(source).ok()??;
+        let pose = self.pose_key(source).ok().flatten().and_then(|key| self.results.poses.get(&key)).cloned();
+        Some(PairExport {
+            name: self.pair_name().to_owned(),
+            source,
+            rig: self.rig(),
+            clouds: self.results.clouds.get(&cloud)?.clone(),
+            mask: self.masks_made_of(&cloud),
+            engine: self.settings.pose_engine,
+            pose,
+            truth: self.sample().ready()?.grasp_from_object,
+            tool: self.tool_key().ok().and_then(|key| self.results.tools.get(&key)).cloned(),
+        })
+    }
+
+    /// Whether a figure of the open pairs can be drawn.
+    pub fn can_draw(&self) -> bool {
+        let open = self.library.open.as_ref();
+        open.is_some_and(|open| open.source.as_dataset().is_some()) && self.entry().is_some()
+    }
+}

@@ -1,0 +1,37 @@
+//! The prediction of another program that lies beside a pair as a picture.
+
+use super::imprint::gone;
+use super::{Computes, Job, Lane, SharedServices, State, TouchKey};
+use crate::work::compare::{Beside, beside};
+use crate::work::error::TaskError;
+
+/// The picture beside one touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PictureKey(pub TouchKey);
+
+impl Computes for PictureKey {
+    type Value = Beside;
+
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Beside>> {
+        let pair = self.0.pair;
+        let source = state.library.open.as_ref()?.source.clone();
+        let sample = state.results.samples.get(&pair)?.clone();
+        Some(Job::new(Lane::Files, "Stored picture", move |_| {
+            let dataset = source.as_dataset().ok_or_else(gone)?;
+            beside(dataset, pair.pair, &sample)?.ok_or_else(|| {
+                let why = "no picture of another program's prediction lies beside this pair";
+                TaskError::new("Stored picture", why)
+                    .with_hint("It is read from NAME_vqvae.png beside NAME_bubble.png.")
+            })
+        }))
+    }
+
+    fn bytes(found: &Beside) -> usize {
+        4 * (found.tile.len() + found.imprint.len())
+    }
+
+    /// The pane says it in place of the picture.
+    fn failed(&self, _: &mut State, _: &TaskError) -> bool {
+        false
+    }
+}

@@ -1,0 +1,77 @@
+//! The scores that are kept of the open data set.
+
+use super::super::evaluate::state::ScoreTable;
+use super::super::pane::Need;
+use super::{Computes, DatasetSeq, Job, Lane, SharedServices, State, Wanted};
+use crate::infer::engine::EngineChoice;
+use crate::work::error::TaskError;
+use crate::work::evaluate::Setup;
+use std::sync::Arc;
+
+/// Everything that decides which scores are there.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ScoresKey {
+    dataset: DatasetSeq,
+    /// Pairs that the data set has by now.
+    pairs: usize,
+    /// How they are scored, as text.
+    setup: String,
+    runtime: EngineChoice,
+    /// How often scores were computed since.
+    round: u64,
+}
+
+impl Computes for ScoresKey {
+    type Value = ScoreTable;
+
+    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<ScoreTable>> {
+        let (services, setup) = (services.clone(), state.setup_of_all()?);
+        let source = state.library.open.as_ref()?.source.clone();
+        Some(Job::new(Lane::Compute, "Look for scores", move |_| {
+            let dataset = source.as_dataset().ok_or_else(|| TaskError::new("Look for scores", "no such data set"))?;
+            Ok(ScoreTable::new(source.index(), services.known_scores(dataset, &setup)?))
+        }))
+    }
+
+    fn bytes(table: &ScoreTable) -> usize {
+        table.bytes()
+    }
+
+    fn arrived(&self, state: &mut State, table: &Arc<ScoreTable>) {
+        if state.scores_key().as_ref() == Some(self) {
+            state.table.scores = table.clone();
+            state.reorder();
+        }
+    }
+}
+
+impl State {
+    /// How all pairs of the open data set are scored: as the results table does it, without leaving grasps out.
+    pub fn setup_of_all(&self) -> Option<Setup> {
+        Some(Setup { grasps_per_tool: None, ..self.evaluation_setup()? })
+    }
+
+    /// The recipe of the scores in force.
+    pub(in crate::app) fn scores_key(&self) -> Option<ScoresKey> {
+        let open = self.library.open.as_ref().filter(|open| open.source.as_dataset().is_some())?;
+        let setup = self.setup_of_all()?;
+        Some(ScoresKey {
+            dataset: open.seq,
+            pairs: open.index().pairs.len(),
+            setup: serde_json::to_string(&setup).ok()?,
+            runtime: setup.runtime,
+            round: self.table.round,
+        })
+    }
+}
+
+impl Wanted<'_> {
+    /// The scores that lists and pictures of all pairs show.
+    pub(crate) fn scores(&mut self) {
+        if self.state.needs(Need::Scores)
+            && let Some(key) = self.state.scores_key()
+        {
+            self.ask(key);
+        }
+    }
+}

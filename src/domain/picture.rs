@@ -1,0 +1,67 @@
+//! Pictures as people see them: depth through a color map, color pictures and differences as bytes. Panes, figures and
+//! files take these, so that the same pixel has the same color everywhere.
+
+use super::colormap::{ColorMap, Range};
+use super::grid::{DepthMap, Grid, RgbGrid};
+
+/// A picture in sRGB bytes.
+pub type Rgb8 = Grid<[u8; 3]>;
+
+/// A depth map through a color map; NaN has a color of its own.
+pub fn colored(depth: &DepthMap, map: ColorMap, range: Range) -> Rgb8 {
+    let table = map.table();
+    let nan = map.rgb8(f32::NAN);
+    depth.map(|v| {
+        let unit = range.unit(*v);
+        if unit.is_nan() { nan } else { table[(unit * 255.0 + 0.5) as usize] }
+    })
+}
+
+/// A color image on the 0..255 scale.
+pub fn plain(image: &RgbGrid) -> Rgb8 {
+    toned(image, 1.0, 0.0)
+}
+
+/// A signed difference around mid gray, with the contrast of [`difference_gain`].
+pub fn difference(image: &RgbGrid) -> Rgb8 {
+    toned(image, difference_gain(image), 128.0)
+}
+
+fn toned(image: &RgbGrid, gain: f32, center: f32) -> Rgb8 {
+    image.map(|p| p.map(|v| (v * gain + center).round().clamp(0.0, 255.0) as u8))
+}
+
+/// The gain that spreads a difference over the gray levels: 1 at the usual contrast, more for faint touches, and for
+/// values on a 0..1 scale. 1 for an empty or constant image.
+pub fn difference_gain(image: &RgbGrid) -> f32 {
+    let mut sizes: Vec<f32> =
+        image.as_slice().iter().flat_map(|p| p.iter().map(|v| v.abs())).filter(|v| v.is_finite()).collect();
+    if sizes.is_empty() {
+        return 1.0;
+    }
+    let at = (sizes.len() - 1) * 995 / 1000;
+    let (_, p99, _) = sizes.select_nth_unstable_by(at, f32::total_cmp);
+    if *p99 > 1e-6 { 120.0 / *p99 } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nan_has_its_own_color_and_ends_are_those_of_the_map() {
+        let depth = DepthMap::from_vec(4, 1, vec![f32::NAN, 0.0, 0.018, 0.5]).unwrap();
+        let picture = colored(&depth, ColorMap::Viridis, Range { lo: 0.0, hi: 0.018 });
+        let [nan, low, high] = [f32::NAN, 0.0, 1.0].map(|unit| ColorMap::Viridis.rgb8(unit));
+        assert_eq!(picture.as_slice(), [nan, low, high, high]);
+    }
+
+    #[test]
+    fn a_difference_lies_around_gray() {
+        let image = RgbGrid::from_fn(10, 10, |x, _| [0.0, x as f32 - 4.5, f32::NAN]);
+        let picture = difference(&image);
+        assert_eq!((picture[(0, 0)][0], picture[(0, 0)][1], picture[(9, 0)][1]), (128, 8, 248));
+        assert_eq!(difference_gain(&RgbGrid::filled(0, 0, [0.0; 3])), 1.0);
+        assert_eq!(plain(&RgbGrid::filled(1, 1, [300.0, -4.0, 12.4]))[(0, 0)], [255, 0, 12]);
+    }
+}

@@ -1,0 +1,329 @@
+//! `touch2touch compare`: any two imprints of a pair against each other; the numbers behind the studio's Compare pane.
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::args::{DatasetArgs, JsonArgs, keyed};
+use super::contact_mask::{MaskArgs, labels_of};
+use super::ledger::colored;
+use super::notes::Notes;
+use super::predict::{ModelArgs, Predictor};
+use super::{Output, ToolArgs, VerbResult, seeds};
+use crate::domain::align::Ask;
+use crate::domain::colormap::{ColorMap, Range};
+use crate::domain::findings::Finding;
+use crate::domain::grid::DepthMap;
+use crate::domain::hand::PoseDifference;
+use crate::domain::pose::{Registration, ToolModel};
+use crate::domain::postprocess::ShiftMode;
+use crate::domain::rig::{PadId, PerPad, Text};
+use crate::domain::sample::Sample;
+use crate::domain::units::{fixed, mm};
+use crate::io::dataset::Dataset;
+use crate::io::{images, npz};
+use crate::work::compare::{Comparison, Depicted, beside, between, tile_of};
+use crate::work::imprint;
+use crate::work::job::JobCx;
+use crate::work::labels::Labels;
+use crate::work::mask::MaskInputs;
+use crate::work::pose::{PoseResult, pose};
+use crate::work::prediction::Prediction;
+use crate::work::subject::{Subject, Wish};
+use crate::work::tool::load_tool;
+
+/// Half the range of the difference's colors in a written picture, meters.
+const DIFFERENCE_M: f32 = 0.004;
+
+/// Arguments of `compare`.
+#[derive(Debug, Args)]
+pub(super) struct CompareArgs {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// The pair, by its name or a part of it that no other has.
+    #[arg(long)]
+    pair: String,
+    /// One: `measured`, `prediction`, `mean` (of seeds) or `stored` (a picture of another program's prediction beside the
+    /// pair), with what differs from the other options: `prediction:bundle=DIR,seed=7,steps=50,shift=raw`,
+    /// `mean:seeds=4`. A shift is `exact`, `unfitted` (without a bundle's fit), `paper` or `raw`.
+    #[arg(long, default_value = "prediction")]
+    a: Subject,
+    /// The other, in the same words.
+    #[arg(long, default_value = "measured")]
+    b: Subject,
+    /// A folder for the difference of each finger, A minus B: meters as .npy, and a picture from -4 to 4 mm; created if
+    /// missing.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    mask: MaskArgs,
+    #[command(flatten)]
+    tool: ToolArgs,
+    /// The registration.
+    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
+    engine: Registration,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+/// What can be said of one imprint against another.
+#[derive(Debug, Serialize)]
+struct Figures {
+    psnr_db: Option<f64>,
+    ssim: Option<f64>,
+    /// Mean absolute difference, meters.
+    mae_m: Option<f64>,
+    /// The same where the GelSlim saw, and where the model made it up.
+    seen_mae_m: Option<f64>,
+    invented_mae_m: Option<f64>,
+}
+
+impl From<&Comparison> for Figures {
+    fn from(found: &Comparison) -> Self {
+        Self {
+            psnr_db: found.psnr_db,
+            ssim: found.ssim,
+            mae_m: Some(found.mae_m).filter(|v| v.is_finite()),
+            seen_mae_m: found.split.and_then(|split| split.seen.mae),
+            invented_mae_m: found.split.and_then(|split| split.invented.mae),
+        }
+    }
+}
+
+#[derive(Debug, Serialize)]
+struct Finger {
+    finger: Text,
+    /// Against the measurement; `None` of the measurement itself and without one.
+    a: Option<Figures>,
+    b: Option<Figures>,
+    /// A against B.
+    a_b: Figures,
+}
+
+#[derive(Debug, Serialize)]
+struct Poses {
+    /// The lab's angles, degrees.
+    a_deg: f64,
+    b_deg: f64,
+    a_error_deg: Option<f64>,
+    b_error_deg: Option<f64>,
+    /// How far the two poses are apart.
+    apart_deg: f64,
+    apart_m: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    pair: String,
+    a: String,
+    b: String,
+    scale: &'static str,
+    fingers: Vec<Finger>,
+    /// `None` without camera, tool or contact.
+    poses: Option<Poses>,
+    /// What is odd about the files, and why there are no poses.
+    notes: Vec<Finding>,
+}
+
+/// A subject as this pair has it.
+#[derive(Default)]
+struct Found {
+    imprints: PerPad<DepthMap>,
+    drawn: PerPad<Prediction>,
+    shift: ShiftMode,
+    tile: Option<DepthMap>,
+}
+
+impl Found {
+    fn depicted<'a>(
+        &'a self,
+        sample: &Sample,
+        pad: PadId,
+        tile: Option<&'a DepthMap>,
+    ) -> anyhow::Result<Option<Depicted<'a>>> {
+        let Some(imprint) = &self.imprints[pad] else { return Ok(None) };
+        if let Some(own) = &self.tile {
+            return Ok(Some(Depicted { imprint, tile: Some(Cow::Borrowed(own)) }));
+        }
+        let drawn = self.drawn[pad].as_ref().map(|made| (made, self.shift));
+        Ok(Some(Depicted::predicted(imprint, drawn, sample, pad, tile)?))
+    }
+}
+
+/// Makes what a subject asks for.
+fn find(
+    args: &CompareArgs,
+    subject: &Subject,
+    dataset: &Dataset,
+    pair: crate::domain::dataset::PairId,
+    sample: &Sample,
+) -> anyhow::Result<Found> {
+    let predictor = |wish: &Wish| Predictor::new(&args.model.with(wish), &dataset.rig);
+    match subject {
+        Subject::Measured => {
+            let tile = tile_of(dataset, pair, sample)?;
+            Ok(Found { imprints: imprint::measured(sample), tile, ..Found::default() })
+        }
+        Subject::Stored => {
+            let found = beside(dataset, pair, sample)?;
+            let found = found.ok_or_else(|| anyhow::anyhow!("there is no NAME_vqvae.png beside this pair"))?;
+            // Picture pairs have one finger.
+            let pads = sample.rig.pads().map(|pad| sample.pad(pad).map(|_| found.imprint.clone()));
+            Ok(Found { imprints: pads.collect(), tile: Some(found.tile), ..Found::default() })
+        }
+        Subject::Predicted(wish) => {
+            let mut predictor = predictor(wish);
+            let drawn = predictor.predictions(sample, &JobCx::unwatched())?;
+            let imprints = predictor.in_meters(sample, &drawn)?;
+            Ok(Found { imprints, drawn, shift: predictor.shift(), tile: None })
+        }
+        Subject::Mean(wish, count) => {
+            let mut predictor = predictor(wish);
+            let mut imprints = PerPad::default();
+            for (pad, touch) in sample.pads.entries() {
+                if predictor.condition(touch)?.is_some() {
+                    let made = seeds::predict(&mut predictor, sample, pad, *count as u16)?;
+                    imprints[pad] = Some(made.spread.mean);
+                }
+            }
+            Ok(Found { imprints, ..Found::default() })
+        }
+    }
+}
+
+pub(super) fn run(args: &CompareArgs) -> VerbResult {
+    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let id = super::find_pair(&dataset, &args.pair)?;
+    let entry = &dataset.index.pairs[id.0 as usize];
+    let output = Output::new(args.json.common(), "comparing", 1);
+    let sample = dataset.load(id)?;
+    let mut notes = Notes::default();
+    notes.take(&output, &sample.notes);
+    let found = [find(args, &args.a, &dataset, id, &sample)?, find(args, &args.b, &dataset, id, &sample)?];
+    let measured = find(args, &Subject::Measured, &dataset, id, &sample)?;
+    let tile = measured.tile.as_ref();
+    let mut fingers = Vec::new();
+    for pad in sample.rig.pads() {
+        let depicted = |found| Found::depicted(found, &sample, pad, tile);
+        let (Some(a), Some(b)) = (depicted(&found[0])?, depicted(&found[1])?) else { continue };
+        let truth = depicted(&measured)?;
+        let against = |subject: &Subject, of: &Depicted<'_>| -> anyhow::Result<Option<Figures>> {
+            match &truth {
+                Some(truth) if *subject != Subject::Measured => Ok(Some((&between(of, truth, &sample, pad)?).into())),
+                _ => Ok(None),
+            }
+        };
+        let apart = between(&a, &b, &sample, pad)?;
+        let finger = sample.rig.pad_key(pad);
+        if let Some(out) = &args.out {
+            write(out, &finger, &apart.error)?;
+        }
+        fingers.push(Finger { finger, a: against(&args.a, &a)?, b: against(&args.b, &b)?, a_b: (&apart).into() });
+    }
+    if fingers.is_empty() {
+        anyhow::bail!("{}: no finger has both {} and {}", entry.name, args.a, args.b);
+    }
+    let mut poses = None;
+    if let Some(name) = &entry.tool {
+        let (tool, odd) = load_tool(&dataset, name)?;
+        notes.take(&output, &odd);
+        let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
+        let pose_of = |subject: &Subject, found: &Found| -> anyhow::Result<PoseResult> {
+            // What was drawn was drawn for what is always shown.
+            let own = *subject == Subject::Measured || *subject == Subject::shown();
+            let labels = args.mask.drawn(&labels).filter(|_| own);
+            posed(args, &dataset, &found.imprints, MaskInputs { sample: &sample, tool: Some(&tool), labels }, &tool)
+        };
+        match (pose_of(&args.a, &found[0]), pose_of(&args.b, &found[1])) {
+            (Ok(a), Ok(b)) => poses = Some(apart(&a, &b)),
+            (Err(err), _) | (_, Err(err)) => output.note(&format!("no poses: {err:#}")),
+        }
+    }
+    let report = Report {
+        pair: entry.name.clone(),
+        a: args.a.to_string(),
+        b: args.b.to_string(),
+        scale: sample.scale.key(),
+        fingers,
+        poses,
+        notes: notes.into_list(&output),
+    };
+    args.json.write(&report)?;
+    output.finish(&report, || text(&report))?;
+    Ok(true)
+}
+
+fn posed(
+    args: &CompareArgs,
+    dataset: &Dataset,
+    imprints: &PerPad<DepthMap>,
+    inputs: MaskInputs<'_>,
+    tool: &ToolModel,
+) -> anyhow::Result<PoseResult> {
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let contact = predictor.contact(&args.mask, imprints.clone(), inputs)?;
+    let points = contact.points(inputs.sample)?;
+    Ok(pose(&points, tool, &*args.engine.method(), Ask::default(), inputs.sample.grasp_from_object)?)
+}
+
+fn apart(a: &PoseResult, b: &PoseResult) -> Poses {
+    let between = PoseDifference::between(a.grasp_from_object, b.grasp_from_object);
+    let error = |pose: &PoseResult| pose.error_rad.map(f64::to_degrees);
+    Poses {
+        a_deg: a.angle_rad.to_degrees(),
+        b_deg: b.angle_rad.to_degrees(),
+        a_error_deg: error(a),
+        b_error_deg: error(b),
+        apart_deg: between.angle_rad.to_degrees(),
+        apart_m: between.position_m,
+    }
+}
+
+/// `a-minus-b-FINGER.npy` and `.png`.
+fn write(out: &Path, finger: &str, error: &DepthMap) -> anyhow::Result<()> {
+    std::fs::create_dir_all(out)
+        .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;
+    let colored = colored(error, ColorMap::Diverging, Range::symmetric(DIFFERENCE_M));
+    npz::write_npy(&out.join(format!("a-minus-b-{finger}.npy")), error)?;
+    images::write_rgb8(&out.join(format!("a-minus-b-{finger}.png")), &colored)?;
+    Ok(())
+}
+
+fn text(report: &Report) -> String {
+    let mut text = format!(
+        "{}\nA  {}\nB  {}\n\n{:<8} {:<6} {:>7} {:>7} {:>9} {:>9} {:>11}\n",
+        report.pair, report.a, report.b, "finger", "", "PSNR dB", "SSIM", "mean mm", "seen mm", "invented mm"
+    );
+    let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| fixed(v, digits));
+    for finger in &report.fingers {
+        for (name, figures) in [("A", finger.a.as_ref()), ("B", finger.b.as_ref()), ("A - B", Some(&finger.a_b))] {
+            let Some(of) = figures else { continue };
+            text += &format!(
+                "{:<8} {name:<6} {:>7} {:>7} {:>9} {:>9} {:>11}\n",
+                finger.finger,
+                number(of.psnr_db, 1),
+                number(of.ssim, 3),
+                number(of.mae_m.map(mm), 2),
+                number(of.seen_mae_m.map(mm), 2),
+                number(of.invented_mae_m.map(mm), 2)
+            );
+        }
+    }
+    if let Some(poses) = &report.poses {
+        let error = |v: Option<f64>| v.map_or(String::new(), |v| format!(" (error {}°)", fixed(v, 1)));
+        text += &format!(
+            "\nangle A {}°{}, B {}°{}; the poses are {}° and {} mm apart\n",
+            fixed(poses.a_deg, 1),
+            error(poses.a_error_deg),
+            fixed(poses.b_deg, 1),
+            error(poses.b_error_deg),
+            fixed(poses.apart_deg, 1),
+            fixed(mm(poses.apart_m), 2)
+        );
+    }
+    text
+}

@@ -1,0 +1,142 @@
+//! `touch2touch export`: a pair in files for other programs.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use serde::Serialize;
+use strum::IntoEnumIterator as _;
+
+use super::args::{DatasetArgs, keyed};
+use super::contact_mask::{MaskArgs, labels_of};
+use super::notes::Notes;
+use super::predict::{ModelArgs, Predictor};
+use super::{Common, Output, ToolArgs, VerbResult};
+use crate::domain::align::Ask;
+use crate::domain::findings::Finding;
+use crate::domain::pose::Registration;
+use crate::work::cloud::clouds;
+use crate::work::job::JobCx;
+use crate::work::labels::{ImprintSource, Labels};
+use crate::work::mask::MaskInputs;
+use crate::work::pair_files::{PairFile, PairParts, write};
+use crate::work::pose::pose;
+use crate::work::tool::load_tool;
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub(super) struct ExportArgs {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// The pair, by its name or a part of it that no other has.
+    #[arg(long)]
+    pair: String,
+    /// Which imprint.
+    #[arg(long, value_parser = keyed::<ImprintSource>(), default_value = "measured")]
+    imprint: ImprintSource,
+    /// The files, with commas between them: `cloud` (PLY; contact, finger and distance to the model for each point),
+    /// `pose` (JSON with 4 x 4 matrices), `mesh` (the CAD model at that pose, STL). Meters, grasp frame.
+    #[arg(long, value_name = "A,B", value_delimiter = ',', value_parser = parse_file(), default_value = "cloud,pose,mesh")]
+    what: Vec<PairFile>,
+    /// The folder, which is made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// The registration.
+    #[arg(long, value_name = "ENGINE", default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
+    engine: Registration,
+    #[command(flatten)]
+    mask: MaskArgs,
+    #[command(flatten)]
+    tool: ToolArgs,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+fn parse_file() -> impl TypedValueParser<Value = PairFile> {
+    // The parser has compared the key with the list.
+    PossibleValuesParser::new(PairFile::iter().map(PairFile::key)).map(|key| key.parse().unwrap_or(PairFile::Cloud))
+}
+
+#[derive(Serialize)]
+struct Report {
+    pair: String,
+    imprint: &'static str,
+    engine: &'static str,
+    mask: String,
+    files: Vec<PathBuf>,
+    /// What is odd about the files of the pair.
+    notes: Vec<Finding>,
+}
+
+pub(super) fn run(args: &ExportArgs) -> VerbResult {
+    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let id = super::find_pair(&dataset, &args.pair)?;
+    let entry = &dataset.index.pairs[id.0 as usize];
+    let output = Output::new(args.common, "exporting", 1);
+    let mut notes = Notes::default();
+    let sample = dataset.load(id)?;
+    notes.take(&output, &sample.notes);
+    let tool = entry.tool.as_deref().map(|name| load_tool(&dataset, name)).transpose();
+    let tool = match tool {
+        Ok(found) => found.map(|(tool, odd)| {
+            notes.take(&output, &odd);
+            tool
+        }),
+        // The cloud needs none.
+        Err(err) if args.what == [PairFile::Cloud] => {
+            output.note(&err.to_string());
+            None
+        }
+        Err(err) => return Err(err.into()),
+    };
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let imprints = predictor.imprints(&sample, args.imprint, &JobCx::unwatched())?;
+    let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
+    let inputs = MaskInputs { sample: &sample, tool: tool.as_ref(), labels: args.mask.drawn(&labels) };
+    let contact = predictor.contact(&args.mask, imprints, inputs)?;
+    let parts = sample.rig.pads().map(|pad| {
+        let mask = contact.masks[pad].as_ref().map(|found| &found.mask);
+        Some((contact.imprints[pad].as_ref()?, mask))
+    });
+    let clouds = clouds(&sample, &parts.collect())?;
+    let truth = sample.grasp_from_object;
+    let found = tool
+        .as_ref()
+        .map(|tool| pose(&clouds.contact_points(), tool, &*args.engine.method(), Ask::default(), truth))
+        .transpose();
+    let found = match found {
+        Err(err) if args.what == [PairFile::Cloud] => {
+            output.note(&err.to_string());
+            None
+        }
+        found => found?,
+    };
+    let mask = contact.made_of();
+    let parts = PairParts {
+        name: &entry.name,
+        source: args.imprint,
+        rig: &sample.rig,
+        clouds: &clouds,
+        mask: &mask,
+        engine: args.engine,
+        pose: found.as_ref(),
+        truth,
+        tool: entry.tool.as_deref().zip(tool.as_ref()),
+    };
+    let files = write(&parts, &args.what, &args.out)?;
+    let report = Report {
+        pair: entry.name.clone(),
+        imprint: args.imprint.key(),
+        engine: args.engine.key(),
+        mask,
+        files,
+        notes: notes.into_list(&output),
+    };
+    output.finish(&report, || {
+        let lines: Vec<String> = report.files.iter().map(|file| format!("wrote {}", file.display())).collect();
+        lines.join("\n")
+    })?;
+    Ok(true)
+}

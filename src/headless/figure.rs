@@ -1,0 +1,127 @@
+//! `touch2touch figure`: pairs side by side, as a picture for a paper.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use serde::Serialize;
+use strum::IntoEnumIterator as _;
+
+use super::args::{DatasetArgs, FingerArg, keyed};
+use super::predict::{ModelArgs, Predictor};
+use super::{Common, Output, VerbResult};
+use crate::domain::colormap::{ColorMap, Range};
+use crate::domain::dataset::PairId;
+use crate::work::error::TaskError;
+use crate::work::figure::{FigureFile, FigureLook, FigurePane, FigureSetup, FigureTheme, figure, kind, note};
+
+/// Arguments of `figure`.
+#[derive(Debug, Args)]
+pub(super) struct FigureArgs {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// The pairs, top to bottom: names, or parts of names that no other pair has, with commas between them.
+    #[arg(long, value_name = "A,B", value_delimiter = ',', required = true)]
+    pairs: Vec<String>,
+    /// The columns, left to right, with commas between them.
+    #[arg(long, value_name = "A,B", value_delimiter = ',', value_parser = parse_pane(), default_value = "gelslim,measured,predicted,error")]
+    panes: Vec<FigurePane>,
+    /// The finger, or `both` for a row of each.
+    #[arg(long, default_value = "right")]
+    finger: FingerArg,
+    /// The file to write: `.png`, or `.svg` with letters and lines that can be edited.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Pixels of a PNG per pixel of an imprint.
+    #[arg(long, default_value_t = FigureLook::default().scale)]
+    scale: f64,
+    /// Dark on white for papers, or light on dark.
+    #[arg(long, value_parser = keyed::<FigureTheme>(), default_value = "light")]
+    theme: FigureTheme,
+    /// The range of the colors of imprints, millimeters, the same for all pictures.
+    #[arg(long, value_name = "LO..HI", value_parser = parse_range, default_value = "0..18", allow_hyphen_values = true)]
+    range: Range,
+    /// Half the range of the colors of errors.
+    #[arg(long, value_name = "MM", default_value_t = FigureLook::default().error_m * 1e3)]
+    error_range_mm: f32,
+    /// Draw imprints in gray.
+    #[arg(long)]
+    gray: bool,
+    /// Leave out what the GelSlim sees of an imprint, the dashed rectangle.
+    #[arg(long)]
+    no_window: bool,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+fn parse_pane() -> impl TypedValueParser<Value = FigurePane> {
+    // The parser has compared the key with the list.
+    PossibleValuesParser::new(FigurePane::iter().map(FigurePane::key))
+        .map(|key| key.parse().unwrap_or(FigurePane::Measured))
+}
+
+/// Reads `LO..HI` in millimeters.
+fn parse_range(text: &str) -> Result<Range, String> {
+    let ends = text.split_once("..").and_then(|(lo, hi)| Some([lo.trim().parse().ok()?, hi.trim().parse().ok()?]));
+    match ends {
+        Some([lo, hi]) if f32::is_finite(lo) && f32::is_finite(hi) && lo < hi => {
+            Ok(Range { lo: lo / 1e3, hi: hi / 1e3 })
+        }
+        _ => Err("two numbers with dots between them are needed, the lower one first, such as 0..18".to_owned()),
+    }
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    file: &'a std::path::Path,
+    #[serde(flatten)]
+    figure: FigureFile,
+    note: &'a str,
+}
+
+pub(super) fn run(args: &FigureArgs) -> VerbResult {
+    kind(&args.out)?;
+    let dataset = args.dataset.open()?;
+    let pairs: Vec<PairId> =
+        args.pairs.iter().map(|name| super::find_pair(&dataset, name)).collect::<anyhow::Result<_>>()?;
+    let fingers = args.finger.fingers(&dataset.rig)?;
+    let look = FigureLook {
+        panes: args.panes.clone(),
+        map: if args.gray { ColorMap::Gray } else { ColorMap::Viridis },
+        range: args.range,
+        error_m: args.error_range_mm / 1e3,
+        theme: args.theme,
+        window: !args.no_window,
+        scale: args.scale,
+    };
+    let output = Output::new(args.common, "drawing", pairs.len());
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let mut setup = FigureSetup {
+        pairs,
+        fingers,
+        shift: crate::domain::postprocess::ShiftMode::default(),
+        look,
+        note: String::new(),
+    };
+    if setup.look.panes.iter().any(|pane| pane.is_predicted()) {
+        let (name, config) = (predictor.bundle()?.name.clone(), predictor.config()?);
+        setup.shift = predictor.shift();
+        setup.note = note(&name, &config, setup.shift);
+    }
+    let drawn = figure(
+        &dataset,
+        &setup,
+        |_, sample, cx| {
+            predictor.predictions(sample, cx).map_err(|err| TaskError::new("Figure", super::output::says(&err)))
+        },
+        &output.job(),
+    )?;
+    let report = Report { file: &args.out, figure: drawn.write(&args.out)?, note: &setup.note };
+    output.finish(&report, || {
+        let [width, height] = report.figure.size_px;
+        format!("wrote {} ({} rows, {width} x {height} pixels)", args.out.display(), report.figure.rows.len())
+    })?;
+    Ok(true)
+}

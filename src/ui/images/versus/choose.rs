@@ -1,0 +1,151 @@
+//! The menu that says what stands on one side of a comparison.
+
+use std::collections::BTreeSet;
+
+use eframe::egui::containers::menu::{MenuButton, MenuConfig};
+use eframe::egui::{self, Button, ComboBox, DragValue, PopupCloseBehavior, RichText, Ui};
+use strum::IntoEnumIterator as _;
+
+use super::{Letter, color};
+use crate::app::settings::{STEPS, Versus};
+use crate::domain::postprocess::ShiftMode;
+use crate::ui::browser::cut_in_the_middle;
+use crate::ui::cx::Cx;
+use crate::ui::theme::{SMALL, caption};
+use crate::work::bundles::BundleKind;
+use crate::work::subject::{Mapping, SEEDS, Subject, Wish};
+
+/// Width of a letter in a button, points.
+const LETTER: f32 = 5.8;
+
+fn cut(text: &str, letters: usize) -> String {
+    cut_in_the_middle(text, letters as f32, |text| text.chars().count() as f32)
+}
+
+/// The button of one of the two, `width` points wide at most, with its menu; what was chosen.
+pub(super) fn menu(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus, letter: Letter, width: f32) -> Option<Subject> {
+    let subject = letter.of(versus);
+    let label = subject.label();
+    let text = RichText::new(format!("{letter:?}  {}", cut(&label, ((width - 28.0) / LETTER).max(6.0) as usize)))
+        .color(color(cx.p, versus, letter));
+    let config = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+    let (button, inner) =
+        MenuButton::from_button(Button::new(text)).config(config).ui(ui, |ui| content(cx, ui, subject));
+    button
+        .accessible_name(format!("{letter:?}: {label}"))
+        .on_hover_text(format!("{label}: choose what {letter:?} is; the choice is kept for this workspace"));
+    inner.and_then(|inner| inner.inner)
+}
+
+fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
+    ui.style_mut().override_font_id = None;
+    ui.set_min_width(240.0);
+    let mut chosen = None;
+    let mut row = |ui: &mut Ui, value: Subject, text: &str, tip: &str| {
+        if ui.selectable_label(*subject == value, text).on_hover_text(tip).clicked() {
+            chosen = Some(value);
+        }
+    };
+    row(ui, Subject::Measured, "Measured", "What the Soft Bubble measured");
+    row(ui, Subject::shown(), "Prediction on screen", "The prediction that the other panes show");
+    let mean = match subject {
+        Subject::Mean(..) => subject.clone(),
+        _ => Subject::Mean(Wish::default(), 8),
+    };
+    row(ui, mean, "Mean of seeds", "The mean of predictions that differ in their seeds");
+    row(ui, Subject::Stored, "Stored picture", "What another program predicted: NAME_vqvae.png beside the pair");
+    let made = made(cx);
+    if !made.is_empty() {
+        ui.separator();
+        ui.label(caption("Made of this touch", cx.p));
+        for wish in made {
+            let value = Subject::Predicted(wish);
+            let text = value.label();
+            row(ui, value, text.trim_start_matches("Prediction · "), "This very recipe, of every pair");
+        }
+    }
+    ui.separator();
+    ui.label(caption("Another prediction", cx.p));
+    let wish = subject.wish().cloned().unwrap_or_default();
+    if let Some(wish) = change(cx, ui, &wish) {
+        chosen = Some(match subject {
+            Subject::Mean(_, count) => Subject::Mean(wish, *count),
+            _ => Subject::Predicted(wish),
+        });
+    }
+    if let Subject::Mean(wish, count) = subject {
+        let mut count = *count;
+        ui.horizontal(|ui| {
+            ui.label("Seeds");
+            if ui.add(DragValue::new(&mut count).range(SEEDS)).changed() {
+                chosen = Some(Subject::Mean(wish.clone(), count));
+            }
+        });
+    }
+    chosen
+}
+
+/// The predictions that were made of the active finger, each as the wish that names it.
+fn made(cx: &Cx<'_>) -> BTreeSet<Wish> {
+    let state = cx.state;
+    let made = state.touch_key(state.selection.finger).and_then(|touch| state.results.made.get(&touch));
+    let wish = |key: &crate::app::keys::PredictionKey| {
+        let bundle = state.library.bundle(&key.bundle)?;
+        Some(Wish { bundle: Some(bundle.name.clone()), steps: Some(key.steps), seed: Some(key.seed), shift: None })
+    };
+    made.into_iter().flatten().rev().take(6).filter_map(wish).collect()
+}
+
+/// Model, seed, steps and way to meters; what was changed.
+fn change(cx: &Cx<'_>, ui: &mut Ui, wish: &Wish) -> Option<Wish> {
+    const AS_SET: &str = "as in Generate";
+    let mut new = wish.clone();
+    egui::Grid::new("wish").num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| {
+        ui.label("Model");
+        let rig = cx.state.rig();
+        let models = cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator && b.fits(&rig));
+        let named = new.bundle.clone().unwrap_or(AS_SET.into());
+        ComboBox::from_id_salt("model").selected_text(cut(&named, 24)).show_ui(ui, |ui| {
+            ui.selectable_value(&mut new.bundle, None, AS_SET);
+            for bundle in models {
+                ui.selectable_value(&mut new.bundle, Some(bundle.name.clone()), &bundle.name);
+            }
+        });
+        ui.end_row();
+        let generate = &cx.state.settings.generate;
+        number(ui, "Seed", &mut new.seed, generate.seed, 0..=u64::from(u32::MAX));
+        number(ui, "Steps", &mut new.steps, generate.steps, STEPS);
+        ui.label("To meters");
+        let text = new.shift.map_or(AS_SET, |mapping| mapping.mode().label());
+        ComboBox::from_id_salt("to meters").selected_text(text).show_ui(ui, |ui| {
+            ui.selectable_value(&mut new.shift, None, AS_SET);
+            for mapping in Mapping::iter() {
+                let mode: ShiftMode = mapping.mode();
+                ui.selectable_value(&mut new.shift, Some(mapping), mode.label());
+            }
+        });
+        ui.end_row();
+    });
+    ui.label(RichText::new("What is not chosen here is as in the Generate pane.").size(SMALL).color(cx.p.weak));
+    (new != *wish).then_some(new)
+}
+
+/// A number that is either left to the settings or chosen.
+fn number<N: egui::emath::Numeric>(
+    ui: &mut Ui,
+    name: &str,
+    value: &mut Option<N>,
+    usual: N,
+    range: std::ops::RangeInclusive<N>,
+) {
+    let mut own = value.is_some();
+    if ui.checkbox(&mut own, name).on_hover_text("Ticked: this number; else as in the Generate pane").changed() {
+        *value = own.then_some(usual);
+    }
+    let mut number = value.unwrap_or(usual);
+    let drag = ui.add_enabled(own, DragValue::new(&mut number).range(range));
+    if drag.accessible_name(name).changed() {
+        *value = Some(number);
+    }
+    ui.end_row();
+}

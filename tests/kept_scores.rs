@@ -1,0 +1,195 @@
+//! Figures of an evaluation are kept on the disk and are, bit for bit, those that would be computed.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+use strum::IntoEnumIterator as _;
+use touch2touch::app::command::{Command, EvaluateCommand, Pane, ViewCommand};
+use touch2touch::app::library::Place;
+use touch2touch::app::runtime::Runtime;
+use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::state::State;
+use touch2touch::domain::catalog;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::evaluation::Figure;
+use touch2touch::domain::grid::Mask;
+use touch2touch::domain::rig::lab;
+use touch2touch::domain::sim;
+use touch2touch::infer::bundle::Origin;
+use touch2touch::infer::store::Store;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch::work::evaluate::{Evaluation, Report, Setup, evaluate, known};
+use touch2touch::work::job::{Cancel, JobCx};
+use touch2touch::work::labels::{HandMask, Labels, PairLabels, Revision};
+use touch2touch::work::mask::{MaskChoice, MaskSource};
+use touch2touch::work::models::Models;
+
+fn write(root: &Path, grasps: std::ops::Range<u64>) {
+    let tools = &catalog::tools()[..2];
+    let config = sim::SimConfig::default();
+    for tool in tools {
+        for number in grasps.clone() {
+            let sample = sim::simulate(tool, sim::random_grasp(number + 3), number, &config);
+            write_pair(root, Layout::Test, &tool.name, number, &sample).unwrap();
+        }
+    }
+    let meshes: Vec<_> = tools.iter().map(|t| (t.name.as_str(), t.seen, t.mesh())).collect();
+    write_tools(root, &meshes).unwrap();
+}
+
+fn setup() -> Setup {
+    let bundle = |name| Origin::from(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name));
+    Setup {
+        bundles: vec![bundle("generator")],
+        classifier: Some(bundle("classifier")),
+        mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
+        resamples: 50,
+        ..Setup::default()
+    }
+}
+
+fn models(folder: &Path) -> Models {
+    Models::new(Some(Store::new(folder.to_owned(), 64 << 20)))
+}
+
+/// An evaluation, and how many grasps were computed for it: the program starts anew each time.
+fn run(data: &Path, setup: &Setup, cache: &Path) -> (Evaluation, u64) {
+    let first = Arc::new(Mutex::new(None));
+    let seen = first.clone();
+    let sink = move |progress: touch2touch::work::job::Progress| {
+        if progress.total > 0 {
+            seen.lock().unwrap().get_or_insert(progress.total - progress.done);
+        }
+    };
+    let cx = JobCx::new(Cancel::default(), Arc::new(sink));
+    let found = evaluate(&Dataset::open(data).unwrap(), setup, &models(cache), &cx).unwrap();
+    let fresh = first.lock().unwrap().unwrap();
+    (found, fresh)
+}
+
+/// Everything of an evaluation but the time it took, as text.
+fn text(evaluation: &Evaluation) -> String {
+    let still = Evaluation { seconds: 0.0, ..evaluation.clone() };
+    let report = Report { evaluation: &still, published: Vec::new(), pairs: Some(&still.scores) };
+    let features: Vec<_> =
+        still.scores.iter().flat_map(|s| &s.grasps).flat_map(|g| g.images.iter().map(|i| &i.features)).collect();
+    format!("{} {features:?} {:?}", serde_json::to_string(&report).unwrap(), still.scores[1].measured_features)
+}
+
+#[test]
+fn a_second_evaluation_computes_nothing_and_says_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, cache) = (folder.path().join("data"), folder.path().join("cache"));
+    write(&data, 0..3);
+    let few = Setup { grasps_per_tool: Some(2), ..setup() };
+    let (cold, fresh) = run(&data, &few, &cache);
+    assert_eq!((fresh, cold.scores[1].grasps.len(), cold.scores[1].grasps[0].images[0].features.len()), (4, 4, 4));
+    let (warm, fresh) = run(&data, &few, &cache);
+    assert_eq!(fresh, 0);
+    assert_eq!(text(&warm), text(&cold));
+
+    // More grasps: only those are computed, and the lab's SSIM is that of the larger set.
+    let (more, fresh) = run(&data, &setup(), &cache);
+    let (anew, all) = run(&data, &setup(), &folder.path().join("other"));
+    assert_eq!((fresh, all), (2, 6));
+    let without_time = |evaluation: &Evaluation| {
+        let mut still = evaluation.clone();
+        for row in &mut still.rows {
+            row.groups.iter_mut().for_each(|group| group.seconds = None);
+        }
+        still.scores.iter_mut().flat_map(|s| &mut s.grasps).for_each(|grasp| grasp.seconds = None);
+        text(&still)
+    };
+    assert_eq!(without_time(&more), without_time(&anew));
+    // And back to the smaller set.
+    let (again, fresh) = run(&data, &few, &cache);
+    assert_eq!((fresh, text(&again)), (0, text(&cold)));
+
+    // What is there is told without computing, and under a copy's names as well.
+    let dataset = Dataset::open(&data).unwrap();
+    let there = known(&dataset, &setup(), &models(&cache)).unwrap();
+    assert_eq!(there.iter().map(|s| s.grasps.len()).collect::<Vec<_>>(), [6, 6]);
+    assert_eq!(there[1].grasps[0].angle_error_rad, anew.scores[1].grasps[0].angle_error_rad);
+    let copy = folder.path().join("copy");
+    write(&copy, 0..3);
+    assert_eq!(run(&copy, &setup(), &cache).1, 0, "the same content elsewhere");
+    let other = Setup { mask: MaskChoice { threshold_m: 0.004, ..setup().mask }, ..setup() };
+    assert!(known(&dataset, &other, &models(&cache)).unwrap().iter().all(|s| s.grasps.is_empty()));
+}
+
+/// The studio as it stands when nothing is left to compute.
+fn studio(data: &Path, home: &Path, commands: Vec<Command>) -> State {
+    let services = LiveServices::with_config_folder(Some(home.to_owned()));
+    let (mut state, mut runtime) = (State::default(), Runtime::inline(Arc::new(services)));
+    runtime.start(&mut state, Some(Place::Path(data.to_owned())));
+    runtime.settle(&mut state);
+    runtime.tick(&mut state, vec![ViewCommand::ShowPanes([Pane::Table].into()).into()]);
+    runtime.settle(&mut state);
+    runtime.tick(&mut state, commands);
+    runtime.settle(&mut state);
+    state
+}
+
+#[test]
+fn the_studio_shows_the_scores_of_the_last_time_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, home) = (folder.path().join("data"), folder.path().join("home"));
+    write(&data, 0..1);
+    assert!(studio(&data, &home, Vec::new()).table.scores.sources.is_empty());
+    let made = studio(&data, &home, vec![EvaluateCommand::All.into()]);
+    let table = made.table.result.as_ref().expect("a table as well");
+    assert_eq!((table.complete, table.setup.grasps_per_tool), (true, None));
+    let again = studio(&data, &home, Vec::new());
+    assert!(again.table.result.is_none());
+    let values = |state: &State| {
+        let sources = state.table.scores.sources.iter();
+        let of = |pair: u32| sources.clone().map(move |s| Figure::iter().map(|f| s.value(PairId(pair), f)).collect());
+        (0..2).flat_map(of).collect::<Vec<Vec<Option<f64>>>>()
+    };
+    assert_eq!(values(&again), values(&made));
+    assert!(values(&again).iter().all(|figures| figures[0].is_some()), "{:?}", values(&again));
+}
+
+#[test]
+fn what_was_changed_or_damaged_is_computed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, cache) = (folder.path().join("data"), folder.path().join("cache"));
+    write(&data, 0..2);
+    let (cold, _) = run(&data, &setup(), &cache);
+    // A mask that somebody drew.
+    let dataset = Dataset::open(&data).unwrap();
+    let labels = Labels::of(&dataset);
+    let name = dataset.index.pairs[0].name.clone();
+    let mask = Arc::new(Mask::from_fn(175, 140, |x, y| (40..140).contains(&x) && (60..80).contains(&y)));
+    let drawn = HandMask { mask, revision: Revision(1), base: "Threshold".into() };
+    let mut drawn_on = PairLabels::default();
+    drawn_on.draw(lab::RIGHT, Some(drawn));
+    labels.save(&name, &drawn_on).unwrap();
+    let (hand, fresh) = run(&data, &setup(), &cache);
+    assert_eq!(fresh, 1);
+    assert_ne!(hand.scores[0].grasps[0].angle_error_rad, cold.scores[0].grasps[0].angle_error_rad);
+    assert_eq!(run(&data, &Setup { hand: false, ..setup() }, &cache).1, 0, "left out, as before it was drawn");
+    labels.save(&name, &PairLabels::default()).unwrap();
+    assert_eq!(run(&data, &setup(), &cache).1, 0, "taken back");
+    // A touch.
+    let sample = sim::simulate(&catalog::tools()[0], sim::random_grasp(77), 1, &sim::SimConfig::default());
+    write_pair(&data, Layout::Test, &catalog::tools()[0].name, 1, &sample).unwrap();
+    assert_eq!(run(&data, &setup(), &cache).1, 1);
+    // The files of figures: cut off, and filled with anything.
+    let sheets = || {
+        let all = std::fs::read_dir(&cache).unwrap().map(|entry| entry.unwrap().path());
+        all.filter(|path| path.extension().is_some_and(|e| e == "scores")).collect::<Vec<_>>()
+    };
+    assert_eq!(sheets().len(), 3, "two methods, and what files hold");
+    let whole = run(&data, &setup(), &cache).0;
+    for damage in [|bytes: Vec<u8>| bytes[..bytes.len() - 3].to_vec(), |bytes: Vec<u8>| vec![b'{'; bytes.len()]] {
+        for sheet in sheets() {
+            std::fs::write(&sheet, damage(std::fs::read(&sheet).unwrap())).unwrap();
+        }
+        let (found, fresh) = run(&data, &setup(), &cache);
+        assert!(fresh > 0);
+        assert_eq!(text(&found), text(&whole));
+        assert_eq!(run(&data, &setup(), &cache).1, 0);
+    }
+}

@@ -1,0 +1,189 @@
+//! Any two imprints against each other: figures, pictures, the wipe, 3D, and that nothing is made out of sight.
+
+use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, vec2};
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::action::Action;
+use touch2touch::app::command::{Pane, PredictCommand, SettingsCommand};
+use touch2touch::app::keys::{ImprintKey, ImprintSource, ShiftMode};
+use touch2touch::app::settings::{Versus, VersusMode, Workspace};
+use touch2touch::app::state::State;
+use touch2touch::domain::rig::lab;
+use touch2touch::work::subject::Subject;
+
+use super::rig::Rig;
+
+fn state(rig: &Rig) -> &State {
+    rig.harness.state().state()
+}
+
+fn click(rig: &mut Rig, label: &str) {
+    let node = rig.harness.get_all_by_label(label).next().unwrap_or_else(|| panic!("no {label:?} on screen"));
+    node.click();
+    rig.harness.step();
+    rig.settle();
+}
+
+fn press(rig: &mut Rig, modifiers: Modifiers, key: Key) {
+    rig.harness.key_press_modifiers(modifiers, key);
+    rig.harness.step();
+    rig.settle();
+}
+
+/// The pixels of a part of the screen.
+fn pixels(rig: &mut Rig, rect: Rect) -> Vec<[u8; 4]> {
+    let image = rig.harness.render().unwrap();
+    let inside = |x: u32, y: u32| rect.contains(Pos2::new(x as f32, y as f32));
+    image.enumerate_pixels().filter(|(x, y, _)| inside(*x, *y)).map(|(_, _, p)| p.0).collect()
+}
+
+fn subject(text: &str) -> Subject {
+    text.parse().unwrap()
+}
+
+fn set(rig: &mut Rig, a: &str, b: &str, mode: VersusMode) {
+    rig.send(SettingsCommand::SetVersus(Versus { a: subject(a), b: subject(b), mode }));
+    rig.settle();
+}
+
+#[test]
+fn any_two_imprints_are_compared_where_somebody_looks() {
+    let Some(mut rig) = Rig::new([1280.0, 800.0], 2) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(PredictCommand::Generate);
+    // Behind its tab nothing is made of what is wished there.
+    set(&mut rig, "prediction:seed=7", "measured", VersusMode::Side);
+    let made = |rig: &Rig| state(rig).results.made.values().map(Vec::len).sum::<usize>();
+    assert!(!state(&rig).selection.panes.contains(&Pane::Compare));
+    assert_eq!(made(&rig), 2, "one for each finger");
+    let chosen = state(&rig).chosen(lab::RIGHT).cloned();
+
+    click(&mut rig, "Compare");
+    let (a, b) = (subject("prediction:seed=7"), Subject::Measured);
+    assert_eq!(made(&rig), 4, "the wished ones, of both fingers: they make one pose");
+    assert_eq!(state(&rig).chosen(lab::RIGHT).cloned(), chosen, "what the other panes show stays");
+    let found = state(&rig).subjects_compared(&a, &b, lab::RIGHT).ready().expect("the figures");
+    let key = state(&rig).subject_key(&a, lab::RIGHT).unwrap();
+    let ImprintKey::Predicted(recipe, ShiftMode::ExactInverse) = &key else { panic!("{key:?}") };
+    assert_eq!(recipe.seed, 7);
+    let measured = state(&rig).imprint(ImprintSource::Measured, lab::RIGHT).ready().unwrap();
+    let predicted = state(&rig).subject(&a, lab::RIGHT).ready().unwrap();
+    assert_eq!(found.error[(60, 70)], predicted[(60, 70)] - measured[(60, 70)]);
+    assert!(state(&rig).subject_pose(&a).is_some() && state(&rig).subject_pose(&b).is_some());
+    rig.shoot("compare-side");
+
+    // The prediction on screen against the measurement is what the error pane says.
+    set(&mut rig, "prediction", "measured", VersusMode::Difference);
+    let state_now = state(&rig);
+    let versus = state_now.subjects_compared(&Subject::shown(), &b, lab::RIGHT).ready().unwrap();
+    let error = state_now.comparison(lab::RIGHT).ready().unwrap();
+    assert_eq!((versus.psnr_db, versus.ssim, versus.mae_m), (error.psnr_db, error.ssim, error.mae_m));
+    let at = (60, 70);
+    let before = versus.error[at];
+    rig.shoot("compare-difference");
+
+    // Swapped, the sign changes and nothing else.
+    press(&mut rig, Modifiers::SHIFT, Key::R);
+    let after = state(&rig).subjects_compared(&b, &Subject::shown(), lab::RIGHT).ready().unwrap().error[at];
+    assert_eq!(after, -before);
+    assert_eq!(state(&rig).versus().b, Subject::shown());
+}
+
+#[test]
+fn a_key_flickers_a_line_wipes_and_both_values_are_read() {
+    let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(PredictCommand::Generate);
+    click(&mut rig, "Compare");
+    let place = rig.harness.get_by_label("Compare A right").rect();
+    let middle = Rect::from_center_size(place.center(), place.size() * 0.5);
+    let other = rig.harness.get_by_label("Compare B right").rect();
+    let (a, b) = (pixels(&mut rig, middle), pixels(&mut rig, middle.translate(other.center() - place.center())));
+    rig.harness.key_down(Key::F);
+    rig.harness.step();
+    rig.harness.run();
+    let held = pixels(&mut rig, middle);
+    rig.harness.key_up(Key::F);
+    rig.harness.step();
+    rig.harness.run();
+    // Not the same pixels of the screen: half a pixel beside.
+    let apart = |x: &[[u8; 4]], y: &[[u8; 4]]| {
+        let of = |(x, y): (&[u8; 4], &[u8; 4])| x.iter().zip(y).map(|(x, y)| f64::from(x.abs_diff(*y))).sum::<f64>();
+        x.iter().zip(y).map(of).sum::<f64>() / x.len() as f64
+    };
+    let same = |x: &[[u8; 4]], y: &[[u8; 4]]| x.iter().zip(y).filter(|(x, y)| x == y).count() as f64 / x.len() as f64;
+    assert!(same(&a, &b) < 0.9, "the two differ: {}", same(&a, &b));
+    assert!(apart(&held, &b) < 0.3 * apart(&held, &a), "B while F is held: {} {}", apart(&held, &b), apart(&held, &a));
+    assert!(same(&pixels(&mut rig, middle), &a) > 0.98, "and A again afterwards");
+
+    // The status bar has both values.
+    rig.harness.event(Event::PointerMoved(place.center()));
+    rig.harness.run();
+    let read = rig.harness.get_all_by_label_contains("A - B ").count();
+    assert!(read > 0, "both values and their difference");
+
+    press(&mut rig, Modifiers::SHIFT, Key::F);
+    assert_eq!(state(&rig).versus().mode, VersusMode::Wipe);
+    let line = rig.harness.get_by_label("Line between A and B, right").rect();
+    let right = Rect::from_center_size(line.center() + vec2(30.0, 0.0), vec2(30.0, 60.0));
+    let before = pixels(&mut rig, right);
+    rig.shoot("compare-wipe");
+    rig.harness.event(Event::PointerMoved(line.center()));
+    rig.harness.event(Event::PointerButton {
+        pos: line.center(),
+        button: PointerButton::Primary,
+        pressed: true,
+        modifiers: Modifiers::NONE,
+    });
+    rig.harness.step();
+    let to = line.center() + vec2(60.0, 0.0);
+    rig.harness.event(Event::PointerMoved(to));
+    rig.harness.step();
+    rig.harness.event(Event::PointerButton {
+        pos: to,
+        button: PointerButton::Primary,
+        pressed: false,
+        modifiers: Modifiers::NONE,
+    });
+    rig.harness.run();
+    let moved = rig.harness.get_by_label("Line between A and B, right").rect();
+    assert!((moved.center().x - to.x).abs() < 3.0, "{moved:?}");
+    assert!(same(&pixels(&mut rig, right), &before) < 0.95, "A lies there now");
+}
+
+#[test]
+fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
+    let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(PredictCommand::Generate);
+    click(&mut rig, "Compare");
+    set(&mut rig, "mean:seeds=2", "measured", VersusMode::Clouds);
+    assert!(rig.harness.query_by_label("3D view, A and B").is_some());
+    let (mean, measured) = (subject("mean:seeds=2"), Subject::Measured);
+    assert!(state(&rig).subjects_apart(&mean, &measured).is_none(), "no view colors by it");
+    rig.shoot("compare-clouds");
+    set(&mut rig, "mean:seeds=2", "measured", VersusMode::Apart);
+    let (key, apart) = state(&rig).subjects_apart(&mean, &measured).expect("the view shows it");
+    let cloud = state(&rig).results.clouds.get(&key.a).unwrap().finger(lab::RIGHT).unwrap();
+    let other = state(&rig).results.clouds.get(&key.b).unwrap().finger(lab::RIGHT).unwrap();
+    let distances = apart.points[lab::RIGHT].as_ref().unwrap();
+    assert_eq!(distances.len(), cloud.points.len());
+    let imprint = |subject: &Subject| state(&rig).subject(subject, lab::RIGHT).ready().unwrap();
+    let (a, b) = (imprint(&mean), imprint(&measured));
+    for i in (0..distances.len()).step_by(997) {
+        let nearest = other.points.iter().map(|p| p.distance(cloud.points[i])).fold(f64::INFINITY, f64::min);
+        assert!((f64::from(distances[i]).abs() - nearest).abs() < 1e-7);
+        let at = (usize::from(cloud.pixels[i][0]), usize::from(cloud.pixels[i][1]));
+        assert_eq!(distances[i] < 0.0, a[at] < b[at] && nearest > 0.0);
+    }
+    rig.shoot("compare-apart");
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    assert_eq!(state(&rig).versus(), Versus::default());
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Inspect));
+    rig.restart([1280.0, 800.0]);
+    assert_eq!(state(&rig).versus().a, mean, "kept in the preferences");
+    assert!(Action::SwapCompared.command(state(&rig)).is_some());
+    // What is not there says so.
+    click(&mut rig, "Compare");
+    set(&mut rig, "stored", "prediction:bundle=gone", VersusMode::Side);
+    assert!(rig.harness.query_all_by_label_contains("not there any more").next().is_some());
+}

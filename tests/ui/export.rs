@@ -1,0 +1,120 @@
+//! What is taken away: figures and pictures, each in few clicks.
+
+use std::path::Path;
+
+use eframe::egui::{Key, OutputCommand};
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::command::{LabelsCommand, Pane, PredictCommand, SettingsCommand};
+use touch2touch::app::settings::{Theme, Workspace};
+use touch2touch::io::images;
+
+use super::rig::Rig;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+
+impl Rig {
+    /// Clicks widgets one after the other; how many that were.
+    fn clicks(&mut self, labels: &[&str]) -> usize {
+        for label in labels {
+            self.harness.get_by_label(label).click();
+            self.harness.step();
+            self.settle();
+        }
+        labels.len()
+    }
+
+    /// Types a path and Enter: two actions.
+    fn take_to(&mut self, path: &Path) -> usize {
+        self.harness.get_by_label("Path").type_text(path.to_str().unwrap());
+        self.harness.step();
+        self.harness.key_press(Key::Enter);
+        self.harness.step();
+        self.settle();
+        2
+    }
+
+    fn predicted(&mut self) {
+        self.send(SettingsCommand::DismissHint);
+        self.send(PredictCommand::Generate);
+    }
+
+    /// What went to the clipboard in the last frame.
+    fn copied(&self) -> Option<String> {
+        self.harness.output().platform_output.commands.iter().find_map(|command| match command {
+            OutputCommand::CopyText(text) => Some(text.clone()),
+            _ => None,
+        })
+    }
+}
+
+#[test]
+fn a_figure_of_four_pairs_takes_no_more_than_eight_actions() {
+    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
+    rig.predicted();
+    let file = rig.data.join("figure.png");
+    let mut actions = rig.clicks(&["Open", "Figure…"]);
+    rig.shoot("figure-form");
+    actions += rig.clicks(&["Save the figure"]);
+    actions += rig.take_to(&file);
+    assert!(actions <= 8, "{actions}");
+    let image = images::read_rgb(&file).unwrap();
+    assert_eq!(image.size(), [1524, 1328], "four rows of four pictures, two pixels for each of an imprint");
+    let state = rig.harness.state().state();
+    assert!(!state.export.asking && state.log.entries.back().unwrap().place.as_deref() == Some(&*file));
+    // The note says where, and can be taken along.
+    rig.harness.get_all_by_label("Show in its folder").next().expect("the note leads to its folder");
+    rig.shoot("figure-saved");
+    rig.harness.get_all_by_label("Copy the path").next().unwrap().click();
+    rig.harness.step();
+    let copied = rig.copied();
+    assert_eq!(copied.as_deref(), file.to_str());
+}
+
+#[test]
+fn a_pane_is_drawn_as_a_picture_from_its_own_menu() {
+    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
+    rig.predicted();
+    rig.send(SettingsCommand::SetTheme(Theme::Light));
+    for (text, name) in [("Save picture 4x", "error.png"), ("Save picture SVG", "error.svg")] {
+        let file = rig.data.join(name);
+        let mut actions = rig.clicks(&["Export Error"]);
+        rig.shoot("pane-menu");
+        actions += rig.clicks(&[text]) + rig.take_to(&file);
+        assert!(actions <= 4 && file.is_file(), "{actions}");
+    }
+    let image = images::read_rgb(&rig.data.join("error.png")).unwrap();
+    assert_eq!(image.width(), 4 * (175 + 44), "one picture with its captions, four pixels for each of the imprint");
+    let text = std::fs::read_to_string(rig.data.join("error.svg")).unwrap();
+    assert!(text.contains("predicted minus measured, mm") && text.contains("mean |error|"));
+}
+
+#[test]
+fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a_scene() {
+    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
+    rig.predicted();
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    let folder = rig.data.join("taken");
+    rig.clicks(&["Export 3D measured"]);
+    rig.shoot("scene-menu");
+    rig.clicks(&["Export the measured pair…"]);
+    rig.take_to(&folder);
+    let mut names: Vec<String> =
+        std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    assert_eq!(names.len(), 3, "{names:?}");
+    assert!(names.iter().zip(["cloud.ply", "mesh.stl", "pose.json"]).all(|(name, end)| name.ends_with(end)));
+    rig.clicks(&["Export 3D measured"]);
+    rig.harness.get_by_label("Copy the command").click();
+    rig.harness.step();
+    let copied = rig.copied().expect("the command is on the clipboard");
+    let state = rig.harness.state().state();
+    assert_eq!(Some(&copied), state.equivalent(Pane::SceneMeasured, 0.004).as_ref());
+    assert!(copied.starts_with("touch2touch export ") && copied.contains("--imprint measured"), "{copied}");
+    rig.settle();
+    // What a mask is made of is said, also of one drawn by hand.
+    rig.send(LabelsCommand::AdoptAutomatic);
+    let exported = rig.harness.state().state().pair_export(Default::default()).unwrap();
+    let files = exported.write(&folder).unwrap();
+    let text = std::fs::read_to_string(files.iter().find(|f| f.ends_with(&names[2])).unwrap()).unwrap();
+    assert!(text.contains("\"mask\": \"hand"), "{text}");
+}

@@ -1,0 +1,110 @@
+//! Jobs of a working day by clicks and keys, with the actions that they take. None may take more than eight.
+
+use eframe::egui::{Event, Key, Modifiers};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use touch2touch::app::command::{PredictCommand, SettingsCommand};
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::state::State;
+use touch2touch::domain::rig::lab;
+use touch2touch::work::subject::Subject;
+
+use super::rig::Rig;
+
+/// The most actions that a job may take.
+const MOST: usize = 8;
+
+/// A person at work: each click and each key is one action.
+struct Person {
+    rig: Rig,
+    actions: usize,
+}
+
+impl Person {
+    fn at(mut rig: Rig) -> Self {
+        rig.send(SettingsCommand::DismissHint);
+        rig.send(PredictCommand::Generate);
+        Self { rig, actions: 0 }
+    }
+
+    fn state(&self) -> &State {
+        self.rig.harness.state().state()
+    }
+
+    fn done(&mut self) {
+        self.actions += 1;
+        self.rig.harness.step();
+        self.rig.settle();
+    }
+
+    /// Clicks on what is called so; the last drawn of several, which lies on top.
+    fn click(&mut self, label: &str) {
+        let node = self.rig.harness.get_all_by_label(label).last().unwrap_or_else(|| panic!("no {label:?} on screen"));
+        node.click();
+        self.done();
+    }
+
+    fn press(&mut self, key: Key) {
+        self.rig.harness.key_press_modifiers(Modifiers::NONE, key);
+        self.done();
+    }
+}
+
+#[test]
+fn two_models_are_compared_on_the_pair_on_screen() {
+    let Some(rig) = Rig::with_bundle([1280.0, 800.0], "Tiny generator of the tests") else { return };
+    let mut person = Person::at(rig);
+    let models: Vec<String> = person.state().evaluated().map(|(bundle, _)| bundle.name.clone()).collect();
+    let shown = person.state().chosen(lab::RIGHT).expect("a prediction").bundle.clone();
+    let shown = person.state().library.bundle(&shown).unwrap().name.clone();
+    let other = models.into_iter().find(|name| *name != shown).expect("a second generator");
+    person.click("Compare");
+    person.click("B: Measured");
+    person.click("as in Generate");
+    person.click(&other);
+    let versus = person.state().versus();
+    assert_eq!(versus.a, Subject::shown());
+    assert_eq!(versus.b.wish().and_then(|wish| wish.bundle.clone()), Some(other));
+    let found = person.state().subjects_compared(&versus.a, &versus.b, lab::RIGHT).ready().expect("the figures");
+    assert!(found.mae_m > 0.0);
+    assert!(person.actions <= MOST, "{} actions", person.actions);
+    person.rig.shoot("job-two-models");
+}
+
+#[test]
+fn the_distance_between_the_model_and_the_tip_is_read() {
+    let Some(rig) = Rig::aligned() else { return };
+    let mut person = Person::at(rig);
+    for _ in 0..3 {
+        person.press(Key::V);
+    }
+    let state = person.state();
+    let source = ImprintSource::Measured;
+    let found = state.deviation(source).ready().expect("the distances are shown");
+    let cloud = state.cloud(source).ready().unwrap().finger(lab::RIGHT).unwrap();
+    // The contact point farthest from the hand: the tip.
+    let contact: Vec<usize> = (0..cloud.points.len()).filter(|i| cloud.contact[*i]).collect();
+    let tip = (0..contact.len()).max_by(|a, b| cloud.points[contact[*a]].z.total_cmp(&cloud.points[contact[*b]].z));
+    let tip = tip.unwrap();
+    let off = f64::from(found.points[lab::RIGHT].as_ref().unwrap()[tip]);
+    let point = cloud.points[contact[tip]];
+    let at = person.rig.harness.state().on_screen(source, point.to_array()).expect("it is drawn");
+    person.rig.harness.event(Event::PointerMoved(at + eframe::egui::vec2(1.0, 0.0)));
+    person.rig.harness.step();
+    person.rig.harness.event(Event::PointerMoved(at));
+    person.done();
+    let said: Vec<String> = person
+        .rig
+        .harness
+        .query_all_by_label_contains("from the model")
+        .filter_map(|node| node.accesskit_node().label())
+        .collect();
+    assert!(!said.is_empty(), "the status bar says the distance of the point under the pointer");
+    // A point in front may be nearer to the pointer by less than a pixel: one of the neighborhood is read.
+    let read = said.iter().find_map(|text| {
+        let number = text.split("   ").find(|part| part.contains("from the model"))?;
+        number.split(' ').next()?.parse::<f64>().ok()
+    });
+    let read = read.unwrap_or_else(|| panic!("{said:?}"));
+    assert!((read - off * 1e3).abs() < 1.5, "{read} mm read, {} mm measured", off * 1e3);
+    assert!(person.actions <= MOST, "{} actions", person.actions);
+}
