@@ -168,9 +168,9 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut next = None;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let direction = 56.0;
-        let width = 0.5 * (ui.available_width() - direction - 24.0).max(60.0);
-        let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(figure.name()).truncate();
+        let direction = 52.0;
+        let width = ui.available_width() - direction - 8.0;
+        let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(figure.name());
         let response = combo.show_ui(ui, |ui| {
             for f in by.figures() {
                 if ui.selectable_label(f == figure, f.name()).on_hover_text(f.tip()).clicked() {
@@ -180,16 +180,6 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
         });
         let tip = "The score that the list shows, and is sorted and filtered by";
         response.response.accessible_name("Score").on_hover_text(tip);
-        let combo = egui::ComboBox::from_id_salt("source").width(width).selected_text(by.short()).truncate();
-        let response = combo.show_ui(ui, |ui| {
-            for source in &table.scores.sources {
-                if ui.selectable_label(source.name == by.name, &*source.name).clicked() {
-                    next = Some(ScoreChoice { source: Some(source.name.clone()), ..chosen.clone() });
-                }
-            }
-        });
-        let tip = "Whose score: the measured imprints' (what no generator can beat), or a generator's";
-        response.response.accessible_name("Source of the score").on_hover_text(tip);
         let text = if chosen.best_first { "best" } else { "worst" };
         let button = egui::Button::new(RichText::new(text).size(SMALL)).selected(sorted);
         let tip = "Which come first; N shows the next worst. A click turns the order round";
@@ -198,6 +188,18 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
             next = Some(ScoreChoice { best_first: sorted && !chosen.best_first, ..chosen.clone() });
         }
     });
+    if table.scores.sources.len() > 1 {
+        let combo = egui::ComboBox::from_id_salt("source").width(ui.available_width());
+        let response = combo.selected_text(by.short()).truncate().show_ui(ui, |ui| {
+            for source in &table.scores.sources {
+                if ui.selectable_label(source.name == by.name, &*source.name).clicked() {
+                    next = Some(ScoreChoice { source: Some(source.name.clone()), ..chosen.clone() });
+                }
+            }
+        });
+        let tip = "Whose score: the measured imprints' (what no generator can beat), or a generator's";
+        response.response.accessible_name("Source of the score").on_hover_text(tip);
+    }
     if let Some(next) = next {
         cx.push(LibraryCommand::SetScore(next));
     }

@@ -27,7 +27,7 @@ use touch2touch::app::results::ambiguity::AmbiguityKey;
 use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::{
-    ColorMap, ColorRange, GenerateSettings, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
+    ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
     SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::tasks::Ticket;
@@ -308,6 +308,7 @@ draws! {
     seeds: SeedsCommand {
         1 Count(0usize..4),
         1 Run(any::<bool>()),
+        1 EveryPair(any::<bool>()),
     }
     labels: LabelsCommand {
         6 BeginStroke(finger(), source(), position(), any::<bool>()),
@@ -408,6 +409,7 @@ draws! {
         1 SetWorkspace(any_of::<Workspace>()),
         1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
         1 DismissHint,
+        1 Remember(Just(Last { pair: "nowhere".into(), finger: 7, ..Last::default() })),
         1 ResetSettings,
     }
     tasks: TasksCommand {

@@ -171,9 +171,9 @@ impl State {
     /// The imprint shown for one finger, meters, raw bubble orientation.
     pub fn imprint(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
         match self.imprint_key(source, finger) {
+            Ok(key) => self.imprint_of(key),
             Err(Absent::NoPrediction) if self.ahead(finger).is_some() => Lookup::Waiting,
             Err(absent) => Lookup::Absent(absent),
-            Ok(key) => self.imprint_of(key),
         }
     }
 
