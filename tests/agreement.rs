@@ -15,6 +15,7 @@ use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
+use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, Versus, VersusMode};
 use touch2touch::app::state::{Lookup, State};
@@ -48,6 +49,7 @@ fn how(action: Action) -> How {
         // Labels are on the disk as soon as a verb ends.
         A::Save => Shell,
         A::Figure => Verb(&["figure", "demo", "--pairs", "a,b", "--panes", "measured,error", "--out", "a.svg"]),
+        A::SaveCase => Verb(&["case", "make", "demo", "--pair", "a", "--out", "a.t2tcase"]),
         A::ExportMeasured => Verb(&["export", "demo", "--pair", "a", "--out", "folder"]),
         A::ExportPredicted => Verb(&["export", "demo", "--pair", "a", "--imprint", "predicted", "--out", "folder"]),
         A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),
@@ -128,6 +130,9 @@ struct Studio {
 impl Studio {
     fn open(place: Place, home: &Path) -> Self {
         let services = LiveServices::with_config_folder(Some(home.to_owned()));
+        let mut settings = services.load_settings().0;
+        settings.generate.by_itself = false;
+        services.save_settings(&settings).unwrap();
         let runtime = Runtime::threads(Arc::new(services), Arc::new(|| {}));
         let mut studio = Self { state: State::default(), runtime };
         studio.runtime.start(&mut studio.state, Some(place));

@@ -102,6 +102,7 @@ actions! {
     Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)];
     Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)];
     Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)];
+    SaveCase, File, "Save case…", "Writes this pair with all that its results depend on into one file, which opens to the same picture elsewhere", [];
     ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [];
     ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [];
     ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
@@ -321,6 +322,7 @@ impl Action {
             }
             Self::Save => does(LabelsCommand::Save),
             Self::Figure => when(state.can_draw(), ExportCommand::Ask(!state.export.asking)),
+            Self::SaveCase => when(state.can_draw(), ExportCommand::Place(Output::Case)),
             Self::ExportMeasured => export(state, ImprintSource::Measured),
             Self::ExportPredicted => export(state, ImprintSource::Predicted),
             Self::ExportMasks => when(open, ViewCommand::Ui(UiRequest::PickExportFolder)),

@@ -14,6 +14,7 @@ use super::state::{Absent, Lookup, State};
 use super::wanted::Wanted;
 use crate::work::error::TaskError;
 
+pub mod ahead;
 pub mod ambiguity;
 pub mod basin;
 pub mod cache;
@@ -227,6 +228,8 @@ results! {
     Prediction(prediction::PredictionKey) in predictions, 256 * MIB;
     /// A prediction with one of several seeds: kept with the others.
     Seed(prediction::SeedKey);
+    /// A prediction of the pair on screen that nobody asked for: kept with the others.
+    Ahead(ahead::AheadKey);
     /// Several predictions of one touch.
     Ensemble(ensemble::EnsembleKey) in ensembles, 32 * MIB;
     /// A prediction in meters, as large as the bubble image.

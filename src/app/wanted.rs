@@ -118,6 +118,7 @@ impl Wanted<'_> {
                 self.basin();
             }
         }
+        self.predictions_ahead();
         if state.needs(Need::Ledger) {
             self.ledger(pair.finger(state.selection.finger));
         }

@@ -24,6 +24,7 @@ use crate::app::command::{
     ViewCommand,
 };
 use crate::app::evaluate::EvaluateCommand;
+use crate::app::export::Output;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
 use crate::app::pane::Kind;
@@ -326,6 +327,11 @@ impl StudioApp {
                 let part = self.panes.hovered.and_then(|pane| self.panes.places.get(&pane).copied());
                 self.shoot(ctx, part, copied);
             }
+            UiRequest::ShowView(camera) => {
+                self.trees.clear();
+                self.panes.maximized = None;
+                self.panes.memories.scene.look_as(&camera);
+            }
             UiRequest::PictureOf(pane) => {
                 if let Some(place) = self.panes.places.get(&pane).copied() {
                     self.shoot(ctx, Some(place), true);
@@ -482,6 +488,10 @@ impl eframe::App for StudioApp {
                 cx.push(match purpose {
                     Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
                     Purpose::Export => Command::Labels(LabelsCommand::ExportMasks(path)),
+                    Purpose::Output(Output::Case) => {
+                        let camera = self.panes.memories.scene.camera_text(ImprintSource::default());
+                        Command::Export(ExportCommand::WriteCase(path, camera))
+                    }
                     Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });

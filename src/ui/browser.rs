@@ -10,6 +10,7 @@ use super::cx::Cx;
 use super::dialogs::Purpose;
 use super::scene::error_color;
 use super::theme::{Palette, SMALL, caption};
+use super::widget::cut::cut_in_the_middle;
 use super::widget::texture::depth_image;
 use super::widget::{empty, progress};
 use crate::app::action::Action;
@@ -167,9 +168,9 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut next = None;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let direction = 56.0;
-        let width = 0.5 * (ui.available_width() - direction - 24.0).max(60.0);
-        let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(figure.name()).truncate();
+        let direction = 52.0;
+        let width = ui.available_width() - direction - 8.0;
+        let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(figure.name());
         let response = combo.show_ui(ui, |ui| {
             for f in by.figures() {
                 if ui.selectable_label(f == figure, f.name()).on_hover_text(f.tip()).clicked() {
@@ -179,16 +180,6 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
         });
         let tip = "The score that the list shows, and is sorted and filtered by";
         response.response.accessible_name("Score").on_hover_text(tip);
-        let combo = egui::ComboBox::from_id_salt("source").width(width).selected_text(by.short()).truncate();
-        let response = combo.show_ui(ui, |ui| {
-            for source in &table.scores.sources {
-                if ui.selectable_label(source.name == by.name, &*source.name).clicked() {
-                    next = Some(ScoreChoice { source: Some(source.name.clone()), ..chosen.clone() });
-                }
-            }
-        });
-        let tip = "Whose score: the measured imprints' (what no generator can beat), or a generator's";
-        response.response.accessible_name("Source of the score").on_hover_text(tip);
         let text = if chosen.best_first { "best" } else { "worst" };
         let button = egui::Button::new(RichText::new(text).size(SMALL)).selected(sorted);
         let tip = "Which come first; N shows the next worst. A click turns the order round";
@@ -197,6 +188,18 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
             next = Some(ScoreChoice { best_first: sorted && !chosen.best_first, ..chosen.clone() });
         }
     });
+    if table.scores.sources.len() > 1 {
+        let combo = egui::ComboBox::from_id_salt("source").width(ui.available_width());
+        let response = combo.selected_text(by.short()).truncate().show_ui(ui, |ui| {
+            for source in &table.scores.sources {
+                if ui.selectable_label(source.name == by.name, &*source.name).clicked() {
+                    next = Some(ScoreChoice { source: Some(source.name.clone()), ..chosen.clone() });
+                }
+            }
+        });
+        let tip = "Whose score: the measured imprints' (what no generator can beat), or a generator's";
+        response.response.accessible_name("Source of the score").on_hover_text(tip);
+    }
     if let Some(next) = next {
         cx.push(LibraryCommand::SetScore(next));
     }
@@ -397,21 +400,6 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
     }
 }
 
-/// A text that is no wider than there is room, with what had to go left out of its middle: names differ at their ends.
-pub(super) fn cut_in_the_middle(text: &str, room: f32, width: impl Fn(&str) -> f32) -> String {
-    if width(text) <= room {
-        return text.to_owned();
-    }
-    let letters: Vec<char> = text.chars().collect();
-    let shortened = |kept: usize| {
-        let head: String = letters[..kept.div_ceil(2)].iter().collect();
-        let tail: String = letters[letters.len() - kept / 2..].iter().collect();
-        format!("{head}…{tail}")
-    };
-    let fitting = (1..letters.len()).rev().map(shortened).find(|short| width(short) <= room);
-    fitting.unwrap_or_else(|| "…".to_owned())
-}
-
 /// The score of a pair that the list is about.
 fn figure_text(cx: &Cx<'_>, pair: PairId) -> Option<(String, Color32)> {
     let (source, figure) = cx.state.table.by()?;
@@ -433,18 +421,4 @@ fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
         .textures
         .get(ui.ctx(), ("thumbnail", key), (bits, map), false, || (depth_image(depth, map, range), None));
     Some(picture.texture.id())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn long_names_keep_their_ends() {
-        let width = |text: &str| text.chars().count() as f32;
-        assert_eq!(cut_in_the_middle("data_12", 7.0, width), "data_12");
-        assert_eq!(cut_in_the_middle("stl_in_millimetres_data_0", 11.0, width), "stl_i…ata_0");
-        assert_eq!(cut_in_the_middle("ärger", 4.0, width), "är…r");
-        assert_eq!(cut_in_the_middle("anything", 0.5, width), "…");
-    }
 }

@@ -117,6 +117,13 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
         let both = ui.checkbox(&mut new.both_fingers, "both fingers");
         both.on_hover_text("Generate for both fingers: the pose needs both. Off: only the active finger");
     });
+    row(ui, cx.p.weak, "", |ui| {
+        let by_itself = ui.checkbox(&mut new.by_itself, "by itself under 1 s");
+        by_itself.on_hover_text(
+            "The pair on screen is predicted without a click where that takes less than a second on this machine, by \
+             what earlier predictions took. Default on",
+        );
+    });
     row(ui, cx.p.weak, "Seed", |ui| {
         let drag = egui::DragValue::new(&mut new.seed).speed(1.0);
         reset(

@@ -11,6 +11,7 @@ use strum::{EnumIter, IntoEnumIterator as _};
 
 use super::cx::Cx;
 use super::theme::{SMALL, caption};
+use super::widget::cut::cut_in_the_middle;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
@@ -26,8 +27,8 @@ const NEAR: f32 = 8.0;
 const DRAG: f32 = 4.0;
 /// Bars of a histogram.
 const BARS: usize = 24;
-/// Height of a tool's histogram, points.
-const STRIP: f32 = 34.0;
+/// Least and largest height of a tool's histogram, points.
+const STRIP: [f32; 2] = [16.0, 34.0];
 
 /// A score: a place among the sources, and a figure. Values are brought to the unit of the screen.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,14 +123,14 @@ fn axes(scores: &ScoreTable, memory: &Memory) -> Option<[Axis; 2]> {
 
 /// Which scores, and how they are shown.
 fn controls(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTable, mut axes: [Axis; 2]) -> [Axis; 2] {
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(4.0, 2.0);
-        let shown = if memory.by_tool { 1 } else { 2 };
-        for (at, (axis, name)) in axes.iter_mut().zip(["x", "y"]).enumerate().take(shown) {
+    let shown = if memory.by_tool { 1 } else { 2 };
+    for (at, (axis, name)) in axes.iter_mut().zip(["x", "y"]).enumerate().take(shown) {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
             ui.label(caption(name, cx.p));
-            let text = format!("{} {}", short(scores, &axis.source), axis.figure.name());
-            let combo = egui::ComboBox::from_id_salt(("axis", at)).width(118.0).selected_text(text).truncate();
-            let response = combo.show_ui(ui, |ui| {
+            let text = format!("{}: {}", axis.figure.name(), short(scores, &axis.source));
+            let combo = egui::ComboBox::from_id_salt(("axis", at)).width(ui.available_width() - 8.0);
+            let response = combo.selected_text(text).truncate().show_ui(ui, |ui| {
                 for source in &scores.sources {
                     ui.label(caption(&*source.name, cx.p));
                     for figure in source.figures() {
@@ -143,7 +144,10 @@ fn controls(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTable, 
             });
             let tip = "Which score of which source stands along this axis";
             response.response.accessible_name(format!("Score along {name}")).on_hover_text(tip);
-        }
+        });
+    }
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
         if !memory.by_tool {
             for coloring in Coloring::iter() {
                 let tip = match coloring {
@@ -206,7 +210,9 @@ fn points(cx: &Cx<'_>, memory: &Memory, scores: &ScoreTable, axes: &[Axis; 2]) -
 fn range(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
     let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
     let room = if high > low { 0.04 * (high - low) } else { 0.5 };
-    (low <= high).then_some([low - room, high + room])
+    // What cannot be negative does not look as if it were.
+    let start = if low >= 0.0 { (low - room).max(0.0) } else { low - room };
+    (low <= high).then_some([start, high + room])
 }
 
 fn scatter(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTable, axes: &[Axis; 2]) {
@@ -234,7 +240,11 @@ fn scatter(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTabl
     };
     let painter = ui.painter_at(rect);
     painter.rect_filled(plot, 2.0, p.canvas);
-    let titles = [0, 1].map(|axis| title(scores, memory, &axes[axis]));
+    let font = FontId::proportional(SMALL);
+    let titles = [0, 1].map(|axis| {
+        let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), p.text).size().x;
+        cut_in_the_middle(&title(scores, memory, &axes[axis]), plot.width() - 8.0, width)
+    });
     ticks(ui, plot, xs, ys, axes, p.weak, p.line);
     painter.text(
         pos2(plot.center().x, rect.bottom()),
@@ -298,10 +308,10 @@ fn ticks(ui: &Ui, plot: Rect, xs: [f64; 2], ys: [f64; 2], axes: &[Axis; 2], text
     for (share, align) in [(0.0_f32, Align2::LEFT_TOP), (0.5, Align2::CENTER_TOP), (1.0, Align2::RIGHT_TOP)] {
         let value = |[low, high]: [f64; 2]| low + f64::from(share) * (high - low);
         let x = plot.left() + share * plot.width();
-        let label = format!("{:.*}", axes[0].figure.decimals(), value(xs));
+        let label = tick(axes[0].figure, value(xs));
         painter.text(pos2(x, plot.bottom() + 2.0), align, label, font.clone(), text);
         let y = plot.bottom() - share * plot.height();
-        let label = format!("{:.*}", axes[1].figure.decimals(), value(ys));
+        let label = tick(axes[1].figure, value(ys));
         let align = if share == 0.0 {
             Align2::RIGHT_BOTTOM
         } else if share == 1.0 {
@@ -315,6 +325,15 @@ fn ticks(ui: &Ui, plot: Rect, xs: [f64; 2], ys: [f64; 2], axes: &[Axis; 2], text
     }
 }
 
+/// A number at an axis: nothing is no less than nothing.
+fn tick(figure: Figure, value: f64) -> String {
+    let text = format!("{value:.*}", figure.decimals());
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        _ => text,
+    }
+}
+
 /// A rectangle that is dragged: the pairs inside are listed alone. A click beside the points lists all again.
 fn brush(
     cx: &mut Cx<'_>,
@@ -325,7 +344,8 @@ fn brush(
     inside: impl FnOnce(Rect) -> BTreeSet<PairId>,
 ) {
     if response.drag_started() {
-        memory.begun = response.interact_pointer_pos();
+        // Where the button went down, not where the pointer was when it had moved far enough.
+        memory.begun = ui.input(|input| input.pointer.press_origin()).or_else(|| response.interact_pointer_pos());
     }
     let Some(begun) = memory.begun else { return };
     let Some(now) = response.interact_pointer_pos().or_else(|| ui.input(|input| input.pointer.latest_pos())) else {
@@ -376,6 +396,7 @@ fn histograms(cx: &mut Cx<'_>, ui: &mut Ui, scores: &ScoreTable, axis: &Axis) {
     );
     ui.label(caption(line, cx.p));
     ui.spacing_mut().item_spacing.y = 2.0;
+    let height = (ui.available_height() / rows.len().max(1) as f32 - 2.0).clamp(STRIP[0], STRIP[1]);
     ScrollArea::vertical().auto_shrink(false).id_salt("histograms").show(ui, |ui| {
         for (tool, values) in &rows {
             let mut bars: Vec<Vec<PairId>> = vec![Vec::new(); BARS];
@@ -384,7 +405,7 @@ fn histograms(cx: &mut Cx<'_>, ui: &mut Ui, scores: &ScoreTable, axis: &Axis) {
             sorted.sort_by(f64::total_cmp);
             let middle = 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
             let average = mean(sorted.iter().copied()).unwrap_or(middle);
-            strip(cx, ui, tool, &bars, [average, middle].map(|v| ((v - low) / (high - low)) as f32), |bar| {
+            strip(cx, ui, height, tool, &bars, [average, middle].map(|v| ((v - low) / (high - low)) as f32), |bar| {
                 let edge = |at: usize| low + at as f64 * (high - low) / BARS as f64;
                 let n = bars[bar].len();
                 format!(
@@ -402,24 +423,22 @@ fn histograms(cx: &mut Cx<'_>, ui: &mut Ui, scores: &ScoreTable, axis: &Axis) {
 fn strip(
     cx: &mut Cx<'_>,
     ui: &mut Ui,
+    height: f32,
     tool: &str,
     bars: &[Vec<PairId>],
     marks: [f32; 2],
     said: impl FnOnce(usize) -> String,
 ) {
     let p = cx.p;
-    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), STRIP), Sense::click());
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), height), Sense::click());
     let name = tool.strip_prefix("pattern_").unwrap_or(tool).replace('_', " ");
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Histogram of {name}")));
     let plot = Rect::from_min_max(rect.min + vec2(84.0, 2.0), rect.max - vec2(4.0, 2.0));
     let painter = ui.painter_at(rect);
-    painter.text(
-        pos2(rect.left() + 2.0, rect.center().y),
-        Align2::LEFT_CENTER,
-        name,
-        FontId::proportional(SMALL),
-        p.text,
-    );
+    let font = FontId::proportional(SMALL);
+    let wide = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), p.text).size().x;
+    let name = cut_in_the_middle(&name, 78.0, wide);
+    painter.text(pos2(rect.left() + 2.0, rect.center().y), Align2::LEFT_CENTER, name, font.clone(), p.text);
     painter.rect_filled(plot, 2.0, p.canvas);
     let most = bars.iter().map(Vec::len).max().unwrap_or(0).max(1) as f32;
     let width = plot.width() / bars.len() as f32;

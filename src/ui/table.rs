@@ -4,9 +4,10 @@ use eframe::egui::{
     self, Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2,
 };
 
-use super::browser::{cut_in_the_middle, predict_all, review_color, score_color};
+use super::browser::{predict_all, review_color, score_color};
 use super::cx::Cx;
 use super::theme::{SMALL, medium};
+use super::widget::cut::cut_in_the_middle;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
@@ -48,7 +49,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         let table = &cx.state.table;
         let total = cx.state.library.pairs().len();
         let scored = table.scores.sources.iter().map(|source| source.scored).min().unwrap_or(0);
-        if scored < total || cx.state.evaluating().is_some() {
+        let empty = table.scores.sources.is_empty() && cx.state.evaluating().is_none();
+        if !empty && (scored < total || cx.state.evaluating().is_some()) {
             predict_all(cx, ui, scored);
         }
         if table.scores.sources.is_empty() {
@@ -197,14 +199,17 @@ fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
     let (names, numbers) = cells(rect, columns.len());
     let order = &cx.state.library.order;
     let left = pos2(names[0].left() + 6.0, rect.center().y);
-    let what = format!("mean of the {} listed", order.len());
+    let scored = |pair: &&PairId| columns.iter().any(|(source, figure)| source.value(**pair, *figure).is_some());
+    let what = format!("mean of {}", order.iter().filter(scored).count());
     ui.painter().text(left, Align2::LEFT_CENTER, what, FontId::proportional(SMALL), cx.p.weak);
     for ((source, figure), cell) in columns.iter().zip(numbers) {
         let values = order.iter().filter_map(|pair| source.value(*pair, *figure)).filter(|v| v.is_finite());
         let text = mean(values).map_or("–".to_owned(), |mean| number(*figure, mean));
         put(ui, cell, &text, cx.p.strong);
     }
-    response.on_hover_text("Means over the pairs of the list that have a number; grasps without a pose are left out");
+    response.on_hover_text(
+        "Means over the pairs of the list that were scored; grasps without a pose are left out of those of the angle",
+    );
 }
 
 /// A value without its unit, which the heading says.

@@ -172,7 +172,7 @@ pub fn evaluate(
     let mut whole = work.iter();
     load::ahead(dataset, setup, &todo, cx, |batch| {
         let name = batch.work.tool.as_deref().unwrap_or("pictures");
-        let mut tool = tool::Tool::new(dataset, batch.work, &mut skipped);
+        let mut tool = tool::Tool::new(dataset, batch.work, &book, &mut skipped);
         for cases in batch.cases {
             if cx.cancel.is_cancelled() {
                 break;
@@ -186,7 +186,7 @@ pub fn evaluate(
             };
             let loaded = cases.good.len() + cases.bad.len();
             skipped.extend(cases.bad);
-            tool.score(&cases.good, setup, &mut models, &book, &mut skipped, cx, &mut |method| {
+            tool.score(&cases.good, setup, &mut models, &mut skipped, cx, &mut |method| {
                 cx.progress(done as u64, total as u64, format!("{name}, {method}"));
             });
             done += loaded;
@@ -194,7 +194,7 @@ pub fn evaluate(
         }
         let ids = whole.next().map_or(&[][..], |tool| &tool.ids);
         let mut again = |at: usize, ids: &[PairId]| tool::again(dataset, setup, &mut models.methods[at], ids, cx);
-        let entries = tool.finish(&book, ids, &mut again, &mut scores, &mut skipped);
+        let entries = tool.finish(ids, &mut again, &mut scores, &mut skipped);
         // Of each grasp once, whatever the number of methods.
         let mut noted = BTreeSet::new();
         for (at, entry) in entries {

@@ -501,7 +501,7 @@ mod tests {
         }
         assert!(!text.contains("predicted minus"));
         let (open, close) = (text.matches("<text").count(), text.matches("</text>").count());
-        assert!(open > 10 && open == close && text.matches('"').count() % 2 == 0);
+        assert!(open > 10 && open == close && text.matches('"').count().is_multiple_of(2));
     }
 
     #[test]

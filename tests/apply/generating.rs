@@ -3,11 +3,14 @@
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
-use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::command::{Answer, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
 use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
 use touch2touch::app::results::Preview;
 use touch2touch::app::settings::GenerateSettings;
+use touch2touch::app::state::{Absent, Lookup};
+use touch2touch::app::tasks::Ticket;
+use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::DepthMap;
 use touch2touch::domain::rig::{PadId, lab};
@@ -26,6 +29,45 @@ const LEFT: PadId = lab::LEFT;
 fn preview(recipe: &PredictionKey, step: u32) -> Arc<Preview> {
     let picture = PreviewPicture { step, of: recipe.steps, depth: DepthMap::filled(4, 3, 0.001) };
     Arc::new(Preview { recipe: recipe.clone(), picture })
+}
+
+#[test]
+fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little() {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::Predicted]));
+    bench.send(LibraryCommand::Select(PairId(1)));
+    bench.settle();
+    assert_eq!(bench.services.generated(), 0, "switched off");
+    let by_itself = |on: bool, bench: &Bench| {
+        let settings = bench.state.settings.generate.clone();
+        SettingsCommand::SetGenerate(GenerateSettings { by_itself: on, ..settings })
+    };
+    bench.send(by_itself(true, &bench));
+    bench.settle();
+    assert_eq!(bench.services.generated(), 1);
+    let key = bench.state.chosen(RIGHT).expect("it is shown").clone();
+    assert_eq!(bench.state.cost_of(&key), bench.state.results.predictions.get(&key).map(|made| made.seconds));
+    // Of pairs that were left before their turn none is made.
+    for pair in [2, 3, 4, 5] {
+        bench.send(LibraryCommand::Select(PairId(pair)));
+    }
+    bench.settle();
+    assert_eq!(bench.services.generated(), 2);
+    assert!(bench.state.chosen(RIGHT).is_some());
+    // A pane that shows no prediction asks for none.
+    bench.send(panes(&[Pane::Measured]));
+    bench.send(LibraryCommand::Select(PairId(6)));
+    bench.settle();
+    assert_eq!(bench.services.generated(), 2);
+    // On a machine that takes long for it nobody waits for what was not asked for.
+    let slow = Prediction { seconds: 5.0, ..(**bench.state.results.predictions.get(&key).unwrap()).clone() };
+    let keys: Vec<_> = bench.state.results.predictions.iter().map(|(key, _)| key.clone()).collect();
+    let slow = keys.into_iter().map(|key| (key, Arc::new(slow.clone()))).collect();
+    bench.send(Answer::Generated(Ticket(u64::MAX), slow));
+    bench.send(panes(&[Pane::Predicted]));
+    bench.settle();
+    assert_eq!(bench.services.generated(), 2);
+    assert!(matches!(bench.state.imprint(ImprintSource::Predicted, RIGHT), Lookup::Absent(Absent::NoPrediction)));
 }
 
 #[test]

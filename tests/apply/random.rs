@@ -193,6 +193,7 @@ fn output() -> impl Strategy<Value = Output> {
     let picture = (any_of::<Pane>(), proptest::option::of(any::<u8>()), number());
     prop_oneof![
         Just(Output::Figure),
+        Just(Output::Case),
         source().prop_map(Output::Pair),
         picture.prop_map(|(pane, scale, error_m)| Output::Picture { pane, scale, error_m }),
     ]
@@ -371,6 +372,7 @@ draws! {
         1 Ask(any::<bool>()),
         1 SetForm(form()),
         1 Place(output()),
+        1 WriteCase(Just(PathBuf::from("no/such/folder/a.t2tcase")), Just(String::new())),
         1 Write(output(), Just(PathBuf::from("no/such/folder/picture.png"))),
     }
     adapt: AdaptCommand {

@@ -1,9 +1,11 @@
 //! Nothing to see is an error, and pictures for people.
 
+use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{
     Command, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
 };
+use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::inspect::{BasinColor, InspectCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{LayerLook, MaskSource, SceneLayer, SceneLook, Theme, Versus, VersusMode, Workspace};
@@ -129,6 +131,28 @@ fn pictures_of_the_faults() {
             rig.shoot(&format!("fault-{name}-{}", layer.name()).to_lowercase());
         }
         rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
+    }
+}
+
+/// The scores of many pairs, for looking at.
+#[test]
+#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
+fn pictures_of_the_scores() {
+    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
+        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
+        rig.send(SettingsCommand::DismissHint);
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+        rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Table)));
+        rig.shoot(&format!("{name}-scores-none"));
+        rig.send(Command::Evaluate(EvaluateCommand::Grasps(Some(4))));
+        rig.send(Command::Evaluate(EvaluateCommand::Start));
+        rig.send(LibraryCommand::NextWorst);
+        rig.shoot(&format!("{name}-scores-dark"));
+        rig.harness.get_by_label("histograms").click();
+        rig.harness.step();
+        rig.settle();
+        rig.send(SettingsCommand::SetTheme(Theme::Light));
+        rig.shoot(&format!("{name}-scores-light"));
     }
 }
 

@@ -174,7 +174,10 @@ impl Services for QuickGenerator {
     }
 
     fn load_settings(&self) -> (Settings, Option<TaskError>) {
-        self.live.load_settings()
+        // Predictions are asked for: a test that is about the others switches them on.
+        let (mut settings, problem) = self.live.load_settings();
+        settings.generate.by_itself = false;
+        (settings, problem)
     }
 
     fn save_settings(&self, settings: &Settings) -> Result<(), TaskError> {
@@ -237,6 +240,7 @@ impl Rig {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles");
         let mut settings = Settings { bundle_folders: vec![folder], ..Settings::default() };
         settings.generate.bundle = Some(name.to_owned());
+        settings.generate.by_itself = false;
         services.save_settings(&settings).unwrap();
         rig.harness = Self::build(size, Arc::new(services), Some(rig.data.clone()), true);
         rig.settle();
@@ -260,6 +264,9 @@ impl Rig {
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
         let services = Arc::new(LiveServices::with_config_folder(Some(config.clone())));
+        let mut settings = Settings::default();
+        settings.generate.by_itself = false;
+        services.save_settings(&settings).unwrap();
         let open = match place {
             Place::Demo => None,
             Place::Path(path) => Some(path),

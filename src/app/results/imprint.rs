@@ -170,7 +170,11 @@ impl State {
 
     /// The imprint shown for one finger, meters, raw bubble orientation.
     pub fn imprint(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
-        self.imprint_key(source, finger).map_or_else(Lookup::Absent, |key| self.imprint_of(key))
+        match self.imprint_key(source, finger) {
+            Ok(key) => self.imprint_of(key),
+            Err(Absent::NoPrediction) if self.ahead(finger).is_some() => Lookup::Waiting,
+            Err(absent) => Lookup::Absent(absent),
+        }
     }
 
     /// An imprint of the selected pair by its recipe, meters, raw bubble orientation.

@@ -6,6 +6,7 @@ mod follow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::super::keys::{PredictionKey, TouchKey};
 use super::super::labels::state::{PairLabels, Review};
@@ -23,11 +24,13 @@ use crate::domain::rig::Rig;
 use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
 use crate::infer::store::{self, Store};
+use crate::io::case_file;
 use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
 use crate::io::{atomic, files, folders, names};
 use crate::work::adapt::{self, AdaptSetup, Adapted};
 use crate::work::bundles::{self, BundleInfo};
+use crate::work::case::{self, Case, CaseSetup};
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{ExportSetup, HandMasks, export_masks};
@@ -37,6 +40,8 @@ use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
 use crate::work::tool::tool_file;
 
+/// Longer than a key that is held down leaves a pair on screen.
+const PATIENCE: Duration = Duration::from_millis(150);
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";
 /// Where a settings file that cannot be used is put.
@@ -77,8 +82,16 @@ impl LiveServices {
 /// # Errors
 /// If nothing in it can be opened.
 pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
+    let mut case = None;
     let dataset = match place {
         Place::Demo => Dataset::demo(),
+        Place::Path(path) if case_file::is_case(path) && path.is_file() => {
+            let cache = folders::program_cache().unwrap_or_else(std::env::temp_dir);
+            let opened = case::open(path, &cache.join("cases"))?;
+            opened.keep_labels()?;
+            case = Some((opened.pair, opened.case));
+            opened.dataset
+        }
         Place::Path(path) => Dataset::open(path)
             .map_err(|err| TaskError::from_error(format!("Open {place}"), &err).with_hint(err.hint()))?,
     };
@@ -86,7 +99,7 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
     let labels = Labels::of(&dataset);
     let (reviews, mut damaged) = labels.reviews();
     problems.append(&mut damaged);
-    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews })
+    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews, case })
 }
 
 /// An open data set with its store of labels.
@@ -96,6 +109,7 @@ pub struct LiveSource {
     labels: Labels,
     problems: Vec<Problem>,
     reviews: BTreeMap<String, Review>,
+    case: Option<(PairId, Case)>,
 }
 
 impl LiveSource {
@@ -116,6 +130,10 @@ impl DataSource for LiveSource {
 
     fn as_dataset(&self) -> Option<&Dataset> {
         Some(&self.dataset)
+    }
+
+    fn case(&self) -> Option<(PairId, &Case)> {
+        self.case.as_ref().map(|(pair, case)| (*pair, case))
     }
 
     fn rig(&self) -> Arc<Rig> {
@@ -212,6 +230,10 @@ impl Services for LiveServices {
         evaluate::evaluate(dataset, setup, &self.models, cx)
     }
 
+    fn patience(&self) -> Duration {
+        PATIENCE
+    }
+
     fn known_scores(&self, dataset: &Dataset, setup: &Setup) -> Result<Vec<Scores>, TaskError> {
         evaluate::known(dataset, setup, &self.models)
     }
@@ -242,6 +264,10 @@ impl Services for LiveServices {
         imprint: &DepthMap,
     ) -> Result<ContactMask, TaskError> {
         self.models.mask(bundle, engine, imprint)
+    }
+
+    fn make_case(&self, dataset: &Dataset, setup: &CaseSetup, file: &Path, cx: &JobCx) -> Result<(), TaskError> {
+        case::make(dataset, setup, &self.models, file, cx).map(drop)
     }
 
     fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {

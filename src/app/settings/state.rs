@@ -269,6 +269,8 @@ pub struct GenerateSettings {
     pub preview_every: u32,
     /// Whether both fingers are generated (the pose needs both), or only the one selected.
     pub both_fingers: bool,
+    /// Whether the pair on screen is predicted without being asked, where that costs little.
+    pub by_itself: bool,
 }
 
 impl Default for GenerateSettings {
@@ -286,6 +288,7 @@ impl Default for GenerateSettings {
             guidance: 1.0,
             preview_every: 4,
             both_fingers: true,
+            by_itself: true,
         }
     }
 }

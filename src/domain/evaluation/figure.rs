@@ -74,7 +74,7 @@ impl Figure {
                 "Against the measured imprint, dB; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed"
             }
             Self::Ssim => "Structural similarity; range 22.5 mm, or both scaled to 0..1 where the scale is assumed",
-            Self::Rms => "Root mean square error against the measured imprint, mm",
+            Self::Rms => "Root mean square error of all fingers against the measured imprints, mm",
             Self::PsnrNoiseFree => "Against the simulator's imprint without camera noise, dB",
             Self::SsimNoiseFree => {
                 "Against the simulator's imprint without camera noise; range of the tool's predictions"

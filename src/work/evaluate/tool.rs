@@ -51,8 +51,13 @@ struct Pending {
     failed: bool,
 }
 
+/// A grasp with what a method made of it, its masks, and why some are not of the source that was asked.
+type Masked<'a> = (&'a Case, Made, PerPad<Mask>, Vec<(String, usize)>);
+
 /// The grasps of one tool, by method.
-pub(super) struct Tool {
+pub(super) struct Tool<'a> {
+    /// What is known of them.
+    book: &'a Kept,
     /// Its pattern's name.
     pattern: Option<String>,
     /// Whether its CAD model could not be used: what is scored without it is not kept.
@@ -62,9 +67,9 @@ pub(super) struct Tool {
     pending: BTreeMap<usize, Vec<Pending>>,
 }
 
-impl Tool {
+impl<'a> Tool<'a> {
     /// Reads the CAD model, if there is anything to score.
-    pub(super) fn new(dataset: &Dataset, work: &ToolWork, skipped: &mut Vec<Skipped>) -> Self {
+    pub(super) fn new(dataset: &Dataset, work: &ToolWork, book: &'a Kept, skipped: &mut Vec<Skipped>) -> Self {
         let tool = &work.tool;
         let model = tool.as_deref().filter(|_| !work.ids.is_empty()).and_then(|name| {
             let skip = |err: TaskError| {
@@ -75,7 +80,7 @@ impl Tool {
         });
         let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
         let broken = tool.is_some() && !work.ids.is_empty() && model.is_none();
-        Self { pattern, broken, model, class: None, pending: BTreeMap::new() }
+        Self { book, pattern, broken, model, class: None, pending: BTreeMap::new() }
     }
 
     /// Takes some of its grasps through every method that they are not known by. `say` is told which.
@@ -84,7 +89,6 @@ impl Tool {
         cases: &[Case],
         setup: &Setup,
         models: &mut Models,
-        book: &Kept,
         skipped: &mut Vec<Skipped>,
         cx: &JobCx,
         say: &mut dyn FnMut(&str),
@@ -96,14 +100,14 @@ impl Tool {
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
             let upper = matches!(method, Method::Measured);
-            let cases: Vec<&Case> = cases.iter().filter(|case| !book.has(at, case.id)).collect();
+            let cases: Vec<&Case> = cases.iter().filter(|case| !self.book.has(at, case.id)).collect();
             let Some(made) = method.make(&cases, setup, cx) else { return };
             let mut failed: BTreeSet<PairId> = BTreeSet::new();
             let mut skip = |case: &Case, why: String| {
                 failed.insert(case.id);
                 skipped.push(Skipped { what: case.name.clone(), method: method.name().to_owned(), why });
             };
-            let mut kept: Vec<(&Case, Made, PerPad<Mask>, Vec<(String, usize)>)> = Vec::new();
+            let mut kept: Vec<Masked<'_>> = Vec::new();
             for (case, made) in cases.into_iter().zip(made) {
                 let made = match made {
                     Ok(made) => made,
@@ -203,7 +207,6 @@ impl Tool {
     /// order. What is new is kept in the book.
     pub(super) fn finish(
         mut self,
-        book: &Kept,
         ids: &[PairId],
         again: &mut dyn FnMut(usize, &[PairId]) -> Vec<Again>,
         scores: &mut [Scores],
@@ -211,9 +214,9 @@ impl Tool {
     ) -> Vec<(usize, Entry)> {
         let mut measured_features = Vec::new();
         let mut all = Vec::new();
-        for at in 0..scores.len() {
+        for (at, scores) in scores.iter_mut().enumerate() {
             let pending = self.pending.remove(&at).unwrap_or_default();
-            let known = book.of(at, ids);
+            let known = self.book.of(at, ids);
             let spans = known.iter().flat_map(|(_, entry)| entry.spans.iter().copied().flatten());
             let range = width(pending.iter().flat_map(|p| &p.images).filter_map(|i| span(&i.prediction)).chain(spans));
             let (mut kept, stale): (Vec<_>, Vec<_>) =
@@ -226,10 +229,10 @@ impl Tool {
                 match one {
                     Ok((one, true)) => kept.push(one),
                     Ok((one, false)) => fresh.push(one),
-                    Err((what, why)) => skipped.push(Skipped { what, method: scores[at].method.clone(), why }),
+                    Err((what, why)) => skipped.push(Skipped { what, method: scores.method.clone(), why }),
                 }
             }
-            book.put(at, &fresh);
+            self.book.put(at, &fresh);
             kept.append(&mut fresh);
             let place: BTreeMap<PairId, usize> = ids.iter().copied().zip(0..).collect();
             kept.sort_by_key(|(id, _)| place.get(id));
@@ -241,9 +244,9 @@ impl Tool {
                     .filter(|(_, f)| !f.is_empty())
                     .collect();
             } else if !kept.is_empty() {
-                scores[at].measured_features.extend(measured_features.iter().cloned());
+                scores.measured_features.extend(measured_features.iter().cloned());
             }
-            scores[at].grasps.extend(kept.iter().map(|(_, entry)| entry.score.clone()));
+            scores.grasps.extend(kept.iter().map(|(_, entry)| entry.score.clone()));
             all.extend(kept.into_iter().map(|(_, entry)| (at, entry)));
         }
         all
