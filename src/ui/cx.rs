@@ -1,9 +1,10 @@
 //! What every pane gets: the state to read, a list to put commands on, and what panes share.
 
+use std::collections::BTreeMap;
+
 use eframe::egui::{self, Response, Ui};
 
 use super::dialogs::Dialogs;
-use super::log::Notes;
 use super::saved::Saved;
 use super::scene_view::Device;
 use super::theme::Palette;
@@ -12,6 +13,7 @@ use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
+use crate::domain::dataset::PairId;
 
 /// What a pane may use while it is drawn.
 pub(super) struct Cx<'a> {
@@ -66,8 +68,8 @@ pub(super) struct Shared {
     pub hover_claimed: bool,
     /// When labels were last written.
     pub saved: Saved,
-    /// When notes came on the screen.
-    pub notes: Notes,
+    /// When notes of the log came on the screen, by number: seconds of the window's clock, and the pair that was shown.
+    pub notes: BTreeMap<u64, (f64, Option<PairId>)>,
 }
 
 impl Shared {
@@ -79,7 +81,7 @@ impl Shared {
             readout: None,
             hover_claimed: false,
             saved: Saved::default(),
-            notes: Notes::default(),
+            notes: BTreeMap::new(),
         }
     }
 }

@@ -220,7 +220,9 @@ impl Plugin for Kept {
             let shown = Callback::new_paint_callback(whole, Shown(picture));
             output.shapes.push(ClippedShape::new(whole, Shape::Callback(shown)));
         }
-        for id in output.textures_delta.free.drain() {
+        let mut freed: Vec<_> = output.textures_delta.free.drain().collect();
+        freed.sort();
+        for id in freed {
             // Its version stays: the name may be given again.
             self.sheet.free(key(id));
         }

@@ -1,6 +1,5 @@
 //! What happened: the log pane, and the notices that appear once.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
@@ -10,7 +9,6 @@ use super::cx::Cx;
 use super::theme::{Palette, SMALL, caption};
 use crate::app::command::{Pane, TasksCommand};
 use crate::app::tasks::{Entry, Level};
-use crate::domain::dataset::PairId;
 
 /// Notices on screen at once.
 const MOST: usize = 3;
@@ -72,17 +70,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// When notes came on the screen, by number: seconds of the window's clock, and the pair that was shown.
-#[derive(Debug, Default)]
-pub(super) struct Notes {
-    came: BTreeMap<u64, (f64, Option<PairId>)>,
-}
-
 /// Warnings, errors and what was saved, as far as they were not seen yet: lines above the status bar, over nothing.
 /// All but errors go by themselves, after a while or with their pair.
 pub(super) fn notices(cx: &mut Cx<'_>, ui: &mut Ui) {
     let (state, now) = (cx.state, ui.input(|i| i.time));
-    let came = &mut cx.shared.notes.came;
+    let came = &mut cx.shared.notes;
     let mut unseen = Vec::new();
     for entry in state.log.unseen().filter(|e| e.level >= Level::Warning || e.place.is_some()) {
         let (since, pair) = *came.entry(entry.number).or_insert((now, state.selection.pair));

@@ -19,6 +19,13 @@ fn state(rig: &Rig) -> &State {
     rig.harness.state().state()
 }
 
+/// Notes that go by themselves are gone, and the panes are as high as they stay.
+fn quiet(rig: &mut Rig) {
+    for _ in 0..60 {
+        rig.harness.step();
+    }
+}
+
 #[test]
 fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
     let Some(mut rig) = Rig::new(SIZE, 3) else { return };
@@ -27,6 +34,7 @@ fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
     rig.send(LibraryCommand::Step(4));
     rig.send(ViewCommand::SelectFinger(lab::LEFT));
     rig.send(ViewCommand::ShowBothFingers(false));
+    quiet(&mut rig);
     let center = rig.harness.get_by_label("3D view, measured").rect().center();
     rig.harness.hover_at(center);
     rig.harness.step();
@@ -42,6 +50,7 @@ fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
     rig.settle();
 
     rig.restart(SIZE);
+    quiet(&mut rig);
     assert_eq!(state(&rig).pair_name(), pair);
     assert_eq!(state(&rig).selection.finger, lab::LEFT);
     assert!(!state(&rig).selection.both_fingers);
@@ -92,9 +101,7 @@ fn notes_cover_nothing_and_only_errors_stay() {
     rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
     let dismiss = |rig: &Rig| rig.harness.query_all_by_label("Dismiss").next().map(|button| button.rect());
     // That there is no mask model is a warning: it goes by itself, and stays in the log.
-    for _ in 0..60 {
-        rig.harness.step();
-    }
+    quiet(&mut rig);
     assert!(state(&rig).log.unseen().any(|entry| entry.level == Level::Warning));
     assert!(dismiss(&rig).is_none());
     rig.send(TasksCommand::Report(TaskError::new("Read the cup", "the handle is missing")));

@@ -99,7 +99,7 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
         let mut offer = |name, tip: &str| {
             let place = inner.with_min_x(inner.right() - 92.0);
             inner.set_right(place.left() - 4.0);
-            let button = Button::new(RichText::new(name).size(SMALL)).min_size(vec2(88.0, 16.0));
+            let button = Button::new(RichText::new(name).size(SMALL)).small().min_size(vec2(88.0, 16.0));
             ui.put(place, button).on_hover_text(tip).clicked()
         };
         if offer("Open in Label", "The mask can be corrected there, or another source chosen") {
