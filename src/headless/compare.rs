@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::args::{DatasetArgs, JsonArgs, keyed};
 use super::contact_mask::{MaskArgs, labels_of};
-use super::ledger::colored;
+use super::ledger::write_colored;
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Output, ToolArgs, VerbResult, seeds};
@@ -23,7 +23,7 @@ use crate::domain::rig::{PadId, PerPad, Text};
 use crate::domain::sample::Sample;
 use crate::domain::units::{fixed, mm};
 use crate::io::dataset::Dataset;
-use crate::io::{images, npz};
+use crate::io::npz;
 use crate::work::compare::{Comparison, Depicted, beside, between, tile_of};
 use crate::work::imprint;
 use crate::work::job::JobCx;
@@ -287,10 +287,9 @@ fn apart(a: &PoseResult, b: &PoseResult) -> Poses {
 fn write(out: &Path, finger: &str, error: &DepthMap) -> anyhow::Result<()> {
     std::fs::create_dir_all(out)
         .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;
-    let colored = colored(error, ColorMap::Diverging, Range::symmetric(DIFFERENCE_M));
     npz::write_npy(&out.join(format!("a-minus-b-{finger}.npy")), error)?;
-    images::write_rgb8(&out.join(format!("a-minus-b-{finger}.png")), &colored)?;
-    Ok(())
+    let range = Range::symmetric(DIFFERENCE_M);
+    write_colored(&out.join(format!("a-minus-b-{finger}.png")), error, ColorMap::Diverging, range)
 }
 
 fn text(report: &Report) -> String {

@@ -1,6 +1,6 @@
 //! `touch2touch ledger`: everything between a decoder's picture and meters, for one touch.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -10,10 +10,11 @@ use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::domain::ambiguity::{Ambiguity, ambiguity};
-use crate::domain::colormap::{ColorMap, NAN_COLOR, Range};
+use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::findings::Finding;
-use crate::domain::grid::{DepthMap, Grid, RgbGrid};
+use crate::domain::grid::DepthMap;
 use crate::domain::metrics::Line;
+use crate::domain::picture::colored;
 use crate::domain::postprocess::{ChainReading, Flag, Histogram, Ledger, Orientation, Stats};
 use crate::domain::rig::{PadId, Text};
 use crate::domain::units::{fixed, mm};
@@ -181,34 +182,26 @@ fn stage(record: &crate::domain::postprocess::StageRecord) -> StageReport {
 }
 
 /// `01-decoder-channel-1.png` and so on: colors over the stage's own range; NaN is gray.
-fn pictures(out: &std::path::Path, ledger: &Ledger) -> anyhow::Result<()> {
+fn pictures(out: &Path, ledger: &Ledger) -> anyhow::Result<()> {
     for (i, record) in ledger.stages.iter().enumerate() {
         let range = Range { lo: record.stats.min as f32, hi: record.stats.max as f32 };
         let name = record.stage.name().to_lowercase().replace(' ', "-");
-        images::write_rgb8(
-            &out.join(format!("{:02}-{name}.png", i + 1)),
-            &colored(&record.image, ColorMap::Viridis, range),
-        )?;
+        write_colored(&out.join(format!("{:02}-{name}.png", i + 1)), &record.image, ColorMap::Viridis, range)?;
     }
     if let Some(against) = &ledger.against {
         let counts = &against.joint.counts;
         let most = counts.as_slice().iter().copied().max().unwrap_or(1).max(1);
         // Roots, so that the few deep pixels are seen beside the many shallow ones; prediction upwards.
         let shares: DepthMap = counts.map(|&c| (f64::from(c) / f64::from(most)).powf(0.25) as f32).rows_reversed();
-        images::write_rgb8(
-            &out.join("joint-histogram.png"),
-            &colored(&shares, ColorMap::Viridis, Range { lo: 0.0, hi: 1.0 }),
-        )?;
+        let whole = Range { lo: 0.0, hi: 1.0 };
+        write_colored(&out.join("joint-histogram.png"), &shares, ColorMap::Viridis, whole)?;
     }
     Ok(())
 }
 
-/// An image in the colors of a map; NaN is gray.
-pub(super) fn colored(image: &DepthMap, map: ColorMap, range: Range) -> RgbGrid {
-    Grid::from_fn(image.width(), image.height(), |x, y| {
-        let v = image[(x, y)];
-        if v.is_finite() { map.rgb8(range.unit(v)).map(f32::from) } else { NAN_COLOR.map(|c| 255.0 * c) }
-    })
+/// Writes an image in the colors of a map; NaN is gray.
+pub(super) fn write_colored(file: &Path, image: &DepthMap, map: ColorMap, range: Range) -> anyhow::Result<()> {
+    Ok(images::write_rgb8(file, &colored(image, map, range).map(|pixel| pixel.map(f32::from)))?)
 }
 
 fn text(report: &Report) -> String {

@@ -9,9 +9,9 @@ use eframe::egui::{
 };
 use strum::{EnumIter, IntoEnumIterator as _};
 
-use super::browser::cut_in_the_middle;
 use super::cx::Cx;
 use super::theme::{SMALL, caption};
+use super::widget::cut::cut_in_the_middle;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};

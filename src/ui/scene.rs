@@ -272,6 +272,14 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
     if ui.input(|i| i.pointer.delta() == egui::Vec2::ZERO) || output.moved {
         // At rest, or while the view turns, the mark stays where it is.
         cx.shared.hover_claimed = true;
+        let marked = cx.state.selection.hover.filter(|_| cx.state.selection.hover_point.is_some());
+        let found = marked.and_then(|hover| {
+            let [x, y] = hover.at_px.map(|v| v.round().max(0.0) as usize);
+            Some((hover.finger, clouds.finger(hover.finger)?.at_pixel(x, y)?))
+        });
+        if let Some((finger, index)) = found {
+            say(cx, source, finger, index, clouds);
+        }
         return;
     }
     let camera = &memory.views[source as usize].camera;
@@ -291,6 +299,16 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
         cx.push(ViewCommand::HoverPixel(hover));
         cx.push(ViewCommand::HoverPoint(Some(point)));
     }
+    say(cx, source, finger, index, clouds);
+}
+
+/// What the status bar says of a point.
+fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) {
+    let cloud = clouds.finger(finger);
+    let Some((point, pixel)) = cloud.and_then(|cloud| Some((*cloud.points.get(index)?, *cloud.pixels.get(index)?)))
+    else {
+        return;
+    };
     let off = distance_at(cx, source, finger, index, clouds);
     let off = off.map_or(String::new(), |off| format!("   {} from the model", units::text_mm(off)));
     cx.shared.readout = Some(format!(

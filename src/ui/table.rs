@@ -4,9 +4,10 @@ use eframe::egui::{
     self, Align2, Color32, FontId, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2,
 };
 
-use super::browser::{cut_in_the_middle, predict_all, review_color, score_color};
+use super::browser::{predict_all, review_color, score_color};
 use super::cx::Cx;
 use super::theme::{SMALL, medium};
+use super::widget::cut::cut_in_the_middle;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};

@@ -3,6 +3,7 @@
 pub mod brush_cursor;
 pub mod colorbar;
 pub mod curves;
+pub mod cut;
 pub mod empty;
 pub mod help;
 pub mod image_canvas;

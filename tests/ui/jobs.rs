@@ -59,7 +59,7 @@ fn two_models_are_compared_on_the_pair_on_screen() {
     let other = models.into_iter().find(|name| *name != shown).expect("a second generator");
     person.click("Compare");
     person.click("B: Measured");
-    person.click("as in Generate");
+    person.click("Model of this prediction");
     person.click(&other);
     let versus = person.state().versus();
     assert_eq!(versus.a, Subject::shown());

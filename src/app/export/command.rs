@@ -96,6 +96,12 @@ impl State {
                 self.model_words(words.option("--seeds", self.seeds.count))
             }
             (Pane::Ledger, _) => self.model_words(of_pair("ledger")?.option("--finger", &finger)),
+            (Pane::Compare, _) => {
+                let versus = self.versus();
+                let words =
+                    of_pair("compare")?.option("--a", versus.a).option("--b", versus.b).option("--engine", engine);
+                self.model_words(self.mask_words(words))
+            }
             (Pane::Masks, _) => of_pair("label")?,
             (Pane::Results | Pane::Table, _) => {
                 let mut words = verb("evaluate");

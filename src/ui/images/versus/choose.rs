@@ -9,9 +9,9 @@ use strum::IntoEnumIterator as _;
 use super::{Letter, color};
 use crate::app::settings::{STEPS, Versus};
 use crate::domain::postprocess::ShiftMode;
-use crate::ui::browser::cut_in_the_middle;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption};
+use crate::ui::widget::cut::cut_in_the_middle;
 use crate::work::bundles::BundleKind;
 use crate::work::subject::{Mapping, SEEDS, Subject, Wish};
 
@@ -105,25 +105,28 @@ fn change(cx: &Cx<'_>, ui: &mut Ui, wish: &Wish) -> Option<Wish> {
         let rig = cx.state.rig();
         let models = cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator && b.fits(&rig));
         let named = new.bundle.clone().unwrap_or(AS_SET.into());
-        ComboBox::from_id_salt("model").selected_text(cut(&named, 24)).show_ui(ui, |ui| {
+        let combo = ComboBox::from_id_salt("model").selected_text(cut(&named, 24));
+        let combo = combo.show_ui(ui, |ui| {
             ui.selectable_value(&mut new.bundle, None, AS_SET);
             for bundle in models {
                 ui.selectable_value(&mut new.bundle, Some(bundle.name.clone()), &bundle.name);
             }
         });
+        combo.response.accessible_name("Model of this prediction");
         ui.end_row();
         let generate = &cx.state.settings.generate;
         number(ui, "Seed", &mut new.seed, generate.seed, 0..=u64::from(u32::MAX));
         number(ui, "Steps", &mut new.steps, generate.steps, STEPS);
         ui.label("To meters");
         let text = new.shift.map_or(AS_SET, |mapping| mapping.mode().label());
-        ComboBox::from_id_salt("to meters").selected_text(text).show_ui(ui, |ui| {
+        let combo = ComboBox::from_id_salt("to meters").selected_text(text).show_ui(ui, |ui| {
             ui.selectable_value(&mut new.shift, None, AS_SET);
             for mapping in Mapping::iter() {
                 let mode: ShiftMode = mapping.mode();
                 ui.selectable_value(&mut new.shift, Some(mapping), mode.label());
             }
         });
+        combo.response.accessible_name("Way to meters of this prediction");
         ui.end_row();
     });
     ui.label(RichText::new("What is not chosen here is as in the Generate pane.").size(SMALL).color(cx.p.weak));
