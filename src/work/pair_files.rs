@@ -266,7 +266,8 @@ mod tests {
         let contact: Vec<DVec3> = all.iter().filter(|p| p.contact).map(|p| p.at).collect();
         assert_eq!(contact, clouds.contact_points());
         let near = all.iter().filter(|p| p.contact && p.distance.abs() < 0.003).count();
-        assert!(near * 10 > contact.len() * 8, "{near} of {}", contact.len());
+        // A threshold of 5 mm takes in membrane that hangs beside the tool: more than half touches it.
+        assert!(near * 2 > contact.len(), "{near} of {}", contact.len());
         let header = String::from_utf8_lossy(&std::fs::read(&files[0]).unwrap()[..900]).into_owned();
         assert!(header.contains("unit meters; grasp frame") && header.contains("0 = right, 1 = left"), "{header}");
 
