@@ -1,8 +1,14 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "a bench prints its table")]
-//! Time of one picture of a 3D view by number of points, still and moving: `cargo bench --bench viewer`.
+//! Time of frames: `cargo bench --features ui-test --bench viewer [-- --json FILE]`.
+//!
+//! The whole studio, painted whole and where something changed (`viewer/window.rs`); its memory after paging; and one
+//! picture of a 3D view by number of points, still and moving. `-- frames`, `-- memory`, `-- points` runs one of them.
 //!
 //! Still = all points, moving = as many as the renderer allows while the camera moves, unchanged = the same call
 //! again: nothing may be drawn. Times include waiting for the device.
+
+#[path = "viewer/window.rs"]
+mod window;
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -45,7 +51,7 @@ fn quantile(values: &mut [f64], q: f64) -> f64 {
     values[((values.len() - 1) as f64 * q).round() as usize]
 }
 
-fn main() -> Result<(), GpuError> {
+fn main() -> Result<(), Box<dyn std::error::Error>> {
     let gpu = match Gpu::headless() {
         Ok(gpu) => gpu,
         Err(error) => {
@@ -53,15 +59,39 @@ fn main() -> Result<(), GpuError> {
             return Ok(());
         }
     };
-    let pipelines = Arc::new(Pipelines::new(&gpu)?);
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    let json = words.iter().position(|word| word == "--json").and_then(|at| words.get(at + 1));
+    let parts = ["memory", "frames", "points"];
+    let asked: Vec<&str> = parts.into_iter().filter(|part| words.iter().any(|word| word == part)).collect();
+    let mut report = serde_json::Map::new();
+    report.insert("adapter".into(), gpu.adapter.clone().into());
+    // Memory first: what the others leave behind would count.
+    for part in if asked.is_empty() { parts.to_vec() } else { asked } {
+        let found = match part {
+            "memory" => window::memory()?,
+            "frames" => window::frames()?,
+            _ => points(&gpu)?,
+        };
+        report.insert(part.into(), found);
+    }
+    if let Some(path) = json {
+        std::fs::write(path, serde_json::to_string_pretty(&report)?)?;
+    }
+    Ok(())
+}
+
+/// Prints the table of 3D pictures; returns it for the file.
+fn points(gpu: &Gpu) -> Result<serde_json::Value, GpuError> {
+    let mut rows = Vec::new();
+    let pipelines = Arc::new(Pipelines::new(gpu)?);
     println!("{}, {} x {} pixels, {FRAMES} pictures each", gpu.adapter, SIZE[0], SIZE[1]);
     println!(
-        "{:>9} {:>10} {:>16} {:>16} {:>9} {:>13}",
-        "points", "upload ms", "still ms (p95)", "moving ms (p95)", "drawn", "unchanged ms"
+        "{:>9} {:>10} {:>16} {:>16} {:>9} {:>9} {:>13}",
+        "points", "upload ms", "still ms (p95)", "moving ms (p95)", "moving/s", "drawn", "unchanged ms"
     );
     for count in [50_000, 200_000, 1_000_000] {
-        let mut renderer = SceneRenderer::new(&gpu, pipelines.clone())?;
-        let target = Target::new(&gpu, SIZE)?;
+        let mut renderer = SceneRenderer::new(gpu, pipelines.clone())?;
+        let target = Target::new(gpu, SIZE)?;
         let mut camera = Camera::default();
         let mut scene = SceneData { clouds: vec![sheet(count)], ..SceneData::default() };
         let points = scene.clouds[0].points.len();
@@ -70,7 +100,7 @@ fn main() -> Result<(), GpuError> {
         }
         let mut picture = |scene: &SceneData, camera: &Camera| -> Result<(f64, bool), GpuError> {
             let start = Instant::now();
-            let drawn = renderer.render(&gpu, scene, camera, &target)?;
+            let drawn = renderer.render(gpu, scene, camera, &target)?;
             // A device that is lost shows in the next call.
             if let Err(error) = gpu.device.poll(wgpu::PollType::wait_indefinitely()) {
                 eprintln!("waiting for the device: {error}");
@@ -86,13 +116,24 @@ fn main() -> Result<(), GpuError> {
                 camera.orbit(DVec2::new(7.0, 1.0));
                 times.push(picture(&scene, &camera)?.0);
             }
-            figures.push(format!("{:.1} ({:.1})", quantile(&mut times, 0.5), quantile(&mut times, 0.95)));
+            figures.push([quantile(&mut times, 0.5), quantile(&mut times, 0.95)]);
         }
         let (unchanged, drawn) = picture(&scene, &camera)?;
         assert!(!drawn, "a picture that did not change was drawn again");
         let budget = renderer.moving_points as usize;
         let shown = points.div_ceil(points.div_ceil(budget.max(1)).max(1));
-        println!("{points:>9} {first:>10.1} {:>16} {:>16} {shown:>9} {unchanged:>13.3}", figures[0], figures[1]);
+        let [still, moving] = [figures[0], figures[1]];
+        let text = |[half, most]: [f64; 2]| format!("{half:.1} ({most:.1})");
+        println!(
+            "{points:>9} {first:>10.1} {:>16} {:>16} {:>9.0} {shown:>9} {unchanged:>13.3}",
+            text(still),
+            text(moving),
+            1e3 / moving[0]
+        );
+        rows.push(serde_json::json!({
+            "points": points, "upload_ms": first, "still_ms": still[0], "moving_ms": moving[0],
+            "moving_fps": 1e3 / moving[0], "drawn": shown, "unchanged_ms": unchanged,
+        }));
     }
-    Ok(())
+    Ok(rows.into())
 }

@@ -20,6 +20,7 @@ pub mod pipelines;
 pub mod points;
 pub mod scene;
 pub mod shaders;
+pub mod sheet;
 pub mod target;
 pub mod view;
 

@@ -8,6 +8,7 @@ mod args;
 mod basin;
 mod bench;
 mod cache;
+mod case;
 mod compare;
 mod contact_mask;
 mod doctor;
@@ -107,6 +108,9 @@ enum Verb {
     /// Time and error of the registration engines and of the generator, side by side.
     #[command(subcommand)]
     Bench(bench::BenchVerb),
+    /// A pair with everything that its results depend on, in one file.
+    #[command(subcommand)]
+    Case(case::CaseVerb),
     /// Model bundles.
     #[command(subcommand)]
     Bundle(models::BundleVerb),
@@ -247,6 +251,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
         Some(Verb::Bench(verb)) => bench::run(&verb),
+        Some(Verb::Case(verb)) => case::run(&verb),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
         Some(Verb::Cache(args)) => cache::run(&args),
         Some(Verb::Runtime(args)) => models::runtime(&args),

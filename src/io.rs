@@ -3,6 +3,7 @@
 //! Every error names the file, what is wrong with it, and (`hint`) what to do about it.
 
 pub mod atomic;
+pub mod case_file;
 pub mod cases;
 pub mod caught;
 pub mod dataset;

@@ -19,6 +19,7 @@ mod export;
 mod fuzzy;
 mod generate;
 mod images;
+mod kept;
 mod layers;
 mod layout;
 mod ledger;
@@ -73,6 +74,8 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
             .with_min_inner_size(SMALLEST)
             .with_clamp_size_to_monitor_size(true)
             .with_drag_and_drop(true),
+        // Pictures have whole bytes: there is nothing to dither, and it costs a program that draws a third of its time.
+        dithering: false,
         ..Default::default()
     };
     let mut options = Options::new(Arc::new(LiveServices::new()), open);

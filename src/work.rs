@@ -14,6 +14,7 @@
 pub mod adapt;
 pub mod bundles;
 pub(crate) mod canvas;
+pub mod case;
 pub mod cloud;
 pub mod compare;
 pub mod deviation;

@@ -49,6 +49,7 @@ fn how(action: Action) -> How {
         // Labels are on the disk as soon as a verb ends.
         A::Save => Shell,
         A::Figure => Verb(&["figure", "demo", "--pairs", "a,b", "--panes", "measured,error", "--out", "a.svg"]),
+        A::SaveCase => Verb(&["case", "make", "demo", "--pair", "a", "--out", "a.t2tcase"]),
         A::ExportMeasured => Verb(&["export", "demo", "--pair", "a", "--out", "folder"]),
         A::ExportPredicted => Verb(&["export", "demo", "--pair", "a", "--imprint", "predicted", "--out", "folder"]),
         A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),

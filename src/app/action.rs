@@ -102,6 +102,7 @@ actions! {
     Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)];
     Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)];
     Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)];
+    SaveCase, File, "Save case…", "Writes this pair with all that its results depend on into one file, which opens to the same picture elsewhere", [];
     ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [];
     ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [];
     ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
@@ -182,10 +183,10 @@ actions! {
     RangeOnce, View, "Fit the color range once", "Sets the color range from what is shown", [plain(K::C)];
     ResetRange, View, "Reset the color range", "Sets the color range to 0 to 18 mm", [shift(K::C)];
     Fit, View, "Fit", "Fits images and 3D views to their panes", [plain(K::Num0)];
-    CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl_alt(K::Num1)];
-    CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl_alt(K::Num2)];
-    CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl_alt(K::Num3)];
-    CameraTop, View, "View from the top", "Looks along the tool", [ctrl_alt(K::Num4)];
+    CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl(K::Num1)];
+    CameraRight, View, "View from the right", "Looks along the closing axis from the right finger", [ctrl(K::Num2)];
+    CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl(K::Num3)];
+    CameraTop, View, "View from the top", "Looks along the tool", [ctrl(K::Num4)];
     NextLayer, View, "Next layer", "Goes through the layers of the 3D panes: none, residuals, reasons, distance, lines", [plain(K::V)];
     AnimateWeakest, View, "Animate weak direction", "Moves the tool to and fro by at most 2 mm and 2° in the direction that the contact determines least", [];
     BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [];
@@ -238,6 +239,52 @@ impl Action {
         )
     }
 
+    /// Other words that people look for it by, in small letters.
+    pub fn words(self) -> std::str::SplitWhitespace<'static> {
+        let text = match self {
+            Self::OpenFolder => "load directory data dataset browse file",
+            Self::OpenDemo => "example sample simulated simulator",
+            Self::Follow => "live watch camera stream",
+            Self::Reload => "refresh again",
+            Self::ExportMasks => "unet training labels npy save",
+            Self::NextWorst => "bad largest error outlier failure hardest",
+            Self::NextUnfinished => "todo open unlabeled remaining",
+            Self::FindSample => "search list find",
+            Self::Generate => "predict prediction run inference diffusion",
+            Self::RunSeeds => "ensemble uncertainty spread repeat",
+            Self::FitPairs => "adapt calibrate tune finetune train",
+            Self::EvaluateDataset => "score metrics benchmark results table",
+            Self::ExportTable => "csv markdown json save results latex",
+            Self::CancelJobs => "stop abort interrupt",
+            Self::NextShift => "depth offset gain millimeters scale",
+            Self::Refit => "statistics mean deviation shift",
+            Self::AdoptAutomatic => "use copy automatic mask",
+            Self::ResetMask => "clear delete mask",
+            Self::Undo => "revert back",
+            Self::BrushSmaller | Self::BrushLarger => "pen size radius width",
+            Self::RunPose => "retry recompute register registration icp failed",
+            Self::NextPoseEngine => "icp gicp register method algorithm",
+            Self::PoseTool => "hand gizmo drag manual move",
+            Self::MeasureDistance | Self::MeasureAngle => "ruler mm length degrees",
+            Self::LockRange | Self::RangeOnce | Self::ResetRange => "colorbar colormap scale limits minimum maximum mm",
+            Self::Fit => "zoom center home view",
+            Self::Section => "clip slice plane cross",
+            Self::EyeDome => "edl shadow",
+            Self::Parallel => "orthographic perspective camera",
+            Self::Footprint => "rectangle outline crop",
+            Self::SwitchTheme => "mode bright black white appearance",
+            Self::DepthChain => "ledger trace pipeline stages",
+            Self::Screenshot | Self::SavePane => "png picture image figure save export",
+            Self::CopyPane => "png picture image figure clipboard",
+            Self::CopyHovered => "clipboard number",
+            Self::ShortcutSheet => "keys keyboard help bindings hotkeys",
+            Self::ResetSettings => "defaults factory settings",
+            Self::ResetWorkspace => "layout panes windows default",
+            _ => "",
+        };
+        text.split_whitespace()
+    }
+
     /// Its main shortcut.
     pub fn shortcut(self) -> Option<Shortcut> {
         self.shortcuts().first().copied()
@@ -275,6 +322,7 @@ impl Action {
             }
             Self::Save => does(LabelsCommand::Save),
             Self::Figure => when(state.can_draw(), ExportCommand::Ask(!state.export.asking)),
+            Self::SaveCase => when(state.can_draw(), ExportCommand::Place(Output::Case)),
             Self::ExportMeasured => export(state, ImprintSource::Measured),
             Self::ExportPredicted => export(state, ImprintSource::Predicted),
             Self::ExportMasks => when(open, ViewCommand::Ui(UiRequest::PickExportFolder)),
@@ -311,7 +359,7 @@ impl Action {
             Self::ExportTable => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder)),
             Self::RunSeeds => {
                 let possible = state.can_generate().is_ok() && state.selection.panes.contains(&Pane::Seeds);
-                when(possible, SeedsCommand::Run(!state.seeds.running))
+                when(possible, SeedsCommand::Run(!state.seeds_running()))
             }
             Self::LockSeed => {
                 let mut generate = settings.generate.clone();

@@ -12,7 +12,7 @@ use super::services::{Followed, Opened};
 use super::settings::state::Settings;
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use super::{adapt, evaluate, follow, library, predict, settings, tasks, workbench};
+use super::{adapt, evaluate, export, follow, library, predict, settings, tasks, workbench};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::adapt::Adapted;
 use crate::work::bundles::BundleInfo;
@@ -73,13 +73,17 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             if seq == state.library.last_seq {
                 let again = library::show(state, seq, place, opened, effects);
                 follow::opened(state, again, effects);
+                export::opened(state, effects);
             }
         }
         Answer::Followed(seq, followed) => {
             let current = is_open(state, seq);
             follow::arrived(state, followed, current, effects);
         }
-        Answer::Bundles(bundles, problems) => library::found(state, bundles, problems),
+        Answer::Bundles(bundles, problems) => {
+            library::found(state, bundles, problems);
+            export::predict_case(state, effects);
+        }
         Answer::SettingsLoaded(settings, problem) => {
             state.settings = settings.validated();
             if let Some(problem) = problem {

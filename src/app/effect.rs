@@ -15,6 +15,7 @@ use super::view::state::UiRequest;
 use crate::domain::sample::Sample;
 use crate::work::adapt::AdaptSetup;
 use crate::work::bundles::BundleInfo;
+use crate::work::case::CaseSetup;
 use crate::work::evaluate::{Evaluation, Setup};
 use crate::work::figure::FigureSetup;
 
@@ -139,6 +140,17 @@ pub enum Effect {
         /// Where to.
         folder: PathBuf,
     },
+    /// Write a case.
+    SaveCase {
+        /// The job.
+        ticket: Ticket,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// What goes into it.
+        setup: Box<CaseSetup>,
+        /// Where to.
+        file: PathBuf,
+    },
     /// Show a file or folder in the system's own window.
     Reveal(PathBuf),
     /// Something only the window can do.
@@ -162,6 +174,7 @@ impl std::fmt::Debug for Effect {
             Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),
             Self::Figure { setup, file, .. } => write!(f, "Figure({:?}, {})", setup.pairs, file.display()),
             Self::ExportPair { folder, .. } => write!(f, "ExportPair({})", folder.display()),
+            Self::SaveCase { file, .. } => write!(f, "SaveCase({})", file.display()),
             Self::Reveal(place) => write!(f, "Reveal({})", place.display()),
             Self::Ui(request) => write!(f, "Ui({request:?})"),
         }

@@ -3,13 +3,16 @@
 mod command;
 pub mod state;
 
-pub use state::{ExportState, FigureForm, MOST_PAIRS, Output, PairExport, SCALES};
+pub use state::{CaseView, ExportState, FigureForm, MOST_PAIRS, Output, PairExport, SCALES};
 
 use std::path::PathBuf;
 
 use super::effect::Effect;
+use super::settings::state::{GenerateSettings, Settings};
 use super::state::State;
 use super::view::state::UiRequest;
+use super::{library, predict, settings};
+use crate::io::case_file;
 use crate::work::error::TaskError;
 use crate::work::figure::FigureSetup;
 
@@ -24,6 +27,8 @@ pub enum ExportCommand {
     Place(Output),
     /// Writes it.
     Write(Output, PathBuf),
+    /// Writes a case of the selected pair; the text is where 3D views look from.
+    WriteCase(PathBuf, String),
 }
 
 pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<Effect>) {
@@ -31,7 +36,76 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
         ExportCommand::Ask(asking) => state.export.asking = asking,
         ExportCommand::SetForm(form) => state.export.form = form.validated(),
         ExportCommand::Place(output) => effects.push(Effect::Ui(UiRequest::PickOutput(output))),
+        ExportCommand::WriteCase(file, camera) => {
+            let (Some(setup), Some(open)) = (state.case_setup(&camera), &state.library.open) else { return };
+            let source = open.source.clone();
+            let ticket = state.tasks.start("Save the case".into(), Vec::new());
+            let file = ended(file, case_file::ENDING);
+            effects.push(Effect::SaveCase { ticket, source, setup: Box::new(setup), file });
+        }
+        ExportCommand::Write(Output::Case, file) => {
+            step(state, ExportCommand::WriteCase(file, String::new()), effects);
+        }
         ExportCommand::Write(output, file) => write(state, output, file, effects),
+    }
+}
+
+/// Where a case was opened: shows its pair as it was shown when it was made, and has it predicted again.
+pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
+    state.export.predict = false;
+    let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
+    let Some((pair, case)) = source.case() else { return };
+    let now = state.settings.clone();
+    let view = case.view.clone().and_then(|view| serde_json::from_value::<CaseView>(view).ok());
+    if let Some(view) = &view {
+        // What is of the person and the machine stays as it is.
+        let settings = Settings {
+            theme: now.theme,
+            ui_zoom: now.ui_zoom,
+            recent: now.recent,
+            bundle_folders: now.bundle_folders,
+            cache_mib: now.cache_mib,
+            hint_dismissed: now.hint_dismissed,
+            ..view.settings.clone()
+        };
+        state.settings = settings.validated();
+        state.selection.both_fingers = view.both_fingers;
+        if state.rig().pads().any(|pad| pad == view.finger) {
+            state.selection.finger = view.finger;
+        }
+    }
+    let recipe = &case.recipe;
+    state.settings.shift = recipe.shift;
+    state.settings.mask.choice = recipe.mask;
+    state.settings.pose_engine = recipe.engine;
+    state.settings.runtime = recipe.runtime;
+    if let Some((model, config)) = &recipe.generator {
+        state.settings.generate = GenerateSettings {
+            bundle: Some(model.name.clone()),
+            preset: None,
+            steps: config.steps,
+            seed: config.seed,
+            sampler: config.sampler,
+            eta: config.eta as f32,
+            spacing: config.spacing,
+            guidance: config.guidance as f32,
+            ..state.settings.generate.clone()
+        };
+        state.export.predict = true;
+    }
+    state.settings = state.settings.clone().validated();
+    settings::save(state, effects);
+    library::select(state, pair, effects);
+    effects.push(Effect::Ui(UiRequest::ShowView(view.map_or_else(String::new, |view| view.camera))));
+    state.log.info(format!("A case of {}, with the preferences that it was saved with", case.dataset));
+    predict_case(state, effects);
+}
+
+/// Predicts what an opened case showed, as soon as there is a generator.
+pub(super) fn predict_case(state: &mut State, effects: &mut Vec<Effect>) {
+    if state.export.predict && state.can_generate().is_ok() {
+        state.export.predict = false;
+        predict::same_seed(state, effects);
     }
 }
 
@@ -42,6 +116,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let setup = state.figure_setup();
             draw(state, "Draw the figure", setup, ended(file, "png"), effects);
         }
+        Output::Case => {}
         Output::Pair(source) => {
             let Some(pair) = state.pair_export(source) else {
                 let err = TaskError::new("Export the pair", format!("there is no {} cloud of it", source.key()));

@@ -20,6 +20,7 @@ use super::state::State;
 use super::tasks::state::Level;
 use super::{inspect, labels, settings, tasks};
 use crate::domain::dataset::PairId;
+use crate::domain::rig::PadId;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
 
@@ -225,6 +226,9 @@ pub(super) fn show(
     tasks::cancel_all(state, effects);
     let before = state.entry().map(|entry| entry.name.clone());
     let same_place = state.library.open.as_ref().is_some_and(|open| open.place == place);
+    // The first opening of a run goes on where the last run ended.
+    let last = state.settings.last.clone();
+    let resumed = state.library.open.is_none() && last.place.as_ref() == Some(&place);
     state.results = Results::default();
     state.table.result = None;
     state.table.scores = Arc::default();
@@ -244,7 +248,12 @@ pub(super) fn show(
         state.library.rows = 0..0;
     }
     state.reorder();
-    let kept = before.filter(|_| same_place).and_then(|name| {
+    if resumed {
+        let pads = opened.source.rig().pads().len();
+        state.selection.finger = PadId::new(last.finger.min(pads.saturating_sub(1)));
+        state.selection.both_fingers = last.both_fingers;
+    }
+    let kept = before.filter(|_| same_place).or(resumed.then_some(last.pair)).and_then(|name| {
         let at = opened.source.index().pairs.iter().position(|entry| entry.name == name)?;
         u32::try_from(at).ok().map(PairId)
     });

@@ -90,12 +90,12 @@ fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
     effects.push(Effect::Generate { ticket, recipes, bundle, source, sample });
 }
 
-/// The seed after `seed`: scattered, so that neighbors share nothing, and short enough to be read out.
+/// The seed after `seed`: scattered, so that neighbors share nothing, and of at most six digits, to be read out.
 ///
-/// Source: the finaliser of SplitMix64 (Steele et al. 2014), cut to 32 bits.
+/// Source: the finaliser of SplitMix64 (Steele et al. 2014).
 fn next_seed(seed: u64) -> u64 {
     let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (z ^ (z >> 31)) >> 32
+    (z ^ (z >> 31)) % 1_000_000
 }

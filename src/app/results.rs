@@ -159,6 +159,16 @@ macro_rules! results {
             }
         }
 
+        impl Results {
+            /// Bytes that the caches hold now.
+            pub fn bytes(&self) -> usize {
+                0 $( $( + self.$cache.bytes() )? )*
+            }
+
+            /// Bytes that the caches may hold together.
+            pub const BUDGET: usize = 0 $( $( + $budget )? )*;
+        }
+
         impl Request {
             /// Its job; `None` if an input is not there (any more).
             pub(super) fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Computed>> {
@@ -207,7 +217,7 @@ macro_rules! results {
 
 results! {
     /// The tensors of a pair: about 10 MB of a lab pair (two GelSlim images and their difference, per finger).
-    Sample(PairKey) in samples, 384 * MIB;
+    Sample(PairKey) in samples, 192 * MIB;
     /// The labels stored for a pair: they go to the document.
     Labels(labels::LabelsKey);
     /// The CAD model of a tool and what the registration derives from it.

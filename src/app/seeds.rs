@@ -11,13 +11,17 @@ use super::state::State;
 pub enum SeedsCommand {
     /// How many; limited to [`COUNT`].
     Count(usize),
-    /// Makes those that are missing, or stops.
+    /// Makes those that are missing for the pair on screen, or stops.
     Run(bool),
+    /// Whether they are made for every pair that is shown.
+    EveryPair(bool),
 }
 
 pub(super) fn step(state: &mut State, command: SeedsCommand) {
     match command {
         SeedsCommand::Count(count) => state.seeds.count = count.clamp(*COUNT.start(), *COUNT.end()),
-        SeedsCommand::Run(running) => state.seeds.running = running,
+        SeedsCommand::Run(true) => state.seeds.asked = state.seeds_of(),
+        SeedsCommand::Run(false) => (state.seeds.asked, state.seeds.every) = (None, false),
+        SeedsCommand::EveryPair(every) => state.seeds.every = every,
     }
 }

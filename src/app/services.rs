@@ -26,6 +26,7 @@ use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
 use crate::work::adapt::{self, AdaptSetup, Adapted};
 use crate::work::bundles::BundleInfo;
+use crate::work::case::{self, Case, CaseSetup};
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::job::JobCx;
@@ -40,6 +41,10 @@ pub trait DataSource: Send + Sync {
     fn root(&self) -> Option<&Path>;
     /// The same as the command line sees it, for work on all of its pairs; `None` where there is no such thing.
     fn as_dataset(&self) -> Option<&Dataset> {
+        None
+    }
+    /// The case that it is, with its pair, if it was opened from one.
+    fn case(&self) -> Option<(PairId, &Case)> {
         None
     }
     /// The sensors that its touches were felt with.
@@ -214,6 +219,14 @@ pub trait Services: Send + Sync {
     /// How long a pair stays on screen before it is predicted without being asked for.
     fn patience(&self) -> Duration {
         Duration::ZERO
+    }
+
+    /// Makes a case of a pair and writes it.
+    ///
+    /// # Errors
+    /// As [`case::make`].
+    fn make_case(&self, dataset: &Dataset, setup: &CaseSetup, file: &Path, cx: &JobCx) -> Result<(), TaskError> {
+        case::make(dataset, setup, &Models::new(None), file, cx).map(drop)
     }
 
     /// The stored settings (defaults where there are none), and what was wrong if they were set aside.

@@ -5,7 +5,7 @@ pub mod state;
 pub use state::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
 pub use state::versus::{Versus, VersusMode};
 pub use state::{
-    BRUSH_RADIUS_PX, ColorMap, ColorRange, GenerateSettings, MAX_CACHE_MIB, MAX_RECENT, MaskChoice, MaskSettings,
+    BRUSH_RADIUS_PX, ColorMap, ColorRange, GenerateSettings, Last, MAX_CACHE_MIB, MAX_RECENT, MaskChoice, MaskSettings,
     MaskSource, MaskTool, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
 };
 
@@ -65,6 +65,8 @@ pub enum SettingsCommand {
     SetWorkspace(Workspace),
     /// The arrangement of the panes of a workspace, in the window's format.
     SetLayout(Workspace, String),
+    /// What is on screen as the window is closed.
+    Remember(Last),
     /// The hint of the first start is not shown again.
     DismissHint,
     /// All preferences back to their defaults; recent places stay.
@@ -114,6 +116,7 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
         SettingsCommand::SetLayout(workspace, layout) => {
             settings.layouts.insert(workspace.name().to_owned(), layout);
         }
+        SettingsCommand::Remember(last) => settings.last = last,
         SettingsCommand::DismissHint => settings.hint_dismissed = true,
         SettingsCommand::ResetSettings => {
             let recent = std::mem::take(&mut settings.recent);

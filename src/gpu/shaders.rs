@@ -17,6 +17,7 @@ pub const SHADERS: &[(&str, &str)] = &[
     ("lines.wgsl", include_str!("../../shaders/lines.wgsl")),
     ("mesh.wgsl", include_str!("../../shaders/mesh.wgsl")),
     ("points.wgsl", include_str!("../../shaders/points.wgsl")),
+    ("sheet.wgsl", include_str!("../../shaders/sheet.wgsl")),
 ];
 
 /// A shader text that cannot be used.

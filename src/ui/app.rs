@@ -12,6 +12,7 @@ use strum::IntoEnumIterator as _;
 
 use super::cx::{Cx, Shared};
 use super::dialogs::Purpose;
+use super::kept::Kept;
 use super::pane::{Docking, Panes};
 use super::scene_view::Device;
 use super::screenshot::Shot;
@@ -23,12 +24,13 @@ use crate::app::command::{
     ViewCommand,
 };
 use crate::app::evaluate::EvaluateCommand;
+use crate::app::export::Output;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
 use crate::app::pane::Kind;
 use crate::app::runtime::Runtime;
 use crate::app::services::SharedServices;
-use crate::app::settings::{Theme, Workspace};
+use crate::app::settings::{Last, Theme, Workspace};
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
 use crate::domain::rig::SensorKind;
@@ -48,12 +50,22 @@ pub struct Options {
     pub reset: bool,
     /// Where pictures are written; `None` = the user's folder for pictures.
     pub screenshots: Option<PathBuf>,
+    /// Whether every frame is painted whole even where a program draws (for measuring what [`super::kept`] saves).
+    pub whole_frames: bool,
 }
 
 impl Options {
     /// The usual ones.
     pub fn new(services: SharedServices, open: Option<PathBuf>) -> Self {
-        Self { services, open, inline: false, native_dialogs: true, reset: false, screenshots: None }
+        Self {
+            services,
+            open,
+            inline: false,
+            native_dialogs: true,
+            reset: false,
+            screenshots: None,
+            whole_frames: false,
+        }
     }
 }
 
@@ -71,6 +83,8 @@ pub struct StudioApp {
     device: Result<Device, String>,
     inline: bool,
     first_prediction: bool,
+    /// Whether cameras and the large pane of the last run were looked for.
+    resumed: bool,
     applied_theme: Option<Theme>,
     applied_zoom: f32,
     folder: Option<PathBuf>,
@@ -89,6 +103,11 @@ impl StudioApp {
         };
         if let Err(why) = &device {
             log::error!("No 3D views: {why}");
+        }
+        if let Some(state) = cc.wgpu_render_state.as_ref().filter(|_| !options.whole_frames)
+            && let Err(error) = Kept::install(&cc.egui_ctx, state)
+        {
+            log::error!("Every frame is painted whole: {error}");
         }
         let ctx = cc.egui_ctx.clone();
         let (shot_sender, shots) = channel();
@@ -116,6 +135,7 @@ impl StudioApp {
             device,
             inline: options.inline,
             first_prediction: false,
+            resumed: false,
             applied_theme: None,
             applied_zoom: 1.0,
             folder: options.screenshots,
@@ -138,6 +158,11 @@ impl StudioApp {
     /// Pictures sent to the graphics card so far.
     pub fn uploads(&self) -> u64 {
         self.shared.textures.uploads
+    }
+
+    /// Pixels of the window painted so far, where only what changed is painted. For tests.
+    pub fn painted(&self, ctx: &egui::Context) -> Option<u64> {
+        ctx.with_plugin(|kept: &mut Kept| kept.painted())
     }
 
     /// Whether nothing runs, nothing waits and nothing is to be executed.
@@ -201,6 +226,7 @@ impl StudioApp {
         }
         self.shared.saved.observe(&self.state.document.unsaved);
         self.first_prediction();
+        self.resume();
         let settings = &self.state.settings;
         if self.applied_theme != Some(settings.theme) {
             self.applied_theme = Some(settings.theme);
@@ -235,6 +261,31 @@ impl StudioApp {
                 self.inbox.push(Command::Predict(PredictCommand::Generate));
             }
         }
+    }
+
+    /// Once, as the first data set is there: cameras and the large pane as they were when it was last closed.
+    fn resume(&mut self) {
+        let Some(open) = self.state.library.open.as_ref().filter(|_| !self.resumed) else { return };
+        self.resumed = true;
+        let last = &self.state.settings.last;
+        if last.place.as_ref() == Some(&open.place) {
+            self.panes.memories.scene.resume(open.seq, &last.cameras);
+            self.panes.maximized = serde_json::from_str(&last.maximized).ok();
+        }
+    }
+
+    /// Keeps what is on screen for the next start; closing the window does it.
+    pub fn remember(&mut self) {
+        let state = &self.state;
+        let last = Last {
+            place: state.library.open.as_ref().map(|open| open.place.clone()),
+            pair: state.pair_name().to_owned(),
+            finger: state.selection.finger.index(),
+            both_fingers: state.selection.both_fingers,
+            cameras: self.panes.memories.scene.cameras(),
+            maximized: self.panes.maximized.and_then(|pane| serde_json::to_string(&pane).ok()).unwrap_or_default(),
+        };
+        self.inbox.push(Command::Settings(SettingsCommand::Remember(last)));
     }
 
     /// What only the window can do.
@@ -275,6 +326,11 @@ impl StudioApp {
             UiRequest::PanePicture { copied } => {
                 let part = self.panes.hovered.and_then(|pane| self.panes.places.get(&pane).copied());
                 self.shoot(ctx, part, copied);
+            }
+            UiRequest::ShowView(camera) => {
+                self.trees.clear();
+                self.panes.maximized = None;
+                self.panes.memories.scene.look_as(&camera);
             }
             UiRequest::PictureOf(pane) => {
                 if let Some(place) = self.panes.places.get(&pane).copied() {
@@ -412,6 +468,7 @@ impl eframe::App for StudioApp {
             edited = bars::top(&mut cx, ui, &mut tree);
             // Drawn before the panes, so it shows the read-out of the frame before: at rest they are the same.
             bars::bottom(&mut cx, ui, self.frame_ms);
+            log_pane::notices(&mut cx, ui);
             readout = cx.shared.readout.take();
             let frame = egui::Frame::new().fill(cx.p.frame);
             egui::CentralPanel::default().frame(frame).show(ui, |ui| match self.panes.maximized {
@@ -424,7 +481,6 @@ impl eframe::App for StudioApp {
             });
             bars::hint(&mut cx, &ctx);
             export::form(&mut cx, &ctx);
-            log_pane::notices(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::sheet(&mut cx, &ctx);
             bars::drop_overlay(&cx, &ctx);
@@ -432,6 +488,10 @@ impl eframe::App for StudioApp {
                 cx.push(match purpose {
                     Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
                     Purpose::Export => Command::Labels(LabelsCommand::ExportMasks(path)),
+                    Purpose::Output(Output::Case) => {
+                        let camera = self.panes.memories.scene.camera_text(ImprintSource::default());
+                        Command::Export(ExportCommand::WriteCase(path, camera))
+                    }
                     Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });
@@ -450,6 +510,7 @@ impl eframe::App for StudioApp {
     }
 
     fn on_exit(&mut self) {
+        self.remember();
         let commands = std::mem::take(&mut self.inbox);
         self.runtime.tick(&mut self.state, commands);
         self.runtime.tick(

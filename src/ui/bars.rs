@@ -63,6 +63,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         ui.separator();
         for action in [
+            Action::SaveCase,
             Action::Figure,
             Action::ExportMeasured,
             Action::ExportPredicted,

@@ -3,6 +3,7 @@
 use eframe::egui::{self, Response, Ui};
 
 use super::dialogs::Dialogs;
+use super::log::Notes;
 use super::saved::Saved;
 use super::scene_view::Device;
 use super::theme::Palette;
@@ -65,6 +66,8 @@ pub(super) struct Shared {
     pub hover_claimed: bool,
     /// When labels were last written.
     pub saved: Saved,
+    /// When notes came on the screen.
+    pub notes: Notes,
 }
 
 impl Shared {
@@ -76,6 +79,7 @@ impl Shared {
             readout: None,
             hover_claimed: false,
             saved: Saved::default(),
+            notes: Notes::default(),
         }
     }
 }

@@ -204,7 +204,7 @@ pub(super) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
         None if pane.is_of_pair() => &[Action::ExportMeasured, Action::ExportPredicted],
         None => &[],
     };
-    for action in [Action::Figure].iter().chain(sides).copied() {
+    for action in [Action::Figure].iter().chain(sides).chain(&[Action::SaveCase]).copied() {
         let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
         let button = egui::Button::new(action.name()).shortcut_text(keys);
         let response = ui.add_enabled(action.command(cx.state).is_some(), button).accessible_name(action.name());

@@ -12,6 +12,8 @@ use crate::domain::dataset::PairId;
 
 /// Entries shown at most: nobody reads further, and a list of 32,000 pairs stays quick.
 const MOST: usize = 60;
+/// What another word for an action counts: less than its name in one piece, more than scattered letters.
+const OTHER_WORD: i32 = 45;
 /// Height of an entry, points.
 const ROW: f32 = 28.0;
 
@@ -42,12 +44,10 @@ pub(super) fn show(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
     if !std::mem::replace(&mut memory.open, true) {
         *memory = Memory { open: true, ..Memory::default() };
     }
-    search(cx, memory);
     let area = egui::Modal::default_area(egui::Id::unique("palette")).anchor(Align2::CENTER_TOP, vec2(0.0, 72.0));
     let mut chosen = None;
     let modal = egui::Modal::new(egui::Id::unique("palette")).area(area).show(ctx, |ui| {
         ui.set_width(520.0);
-        let count = memory.found.as_ref().map_or(0, |f| f.1.len());
         let (down, up, enter) = ui.input_mut(|i| {
             (
                 i.count_and_consume_key(egui::Modifiers::NONE, Key::ArrowDown),
@@ -64,6 +64,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
         if response.changed() {
             memory.selected = 0;
         }
+        // After the text: Enter that comes with the last letter means what that letter found.
+        search(cx, memory);
+        let count = memory.found.as_ref().map_or(0, |f| f.1.len());
         let selected = (memory.selected + down).saturating_sub(up).min(count.saturating_sub(1));
         let moved = selected != memory.selected;
         memory.selected = selected;
@@ -108,7 +111,9 @@ fn search(cx: &Cx<'_>, memory: &mut Memory) {
     for action in Action::iter() {
         let name = score(&query, action.name());
         let help = score(&query, action.tooltip()).map(|s| s - 30).filter(|_| query.len() >= 3);
-        if let Some(s) = name.max(help) {
+        let word = query.trim().to_lowercase();
+        let other = action.words().filter(|w| word.len() >= 2 && w.starts_with(&word)).map(|_| OTHER_WORD).next();
+        if let Some(s) = name.max(help).max(other) {
             // Actions before samples: there are few of them.
             found.push((s + 4, Entry::Action(action)));
         }

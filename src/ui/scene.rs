@@ -65,6 +65,8 @@ pub(super) struct Memory {
     mesh: Option<SceneMesh>,
     /// Correspondences of the step that the time machine shows.
     step_lines: Option<StepLines>,
+    /// The pass in which a camera was last moved, and whose.
+    moved: Option<(u64, ImprintSource)>,
     /// Counts what was made for the renderer.
     revision: u64,
 }
@@ -89,9 +91,38 @@ impl Memory {
         }
     }
 
+    /// The cameras of both sides as text; empty where a view was not placed yet.
+    pub(super) fn cameras(&self) -> [String; 2] {
+        [ImprintSource::Measured, ImprintSource::Predicted].map(|side| match self.views[side as usize].placed {
+            true => self.camera_text(side),
+            false => String::new(),
+        })
+    }
+
+    /// Looks at a data set from where a text of [`Self::cameras`] says; what is no camera is left to be fitted.
+    pub(super) fn resume(&mut self, seq: DatasetSeq, cameras: &[String; 2]) {
+        self.fitted = Some(seq);
+        for (view, text) in self.views.iter_mut().zip(cameras) {
+            if let Some(camera) = serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid) {
+                view.camera = camera;
+                view.placed = true;
+            }
+        }
+    }
+
     /// The camera of a side, as text for the clipboard.
     pub(super) fn camera_text(&self, source: ImprintSource) -> String {
         serde_json::to_string(&self.views[source as usize].camera).unwrap_or_default()
+    }
+
+    /// Lets both sides look from where [`Self::camera_text`] says; what is no camera changes nothing.
+    pub(super) fn look_as(&mut self, text: &str) {
+        if let Some(camera) = serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid) {
+            for view in &mut self.views {
+                view.camera = camera;
+                view.placed = true;
+            }
+        }
     }
 
     /// Where a point of the grasp frame (meters) appeared when a side was last drawn.
@@ -191,9 +222,15 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         other.camera = camera;
         other.placed |= memory.clouds[1 - source as usize].is_some();
     }
-    scene.moving = output.moved;
+    // A linked camera may be drawn before the one that leads it: it moves in the next frame.
+    let pass = ui.ctx().cumulative_pass_nr();
     if output.moved {
-        // Points were thinned out while moving: draw all of them once it rests.
+        memory.moved = Some((pass, source));
+    }
+    let linked = state.settings.cameras_linked;
+    scene.moving = memory.moved.is_some_and(|(at, by)| pass <= at + 1 && (by == source || linked));
+    if scene.moving {
+        // Moving views are drawn coarsely: draw all there is once they rest.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(120));
     }
     memory.views[source as usize].draw(ui, device, &output, &scene);

@@ -8,6 +8,7 @@ use eframe::egui::{
 use eframe::egui_wgpu::RenderState;
 use glam::{DVec2, DVec3};
 
+use super::kept::Kept;
 use crate::gpu::pipelines::Pipelines;
 use crate::gpu::scene::{SceneData, SceneRenderer};
 use crate::gpu::target::Target;
@@ -140,7 +141,10 @@ impl SceneView {
     /// Brings the picture up to date and paints it. Nothing is drawn on the device when nothing changed.
     pub(super) fn draw(&mut self, ui: &Ui, device: &Device, output: &SceneOutput, scene: &SceneData) {
         match self.try_draw(device, output, scene) {
-            Ok(texture) => {
+            Ok((texture, drawn)) => {
+                if drawn && let Some(view) = self.drawn.as_ref().map(|drawn| drawn.target.view()) {
+                    ui.ctx().with_plugin(|kept: &mut Kept| kept.show(texture, view));
+                }
                 let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
                 ui.painter().image(texture, output.rect, uv, egui::Color32::WHITE);
                 self.error = None;
@@ -163,12 +167,19 @@ impl SceneView {
         }
     }
 
-    fn try_draw(&mut self, device: &Device, output: &SceneOutput, scene: &SceneData) -> Result<TextureId, GpuError> {
+    fn try_draw(
+        &mut self,
+        device: &Device,
+        output: &SceneOutput,
+        scene: &SceneData,
+    ) -> Result<(TextureId, bool), GpuError> {
         let gpu = &device.gpu;
+        // A program that draws gets a quarter of the pixels to do while the camera moves.
+        let size = if scene.moving && gpu.software { output.size.map(|s| s.div_ceil(2)) } else { output.size };
         let drawn = match &mut self.drawn {
             Some(drawn) => drawn,
             None => {
-                let target = Target::new(gpu, output.size)?;
+                let target = Target::new(gpu, size)?;
                 let renderer = SceneRenderer::new(gpu, device.pipelines.clone())?;
                 let texture = device.state.renderer.write().register_native_texture(
                     &gpu.device,
@@ -179,7 +190,7 @@ impl SceneView {
                 self.drawn.insert(Drawn { target, renderer, texture, generation })
             }
         };
-        drawn.target.resize(gpu, output.size)?;
+        drawn.target.resize(gpu, size)?;
         if drawn.target.generation() != drawn.generation {
             drawn.generation = drawn.target.generation();
             device.state.renderer.write().update_egui_texture_from_wgpu_texture(
@@ -189,7 +200,7 @@ impl SceneView {
                 drawn.texture,
             );
         }
-        drawn.renderer.render(gpu, scene, &self.camera, &drawn.target)?;
-        Ok(drawn.texture)
+        let changed = drawn.renderer.render(gpu, scene, &self.camera, &drawn.target)?;
+        Ok((drawn.texture, changed))
     }
 }

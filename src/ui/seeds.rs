@@ -60,10 +60,10 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 }
 
 fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey]) {
-    let seeds = cx.state.seeds;
+    let (count, every, running) = (cx.state.seeds.count, cx.state.seeds.every, cx.state.seeds_running());
     let there = recipes.iter().filter(|r| cx.state.results.predictions.contains(r)).count();
     ui.horizontal(|ui| {
-        let mut count = seeds.count;
+        let mut count = count;
         let drag = ui.add(egui::DragValue::new(&mut count).speed(0.1).range(COUNT).suffix(" seeds"));
         let drag = drag.accessible_name("Number of seeds");
         if drag
@@ -72,12 +72,17 @@ fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey]) {
         {
             cx.push(Command::Seeds(SeedsCommand::Count(count)));
         }
-        let text = if seeds.running { "Stop" } else { "Run" };
-        let run = ui.add(egui::Button::selectable(seeds.running, text)).accessible_name("Run the seeds");
+        let text = if running { "Stop" } else { "Run" };
+        let run = ui.add(egui::Button::selectable(running, text)).accessible_name("Run the seeds");
         if run.on_hover_text(Action::RunSeeds.tooltip()).clicked() {
-            cx.push(Command::Seeds(SeedsCommand::Run(!seeds.running)));
+            cx.push(Command::Seeds(SeedsCommand::Run(!running)));
         }
-        let text = match seeds.running && there < recipes.len() {
+        let mut every = every;
+        let switch = ui.checkbox(&mut every, "every pair").accessible_name("Seeds for every pair");
+        if switch.on_hover_text("Makes them for every pair that is shown, or only where Run is pressed").changed() {
+            cx.push(Command::Seeds(SeedsCommand::EveryPair(every)));
+        }
+        let text = match running && there < recipes.len() {
             true => format!("{there} of {}, seed {}…", recipes.len(), recipes[0].seed.wrapping_add(there as u64)),
             false => format!("{there} of {}", recipes.len()),
         };
@@ -119,7 +124,7 @@ fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], poses: &[Option
                 }
             }
             None => {
-                let text = if state.seeds.running { "…" } else { "–" };
+                let text = if state.seeds_running() { "…" } else { "–" };
                 painter.text(rect.center(), Align2::CENTER_CENTER, text, FontId::proportional(SMALL), cx.p.weak);
             }
         }

@@ -27,7 +27,7 @@ use touch2touch::app::results::ambiguity::AmbiguityKey;
 use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::{
-    ColorMap, ColorRange, GenerateSettings, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
+    ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
     SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::tasks::Ticket;
@@ -193,6 +193,7 @@ fn output() -> impl Strategy<Value = Output> {
     let picture = (any_of::<Pane>(), proptest::option::of(any::<u8>()), number());
     prop_oneof![
         Just(Output::Figure),
+        Just(Output::Case),
         source().prop_map(Output::Pair),
         picture.prop_map(|(pane, scale, error_m)| Output::Picture { pane, scale, error_m }),
     ]
@@ -307,6 +308,7 @@ draws! {
     seeds: SeedsCommand {
         1 Count(0usize..4),
         1 Run(any::<bool>()),
+        1 EveryPair(any::<bool>()),
     }
     labels: LabelsCommand {
         6 BeginStroke(finger(), source(), position(), any::<bool>()),
@@ -370,6 +372,7 @@ draws! {
         1 Ask(any::<bool>()),
         1 SetForm(form()),
         1 Place(output()),
+        1 WriteCase(Just(PathBuf::from("no/such/folder/a.t2tcase")), Just(String::new())),
         1 Write(output(), Just(PathBuf::from("no/such/folder/picture.png"))),
     }
     adapt: AdaptCommand {
@@ -406,6 +409,7 @@ draws! {
         1 SetWorkspace(any_of::<Workspace>()),
         1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
         1 DismissHint,
+        1 Remember(Just(Last { pair: "nowhere".into(), finger: 7, ..Last::default() })),
         1 ResetSettings,
     }
     tasks: TasksCommand {

@@ -4,8 +4,13 @@ use std::path::Path;
 
 use eframe::egui::{Key, OutputCommand};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LabelsCommand, Pane, PredictCommand, SettingsCommand};
-use touch2touch::app::settings::{Theme, Workspace};
+use strum::IntoEnumIterator as _;
+use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::{ColorRange, Theme, Workspace};
+use touch2touch::app::state::State;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::rig::lab;
 use touch2touch::io::images;
 
 use super::rig::Rig;
@@ -117,4 +122,42 @@ fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a
     let files = exported.write(&folder).unwrap();
     let text = std::fs::read_to_string(files.iter().find(|f| f.ends_with(&names[2])).unwrap()).unwrap();
     assert!(text.contains("\"mask\": \"hand"), "{text}");
+}
+
+#[test]
+fn a_case_is_saved_and_opened_elsewhere_to_the_same_picture_in_eight_actions() {
+    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
+    rig.send(LibraryCommand::Select(PairId(4)));
+    rig.predicted();
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(LabelsCommand::AdoptAutomatic);
+    rig.send(ViewCommand::SelectFinger(lab::LEFT));
+    rig.send(SettingsCommand::SetRange(ColorRange { min_m: 0.001, max_m: 0.012, locked: true }));
+    let file = rig.data.join("grasp.t2tcase");
+    let mut actions = rig.clicks(&["Open", "Save case…"]) + rig.take_to(&file);
+    assert!(file.is_file(), "{:?}", rig.harness.state().state().log.entries.back());
+
+    let Some(mut other) = Rig::new(SIZE, 1) else { return };
+    actions += other.clicks(&["Open", "Path…"]) + other.take_to(&file);
+    assert!(actions <= 8, "{actions}");
+    other.shoot("case-elsewhere");
+    rig.shoot("case-here");
+    let [here, there] = [&rig, &other].map(|rig| rig.harness.state().state());
+    assert_eq!(here.pair_name(), there.pair_name());
+    assert_eq!((here.selection.finger, here.settings.range), (there.selection.finger, there.settings.range));
+    assert_eq!((here.settings.workspace, &here.settings.layouts), (there.settings.workspace, &there.settings.layouts));
+    let masks = |state: &State| {
+        let labels = state.document.pair(state.pair_name()).unwrap();
+        labels.masks.entries().map(|(pad, hand)| (pad, hand.mask.clone())).collect::<Vec<_>>()
+    };
+    assert!(!masks(here).is_empty() && masks(here) == masks(there));
+    for source in ImprintSource::iter() {
+        for pad in lab::PADS {
+            let depth = |state: &State| state.imprint(source, pad).ready().cloned();
+            let bits = |state: &State| depth(state).map(|d| d.map(|v| v.to_bits()));
+            assert!(bits(here).is_some() && bits(here) == bits(there), "{source:?} {pad:?}");
+        }
+        let pose = |state: &State| state.pose(source).ready().map(|found| found.grasp_from_object);
+        assert_eq!(pose(here), pose(there), "{source:?}");
+    }
 }

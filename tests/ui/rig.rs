@@ -290,6 +290,24 @@ impl Rig {
     ) -> Harness<'static, StudioApp> {
         let mut options = Options::new(services, open);
         options.inline = inline;
+        Self::build_with(size, options)
+    }
+
+    /// The same studio on the same data, painted whole in every frame.
+    pub(super) fn painted_whole(&self, size: [f32; 2]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let config = folder.path().join("config");
+        let live = LiveServices::with_config_folder(Some(config.clone()));
+        let mut options = Options::new(Arc::new(QuickGenerator { live, gate: None }), Some(self.data.clone()));
+        options.inline = true;
+        options.whole_frames = true;
+        let harness = Self::build_with(size, options);
+        let mut rig = Self { harness, data: self.data.clone(), config, _folder: folder };
+        rig.settle();
+        rig
+    }
+
+    fn build_with(size: [f32; 2], mut options: Options) -> Harness<'static, StudioApp> {
         options.native_dialogs = false;
         Harness::builder()
             .with_size(size)

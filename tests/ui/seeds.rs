@@ -1,7 +1,7 @@
 //! Several seeds: nothing runs out of sight; the grid, the spreads and the fan come with the predictions.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, SettingsCommand};
 use touch2touch::app::seeds::SeedsCommand;
 use touch2touch::domain::ensemble::AngleFan;
 use touch2touch::domain::rig::lab;
@@ -59,14 +59,22 @@ fn seeds_run_in_sight_only_and_show_where_they_disagree() {
     assert_eq!(there(&rig), 12);
     assert_eq!(rig.harness.state().state().chosen(lab::RIGHT), Some(&third));
 
-    // Stopped: another pair gets none until told so.
-    click(&mut rig, "Run the seeds");
+    // Run means this pair: another one gets none until told so, and the switch tells it for all.
+    assert!(!rig.harness.state().state().seeds_running(), "all are there");
     rig.send(LibraryCommand::Step(1));
     assert_eq!(there(&rig), 0);
     rig.send(Command::Seeds(SeedsCommand::Count(1)));
     assert_eq!(rig.harness.state().state().seeds.count, 2, "one is no ensemble");
     click(&mut rig, "Run the seeds");
     assert_eq!(there(&rig), 2);
+    click(&mut rig, "Seeds for every pair");
+    rig.send(LibraryCommand::Step(-1));
+    rig.send(PredictCommand::GenerateNewSeed);
+    assert_eq!(there(&rig), 2, "another seed is another run, and the switch is on");
+    click(&mut rig, "Seeds for every pair");
+    rig.send(PredictCommand::GenerateNewSeed);
+    assert!(there(&rig) < 2, "off: nothing but what was generated");
+    assert!(rig.harness.state().state().settings.generate.seed < 1_000_000, "short enough to be read out");
     for size in [[1920.0, 1080.0], [1000.0, 640.0]] {
         rig.harness.set_size(size.into());
         rig.harness.run();

@@ -9,6 +9,7 @@ use crate::domain::postprocess::{CorrectionPart, CorrectionParts};
 use crate::infer::engine::EngineChoice;
 use crate::work::bundles::BundleKind;
 use crate::work::mask::MaskSource;
+use crate::work::subject::{Subject, Wish};
 
 /// The words of a command line.
 struct Words(Vec<String>);
@@ -95,15 +96,17 @@ impl State {
                 let words = of_pair("generate")?.option("--finger", &finger).option("--out", "predictions");
                 self.model_words(words.option("--seeds", self.seeds.count))
             }
-            (Pane::Ledger, _) => self.model_words(of_pair("ledger")?.option("--finger", &finger)),
             (Pane::Compare, _) => {
                 let versus = self.versus();
-                let words =
-                    of_pair("compare")?.option("--a", versus.a).option("--b", versus.b).option("--engine", engine);
+                let words = of_pair("compare")?
+                    .option("--a", self.placed(&versus.a))
+                    .option("--b", self.placed(&versus.b))
+                    .option("--engine", engine);
                 self.model_words(self.mask_words(words))
             }
+            (Pane::Ledger, _) => self.model_words(of_pair("ledger")?.option("--finger", &finger)),
             (Pane::Masks, _) => of_pair("label")?,
-            (Pane::Results | Pane::Table, _) => {
+            (Pane::Results | Pane::Table | Pane::Scatter, _) => {
                 let mut words = verb("evaluate");
                 for (bundle, _) in self.evaluated().filter(|(_, chosen)| *chosen) {
                     words = words.option("--bundle", bundle.origin.path().display());
@@ -127,6 +130,22 @@ impl State {
     pub fn equivalent(&self, pane: Pane, error_m: f32) -> Option<String> {
         let words: Vec<String> = self.equivalent_words(pane, error_m)?.iter().map(|word| quoted(word)).collect();
         Some(words.join(" "))
+    }
+
+    /// A subject with the folder of its bundle in place of the bundle's name.
+    fn placed(&self, subject: &Subject) -> Subject {
+        let placed = |wish: &Wish| {
+            let bundle = wish.bundle.as_ref().map(|name| {
+                let found = self.library.bundles.iter().find(|bundle| bundle.name == *name);
+                found.map_or_else(|| name.clone(), |bundle| bundle.origin.path().display().to_string())
+            });
+            Wish { bundle, ..wish.clone() }
+        };
+        match subject {
+            Subject::Predicted(wish) => Subject::Predicted(placed(wish)),
+            Subject::Mean(wish, seeds) => Subject::Mean(placed(wish), *seeds),
+            other => other.clone(),
+        }
     }
 
     /// Where masks come from.

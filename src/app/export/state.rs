@@ -3,18 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, Registration};
 use super::super::pane::{Kind, Pane};
-use super::super::settings::state::ColorMap as MapChoice;
+use super::super::settings::state::{ColorMap as MapChoice, Settings};
 use super::super::state::State;
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
-use crate::domain::rig::Rig;
-use crate::work::bundles::BundleInfo;
+use crate::domain::rig::{PadId, Rig};
+use crate::io::case_file;
+use crate::work::bundles::{BundleInfo, BundleKind};
+use crate::work::case::CaseSetup;
 use crate::work::cloud::Clouds;
 use crate::work::error::TaskError;
 use crate::work::figure::{FigureLook, FigurePane, FigureSetup, FigureTheme, note};
@@ -79,6 +82,8 @@ pub struct ExportState {
     pub asking: bool,
     /// What it says.
     pub form: FigureForm,
+    /// Whether the prediction of a case that was opened is still to be made.
+    pub predict: bool,
 }
 
 /// Something to be written once the place is chosen.
@@ -97,6 +102,8 @@ pub enum Output {
     },
     /// Cloud, pose and mesh of an imprint of the selected pair, into a folder.
     Pair(ImprintSource),
+    /// The selected pair with everything that its results depend on.
+    Case,
 }
 
 impl Output {
@@ -104,6 +111,7 @@ impl Output {
     pub fn title(self) -> &'static str {
         match self {
             Self::Figure => "Save the figure (.png or .svg)",
+            Self::Case => "Save the case (.t2tcase)",
             Self::Pair(_) => "Export cloud, pose and mesh to a folder",
             Self::Picture { scale: Some(_), .. } => "Save the picture (.png)",
             Self::Picture { scale: None, .. } => "Save the picture (.svg)",
@@ -115,9 +123,23 @@ impl Output {
         match self {
             Self::Figure => Some("figure.png".into()),
             Self::Picture { pane, scale, .. } => Some(pane.picture_name(scale.is_some())),
+            Self::Case => Some(format!("case.{}", case_file::ENDING)),
             Self::Pair(_) => None,
         }
     }
+}
+
+/// How the studio showed a case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CaseView {
+    /// The preferences, with the arrangement of the panes.
+    pub settings: Settings,
+    /// Where 3D views look from, in the window's own format.
+    pub camera: String,
+    /// The active finger.
+    pub finger: PadId,
+    /// Whether all fingers were shown.
+    pub both_fingers: bool,
 }
 
 /// What is written of the selected pair for other programs, gathered for a job.
@@ -275,6 +297,30 @@ impl State {
             pose,
             truth: self.sample().ready()?.grasp_from_object,
             tool: self.tool_key().ok().and_then(|key| self.results.tools.get(&key)).cloned(),
+        })
+    }
+
+    /// What goes into a case of the selected pair; `camera` is where 3D views look from, as the window says it.
+    pub fn case_setup(&self, camera: &str) -> Option<CaseSetup> {
+        let pair = self.selection.pair?;
+        let chosen = self.chosen(self.selection.finger).or_else(|| self.rig().pads().find_map(|pad| self.chosen(pad)));
+        let generator = chosen.and_then(|key| Some((self.library.bundle(&key.bundle)?.clone(), key.config())));
+        let settings = Settings { recent: Vec::new(), bundle_folders: Vec::new(), ..self.settings.clone() };
+        let view = CaseView {
+            settings,
+            camera: camera.to_owned(),
+            finger: self.selection.finger,
+            both_fingers: self.selection.both_fingers,
+        };
+        Some(CaseSetup {
+            pair,
+            generator,
+            shift: self.settings.shift,
+            mask: (self.settings.mask.choice, self.bundle(BundleKind::Mask).ok().cloned()),
+            engine: self.settings.pose_engine,
+            runtime: self.settings.runtime,
+            labels: self.document.pair(self.pair_name()).cloned().unwrap_or_default(),
+            view: serde_json::to_value(view).ok(),
         })
     }
 

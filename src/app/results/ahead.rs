@@ -62,7 +62,7 @@ impl State {
         let needs = [Need::Imprint(super::ImprintSource::Predicted), Need::Comparison, Need::Ledger];
         let (_, cloud) = self.shows_cloud(super::ImprintSource::Predicted);
         let shown = cloud || needs.into_iter().any(|need| self.needs(need));
-        let asked_for = self.tasks.any_generating().is_some() || self.seeds.running;
+        let asked_for = self.tasks.any_generating().is_some() || (self.seeds_asked() && self.needs(Need::Seeds));
         if !self.settings.generate.by_itself || !shown || asked_for || !self.fingers_to_generate().contains(&finger) {
             return None;
         }

@@ -201,6 +201,17 @@ impl Runtime {
                 });
                 self.task(Lane::Compute, ticket, "Export the pair".into(), body);
             }
+            Effect::SaveCase { ticket, source, setup, file } => {
+                let (services, file) = (self.services.clone(), absolute(file));
+                let body = Box::new(move |cx: &JobCx| {
+                    let dataset = source.as_dataset().ok_or_else(|| {
+                        TaskError::new("Case", "this kind of source cannot be read outside the studio")
+                    })?;
+                    services.make_case(dataset, &setup, &file, cx)?;
+                    Ok(Answer::Saved(ticket, format!("Saved {}", file.display()), file))
+                });
+                self.task(Lane::Models, ticket, "Save the case".into(), body);
+            }
             Effect::Reveal(place) => {
                 self.unwatched(
                     Lane::Files,

@@ -14,17 +14,19 @@ use crate::work::pose::PoseResult;
 pub const COUNT: std::ops::RangeInclusive<usize> = 2..=16;
 
 /// What a person chose about seeds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Seeds {
     /// How many.
     pub count: usize,
-    /// Whether those that are missing are made, while their pane is on screen.
-    pub running: bool,
+    /// Whether they are made for every pair that is shown with their pane.
+    pub every: bool,
+    /// What they were asked for: the recipe of the first of them. Another pair or another setting asks anew.
+    pub asked: Option<PredictionKey>,
 }
 
 impl Default for Seeds {
     fn default() -> Self {
-        Self { count: 8, running: false }
+        Self { count: 8, every: false, asked: None }
     }
 }
 
@@ -45,6 +47,25 @@ impl State {
         }
         let recipe = |seed| PredictionKey { seed, ..first.clone() };
         Ok(seeds(first.seed, self.seeds.count).into_iter().map(recipe).collect())
+    }
+
+    /// The recipe that a run of seeds belongs to: that of the first finger, of the pair on screen.
+    pub(in crate::app) fn seeds_of(&self) -> Option<PredictionKey> {
+        self.rig().pads().find_map(|pad| self.recipe(self.touch_key(pad)?))
+    }
+
+    /// Whether the seeds that are missing are made, while their pane is on screen.
+    pub(in crate::app) fn seeds_asked(&self) -> bool {
+        self.seeds.every || (self.seeds.asked.is_some() && self.seeds.asked == self.seeds_of())
+    }
+
+    /// Whether seeds are being made for what is on screen: they were asked for, and some are missing.
+    pub fn seeds_running(&self) -> bool {
+        let missing = |finger: &PadId| {
+            let made = |recipe: &PredictionKey| self.results.predictions.contains(recipe);
+            self.seed_recipes(*finger).is_ok_and(|recipes| !recipes.iter().all(made))
+        };
+        self.seeds_asked() && self.seed_fingers().iter().any(missing)
     }
 
     /// The imprint of one seed in meters, if it is there.
@@ -118,7 +139,7 @@ impl Wanted<'_> {
                 let Some(recipe) = recipes.get(at) else { continue };
                 if state.results.predictions.contains(recipe) {
                     self.ask(MetersKey(recipe.clone(), state.settings.shift));
-                } else if state.seeds.running {
+                } else if state.seeds_asked() {
                     fresh.push(SeedKey(recipe.clone()));
                 }
             }

@@ -24,11 +24,13 @@ use crate::domain::rig::Rig;
 use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
 use crate::infer::store::{self, Store};
+use crate::io::case_file;
 use crate::io::dataset::Dataset;
 use crate::io::statistics::ShiftStatistics;
 use crate::io::{atomic, files, folders, names};
 use crate::work::adapt::{self, AdaptSetup, Adapted};
 use crate::work::bundles::{self, BundleInfo};
+use crate::work::case::{self, Case, CaseSetup};
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{ExportSetup, HandMasks, export_masks};
@@ -80,8 +82,16 @@ impl LiveServices {
 /// # Errors
 /// If nothing in it can be opened.
 pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
+    let mut case = None;
     let dataset = match place {
         Place::Demo => Dataset::demo(),
+        Place::Path(path) if case_file::is_case(path) && path.is_file() => {
+            let cache = folders::program_cache().unwrap_or_else(std::env::temp_dir);
+            let opened = case::open(path, &cache.join("cases"))?;
+            opened.keep_labels()?;
+            case = Some((opened.pair, opened.case));
+            opened.dataset
+        }
         Place::Path(path) => Dataset::open(path)
             .map_err(|err| TaskError::from_error(format!("Open {place}"), &err).with_hint(err.hint()))?,
     };
@@ -89,7 +99,7 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
     let labels = Labels::of(&dataset);
     let (reviews, mut damaged) = labels.reviews();
     problems.append(&mut damaged);
-    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews })
+    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews, case })
 }
 
 /// An open data set with its store of labels.
@@ -99,6 +109,7 @@ pub struct LiveSource {
     labels: Labels,
     problems: Vec<Problem>,
     reviews: BTreeMap<String, Review>,
+    case: Option<(PairId, Case)>,
 }
 
 impl LiveSource {
@@ -119,6 +130,10 @@ impl DataSource for LiveSource {
 
     fn as_dataset(&self) -> Option<&Dataset> {
         Some(&self.dataset)
+    }
+
+    fn case(&self) -> Option<(PairId, &Case)> {
+        self.case.as_ref().map(|(pair, case)| (*pair, case))
     }
 
     fn rig(&self) -> Arc<Rig> {
@@ -249,6 +264,10 @@ impl Services for LiveServices {
         imprint: &DepthMap,
     ) -> Result<ContactMask, TaskError> {
         self.models.mask(bundle, engine, imprint)
+    }
+
+    fn make_case(&self, dataset: &Dataset, setup: &CaseSetup, file: &Path, cx: &JobCx) -> Result<(), TaskError> {
+        case::make(dataset, setup, &self.models, file, cx).map(drop)
     }
 
     fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {

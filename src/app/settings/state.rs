@@ -84,6 +84,26 @@ pub struct Settings {
     pub workspace: Workspace,
     /// Folders with further model bundles.
     pub bundle_folders: Vec<PathBuf>,
+    /// What was on screen when the window was closed.
+    pub last: Last,
+}
+
+/// What was on screen when the window was closed: shown again when the same place is opened next.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Last {
+    /// The open data set.
+    pub place: Option<Place>,
+    /// The name of the pair.
+    pub pair: String,
+    /// The number of the active finger.
+    pub finger: usize,
+    /// Whether both fingers were shown.
+    pub both_fingers: bool,
+    /// The cameras of the 3D views, in the window's own format; empty = fitted.
+    pub cameras: [String; 2],
+    /// The pane that filled the window, in the window's own format; empty = none.
+    pub maximized: String,
 }
 
 impl Default for Settings {
@@ -113,6 +133,7 @@ impl Default for Settings {
             layouts: std::collections::BTreeMap::new(),
             workspace: Workspace::Inspect,
             bundle_folders: Vec::new(),
+            last: Last::default(),
         }
     }
 }

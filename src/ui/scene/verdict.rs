@@ -5,8 +5,11 @@ use eframe::egui::{Button, Color32, RichText, Sense, Ui, vec2};
 use super::hands;
 use super::overlay::{difference, lower_first, pose_details, step_text};
 use crate::app::action::Action;
+use crate::app::command::SettingsCommand;
 use crate::app::keys::ImprintSource;
+use crate::app::settings::MaskSource;
 use crate::app::state::{Absent, Lookup, State};
+use crate::domain::align::MIN_POINTS;
 use crate::domain::hand::PoseDifference;
 use crate::domain::units;
 use crate::ui::cx::Cx;
@@ -71,6 +74,17 @@ pub(super) fn findings(state: &State, pose: &PoseResult) -> Vec<(Grade, String)>
     found
 }
 
+/// Whether there is no pose because the mask has too few contact points.
+fn lacks_contact(state: &State, source: ImprintSource) -> bool {
+    match state.pose(source) {
+        Lookup::Absent(Absent::NoContact) => true,
+        Lookup::Failed(_) => {
+            state.cloud(source).ready().is_some_and(|clouds| clouds.contact_points().len() < MIN_POINTS)
+        }
+        _ => false,
+    }
+}
+
 /// The line; takes its height from the top of the pane.
 pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     let (text, color, details) = said(cx, source);
@@ -80,12 +94,20 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     ui.painter().circle_filled(rect.left_center() + vec2(12.0, 0.0), 4.0, color);
     let mut inner = rect.with_min_x(rect.left() + 22.0).shrink2(vec2(4.0, 2.0));
     // Too few contact points: the mask is where that is mended.
-    if matches!(cx.state.pose(source), Lookup::Absent(Absent::NoContact)) {
-        let place = inner.with_min_x(inner.right() - 92.0);
-        inner.set_right(place.left() - 4.0);
-        let button = Button::new(RichText::new("Open in Label").size(SMALL)).min_size(vec2(88.0, 16.0));
-        if ui.put(place, button).on_hover_text("The mask can be corrected there, or another source chosen").clicked() {
+    if lacks_contact(cx.state, source) {
+        let threshold = cx.state.settings.mask.choice.source == MaskSource::Threshold;
+        let mut offer = |name, tip: &str| {
+            let place = inner.with_min_x(inner.right() - 92.0);
+            inner.set_right(place.left() - 4.0);
+            let button = Button::new(RichText::new(name).size(SMALL)).min_size(vec2(88.0, 16.0));
+            ui.put(place, button).on_hover_text(tip).clicked()
+        };
+        if offer("Open in Label", "The mask can be corrected there, or another source chosen") {
             cx.act(Action::LabelWorkspace);
+        }
+        let tip = "Marks what is deeper than the threshold as contact, here and on the other pairs";
+        if !threshold && offer("Use threshold", tip) {
+            cx.push(SettingsCommand::SetMaskSource(MaskSource::Threshold));
         }
     }
     ui.scope_builder(eframe::egui::UiBuilder::new().max_rect(inner), |ui| {

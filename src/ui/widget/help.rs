@@ -39,7 +39,7 @@ pub const SCENE: &[(&str, &str)] = &[
     ("Right or middle drag", "move"),
     ("Wheel", "zoom at the pointer"),
     ("Double-click", "center the point; beside all points, or 0: fit"),
-    ("Ctrl + Alt + 1 … 4", "from left, right, front, top"),
+    ("Ctrl + 1 … 4", "from left, right, front, top"),
     ("Hover", "cross-hair in the images"),
     ("Click a point", "read it, or measure with Y (mm) and Shift + Y (angle)"),
     ("Z", "pose tool: arrows or handles; Enter accepts, Esc reverts"),

@@ -50,6 +50,7 @@ impl Following for LiveFollowing {
             labels: self.labels.continued(&dataset),
             problems: dataset.problems.clone(),
             reviews: self.reviews.clone(),
+            case: None,
             dataset,
         });
         Some(Followed { source, pair: ready.id, completed: ready.completed, sample })

@@ -1,0 +1,327 @@
+//! Flat triangles into a picture that stays: what the window's toolkit draws, at what a software renderer can do fast.
+//!
+//! Its cost is that of the fragments: one color without a texture costs a fraction of a sampled one, and what is opaque
+//! need not be blended with what it hides.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+
+use super::buffer::Elements;
+use super::{Gpu, GpuError, shaders, wgpu};
+
+/// A corner of a triangle.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Corner {
+    /// Clip space: -1 to 1 from left to right and from bottom to top.
+    pub at: [f32; 2],
+    /// Place in the texture, 0 to 1.
+    pub uv: [f32; 2],
+    /// Premultiplied and sRGB-encoded.
+    pub color: [u8; 4],
+}
+
+/// How triangles are filled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fill {
+    /// By the colors of their corners.
+    Flat {
+        /// Whether nothing below shows through.
+        opaque: bool,
+    },
+    /// By a texture times the colors of their corners.
+    Textured {
+        /// Which texture.
+        key: u64,
+        /// Whether nothing below shows through.
+        opaque: bool,
+    },
+}
+
+/// Triangles in a row that are filled alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// Left, top, width and height of what may be painted, pixels.
+    pub scissor: [u32; 4],
+    /// Their corners in the list of indices.
+    pub indices: Range<u32>,
+    /// How they are filled.
+    pub fill: Fill,
+}
+
+/// Pipelines and textures.
+#[derive(Debug)]
+pub struct Sheet {
+    layout: wgpu::BindGroupLayout,
+    flat: [wgpu::RenderPipeline; 2],
+    textured: [wgpu::RenderPipeline; 2],
+    whole: wgpu::RenderPipeline,
+    samplers: [wgpu::Sampler; 2],
+    textures: BTreeMap<u64, Texture>,
+    corners: Option<wgpu::Buffer>,
+    indices: Option<wgpu::Buffer>,
+}
+
+#[derive(Debug)]
+struct Texture {
+    /// `None` for what somebody else draws.
+    own: Option<wgpu::Texture>,
+    bindings: wgpu::BindGroup,
+    opaque: bool,
+}
+
+/// A picture of the window's size, and how it is put on the window.
+#[derive(Clone, Debug)]
+pub struct Kept {
+    size: [u32; 2],
+    view: wgpu::TextureView,
+    bindings: wgpu::BindGroup,
+    pipeline: wgpu::RenderPipeline,
+}
+
+impl Kept {
+    /// Width and height, pixels.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// Copies the picture to the viewport of a pass.
+    pub fn copy(&self, pass: &mut wgpu::RenderPass<'_>) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.bindings, &[]);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+/// Premultiplied colors over what is there.
+const OVER: wgpu::BlendState = wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING;
+
+impl Sheet {
+    /// For pictures and a window of `format`.
+    ///
+    /// # Errors
+    /// [`GpuError::Shader`] and [`GpuError::Device`].
+    pub fn new(gpu: &Gpu, format: wgpu::TextureFormat) -> Result<Self, GpuError> {
+        let module = shaders::compile(gpu, "sheet.wgsl")?;
+        gpu.guarded("building the pipelines of the window", || {
+            let device = &gpu.device;
+            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some("Sheet::layout"),
+                entries: &[
+                    wgpu::BindGroupLayoutEntry {
+                        binding: 0,
+                        visibility: wgpu::ShaderStages::FRAGMENT,
+                        ty: wgpu::BindingType::Texture {
+                            multisampled: false,
+                            sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                            view_dimension: wgpu::TextureViewDimension::D2,
+                        },
+                        count: None,
+                    },
+                    wgpu::BindGroupLayoutEntry {
+                        binding: 1,
+                        visibility: wgpu::ShaderStages::FRAGMENT,
+                        ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+                        count: None,
+                    },
+                ],
+            });
+            let build = |label, [vertex, fragment]: [&str; 2], bound: bool, blend| {
+                let groups = [Some(&layout)];
+                let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                    label: Some(label),
+                    bind_group_layouts: if bound { &groups } else { &[] },
+                    immediate_size: 0,
+                });
+                let corners = [Some(wgpu::VertexBufferLayout {
+                    array_stride: size_of::<Corner>() as u64,
+                    step_mode: wgpu::VertexStepMode::Vertex,
+                    attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Float32x2, 2 => Unorm8x4],
+                })];
+                device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                    label: Some(label),
+                    layout: Some(&pipeline_layout),
+                    vertex: wgpu::VertexState {
+                        module: &module,
+                        entry_point: Some(vertex),
+                        compilation_options: wgpu::PipelineCompilationOptions::default(),
+                        buffers: if vertex == "vs_main" { &corners } else { &[] },
+                    },
+                    primitive: wgpu::PrimitiveState::default(),
+                    depth_stencil: None,
+                    multisample: wgpu::MultisampleState::default(),
+                    fragment: Some(wgpu::FragmentState {
+                        module: &module,
+                        entry_point: Some(fragment),
+                        compilation_options: wgpu::PipelineCompilationOptions::default(),
+                        targets: &[Some(wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL })],
+                    }),
+                    multiview_mask: None,
+                    cache: None,
+                })
+            };
+            let sampler = |filter| {
+                device.create_sampler(&wgpu::SamplerDescriptor {
+                    label: Some("Sheet::sampler"),
+                    mag_filter: filter,
+                    min_filter: filter,
+                    ..Default::default()
+                })
+            };
+            let two = |label, fragment: &str, bound| {
+                [Some(OVER), None].map(|blend| build(label, ["vs_main", fragment], bound, blend))
+            };
+            Ok(Self {
+                flat: two("Sheet::flat", "fs_flat", false),
+                textured: two("Sheet::textured", "fs_tinted", true),
+                whole: build("Sheet::whole", ["vs_whole", "fs_copied"], true, None),
+                samplers: [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest].map(sampler),
+                layout,
+                textures: BTreeMap::new(),
+                corners: None,
+                indices: None,
+            })
+        })
+    }
+
+    fn bind(&self, gpu: &Gpu, view: &wgpu::TextureView, nearest: bool) -> wgpu::BindGroup {
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("Sheet::texture"),
+            layout: &self.layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: wgpu::BindingResource::Sampler(&self.samplers[usize::from(nearest)]),
+                },
+            ],
+        })
+    }
+
+    /// An empty picture of `size` pixels and `format`, which must be that of the sheet.
+    pub fn picture(&self, gpu: &Gpu, size: [u32; 2], format: wgpu::TextureFormat) -> Kept {
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+        let view =
+            texture(gpu, "Sheet::picture", size, format, usage).create_view(&wgpu::TextureViewDescriptor::default());
+        let bindings = self.bind(gpu, &view, true);
+        Kept { size, view, bindings, pipeline: self.whole.clone() }
+    }
+
+    /// Makes or replaces a texture of `size` pixels, row by row; `rgba` premultiplied.
+    pub fn set(&mut self, gpu: &Gpu, key: u64, size: [u32; 2], rgba: &[u8], nearest: bool) {
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+        let own = texture(gpu, "Sheet::texture", size, wgpu::TextureFormat::Rgba8Unorm, usage);
+        write(gpu, &own, [0; 2], size, rgba);
+        let bindings = self.bind(gpu, &own.create_view(&wgpu::TextureViewDescriptor::default()), nearest);
+        let opaque = rgba.chunks_exact(4).all(|p| p[3] == 255);
+        self.textures.insert(key, Texture { own: Some(own), bindings, opaque });
+    }
+
+    /// Writes a part of a texture at `place`; returns whether there is such a texture.
+    pub fn set_part(&mut self, gpu: &Gpu, key: u64, place: [u32; 2], size: [u32; 2], rgba: &[u8]) -> bool {
+        let Some(texture) = self.textures.get_mut(&key) else { return false };
+        let Some(own) = &texture.own else { return false };
+        texture.opaque = false;
+        write(gpu, own, place, size, rgba);
+        true
+    }
+
+    /// A texture that somebody else draws, opaque.
+    pub fn show(&mut self, gpu: &Gpu, key: u64, view: &wgpu::TextureView) {
+        let bindings = self.bind(gpu, view, false);
+        self.textures.insert(key, Texture { own: None, bindings, opaque: true });
+    }
+
+    /// Frees a texture.
+    pub fn free(&mut self, key: u64) {
+        self.textures.remove(&key);
+    }
+
+    /// Whether nothing shows through a texture.
+    pub fn is_opaque(&self, key: u64) -> bool {
+        self.textures.get(&key).is_some_and(|t| t.opaque)
+    }
+
+    /// Paints into a picture, over what is there.
+    ///
+    /// # Errors
+    /// [`GpuError::TooLarge`] and [`GpuError::Device`].
+    pub fn paint(
+        &mut self,
+        gpu: &Gpu,
+        picture: &Kept,
+        corners: &[Corner],
+        indices: &[u32],
+        runs: &[Run],
+    ) -> Result<(), GpuError> {
+        gpu.guarded("painting the window", || {
+            let usage = wgpu::BufferUsages::VERTEX;
+            let corners = Elements::upload(gpu, "Sheet::corners", corners, usage, self.corners.take())?;
+            let usage = wgpu::BufferUsages::INDEX;
+            let indices = Elements::upload(gpu, "Sheet::indices", indices, usage, self.indices.take())?;
+            let label = Some("Sheet::encoder");
+            let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
+            {
+                let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                    label: Some("Sheet::pass"),
+                    color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                        view: &picture.view,
+                        depth_slice: None,
+                        resolve_target: None,
+                        ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
+                    })],
+                    ..Default::default()
+                });
+                pass.set_vertex_buffer(0, corners.buffer.slice(..));
+                pass.set_index_buffer(indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
+                for run in runs {
+                    match run.fill {
+                        Fill::Flat { opaque } => pass.set_pipeline(&self.flat[usize::from(opaque)]),
+                        Fill::Textured { key, opaque } => {
+                            let Some(texture) = self.textures.get(&key) else { continue };
+                            pass.set_pipeline(&self.textured[usize::from(opaque)]);
+                            pass.set_bind_group(0, &texture.bindings, &[]);
+                        }
+                    }
+                    let [x, y, width, height] = run.scissor;
+                    pass.set_scissor_rect(x, y, width, height);
+                    pass.draw_indexed(run.indices.clone(), 0, 0..1);
+                }
+            }
+            gpu.queue.submit([encoder.finish()]);
+            (self.corners, self.indices) = (Some(corners.buffer), Some(indices.buffer));
+            Ok(())
+        })
+    }
+}
+
+fn texture(
+    gpu: &Gpu,
+    label: &str,
+    [width, height]: [u32; 2],
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d { width: width.max(1), height: height.max(1), depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    })
+}
+
+fn write(gpu: &Gpu, texture: &wgpu::Texture, [x, y]: [u32; 2], [width, height]: [u32; 2], rgba: &[u8]) {
+    let origin = wgpu::Origin3d { x, y, z: 0 };
+    gpu.queue.write_texture(
+        wgpu::TexelCopyTextureInfo { texture, mip_level: 0, origin, aspect: wgpu::TextureAspect::All },
+        rgba,
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(4 * width), rows_per_image: None },
+        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+    );
+}

@@ -1,0 +1,147 @@
+//! Frames of which only what changed is painted: the same pictures, and little to paint.
+
+use eframe::egui::{Key, Modifiers, PointerButton, Pos2, vec2};
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::command::{LibraryCommand, SettingsCommand};
+use touch2touch::app::results::Results;
+use touch2touch::app::settings::{Theme, Workspace};
+
+use super::rig::Rig;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+
+/// Share of bytes that differ by more than a rounding, and the largest difference.
+fn difference(a: &mut Rig, b: &mut Rig, what: &str) -> (f64, u8) {
+    let [one, two] = [a, b].map(|rig| rig.harness.render().unwrap());
+    assert_eq!(one.dimensions(), two.dimensions());
+    let apart = |(a, b): (&u8, &u8)| a.abs_diff(*b);
+    let far = one.iter().zip(two.iter()).map(apart).filter(|d| *d > 2).count();
+    let most = one.iter().zip(two.iter()).map(apart).max().unwrap_or(0);
+    if far > 0
+        && let Some(folder) = std::env::var_os("TOUCH2TOUCH_SCREENSHOTS")
+    {
+        let folder = std::path::Path::new(&folder);
+        one.save(folder.join(format!("{what}-changed.png"))).unwrap();
+        two.save(folder.join(format!("{what}-whole.png"))).unwrap();
+    }
+    (far as f64 / one.len() as f64, most)
+}
+
+#[test]
+fn what_is_painted_in_parts_is_what_is_painted_whole() {
+    let Some(mut parts) = Rig::new(SIZE, 2) else { return };
+    let mut whole = parts.painted_whole(SIZE);
+    assert!(parts.harness.state().painted(&parts.harness.ctx).is_some_and(|px| px > 0));
+    assert_eq!(whole.harness.state().painted(&whole.harness.ctx), None);
+    let check = |parts: &mut Rig, whole: &mut Rig, what: &str| {
+        let (share, most) = difference(parts, whole, what);
+        // Textures are filtered by the device in one and by the shader in the other.
+        assert!(share < 0.002, "{what}: {:.3} % of the bytes differ, by at most {most}", share * 100.0);
+    };
+    for rig in [&mut parts, &mut whole] {
+        rig.send(SettingsCommand::DismissHint);
+    }
+    for (workspace, theme) in [
+        (Workspace::Inspect, Theme::Dark),
+        (Workspace::Align, Theme::Light),
+        (Workspace::Label, Theme::Dark),
+        (Workspace::Evaluate, Theme::Light),
+    ] {
+        let name = workspace.name();
+        for rig in [&mut parts, &mut whole] {
+            rig.send(SettingsCommand::SetTheme(theme));
+            rig.send(SettingsCommand::SetWorkspace(workspace));
+        }
+        check(&mut parts, &mut whole, name);
+        for i in 0..6_u8 {
+            let place = Pos2::new(90.0 + 200.0 * f32::from(i), 120.0 + 100.0 * f32::from(i));
+            for rig in [&mut parts, &mut whole] {
+                rig.harness.hover_at(place);
+                rig.harness.step();
+                rig.harness.step();
+            }
+            check(&mut parts, &mut whole, &format!("{name}-hover-{i}"));
+        }
+        for rig in [&mut parts, &mut whole] {
+            rig.harness.key_press_modifiers(Modifiers::NONE, Key::D);
+            rig.harness.step();
+            rig.settle();
+        }
+        check(&mut parts, &mut whole, &format!("{name}-step"));
+    }
+    // A window of another size.
+    for rig in [&mut parts, &mut whole] {
+        rig.harness.set_size(vec2(1000.0, 700.0));
+        rig.settle();
+    }
+    check(&mut parts, &mut whole, "resized");
+}
+
+#[test]
+fn a_turned_view_is_painted() {
+    let Some(mut parts) = Rig::new(SIZE, 1) else { return };
+    let mut whole = parts.painted_whole(SIZE);
+    for rig in [&mut parts, &mut whole] {
+        rig.send(SettingsCommand::DismissHint);
+        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+        let center = rig.harness.get_by_label("3D view, measured").rect().center();
+        rig.harness.hover_at(center);
+        rig.harness.step();
+        rig.harness.drag_at(center);
+        for i in 1..5_u8 {
+            rig.harness.hover_at(center + vec2(12.0 * f32::from(i), 3.0));
+            rig.harness.step();
+        }
+        rig.harness.event(eframe::egui::Event::PointerButton {
+            pos: center + vec2(48.0, 3.0),
+            button: PointerButton::Primary,
+            pressed: false,
+            modifiers: Modifiers::NONE,
+        });
+        rig.settle();
+        for _ in 0..4 {
+            rig.harness.step();
+        }
+    }
+    let (share, most) = difference(&mut parts, &mut whole, "turned");
+    assert!(share < 0.002, "{share} of the bytes differ, by at most {most}");
+}
+
+#[test]
+fn an_idle_window_paints_nothing_and_a_pointer_on_the_move_little() {
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Inspect));
+    let painted = |rig: &Rig| rig.harness.state().painted(&rig.harness.ctx).unwrap();
+    rig.harness.hover_at(Pos2::new(640.0, 400.0));
+    rig.harness.run();
+    let rested = painted(&rig);
+    for _ in 0..3 {
+        rig.harness.step();
+    }
+    // The status bar says how long a frame takes: a number of two tiles or four.
+    let number = painted(&rig) - rested;
+    assert!(number <= 3 * 6 * 32 * 32, "nothing changed and {number} pixels were painted");
+    let rested = painted(&rig);
+    let frames = 12;
+    for i in 0..frames {
+        let t = i as f32 * 0.5;
+        rig.harness.hover_at(Pos2::new(640.0 + 500.0 * t.sin(), 400.0 + 300.0 * t.cos()));
+        rig.harness.step();
+    }
+    let share = (painted(&rig) - rested) as f64 / frames as f64 / f64::from(SIZE[0] * SIZE[1]);
+    assert!(share < 0.25, "a move of the pointer paints {:.0} % of the window", share * 100.0);
+}
+
+#[test]
+fn what_is_computed_stays_within_its_budget() {
+    // What the documentation says of memory.
+    const { assert!(Results::BUDGET <= 1400 << 20) };
+    let Some(mut rig) = Rig::new(SIZE, 4) else { return };
+    let first = rig.harness.state().state().results.bytes();
+    for _ in 0..7 {
+        rig.send(LibraryCommand::Step(1));
+    }
+    let bytes = rig.harness.state().state().results.bytes();
+    assert!(bytes > first && bytes <= Results::BUDGET, "{first} {bytes}");
+}
