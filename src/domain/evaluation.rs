@@ -385,7 +385,13 @@ mod tests {
 
     fn grasp(tool: &str, group: Group, rms_m: f64, angle_deg: f64) -> GraspScore {
         let error = SquaredError { sum: rms_m * rms_m * 100.0, pixels: 100 };
-        let image = ImageScore { error, ssim: Some(0.5), tool_right: Some(angle_deg < 5.0), ..ImageScore::default() };
+        let image = ImageScore {
+            error,
+            ssim: Some(0.5),
+            ssim_peak: Some(0.5),
+            tool_right: Some(angle_deg < 5.0),
+            ..ImageScore::default()
+        };
         GraspScore {
             pair: format!("{tool}/data_0"),
             tool: Some(tool.into()),
