@@ -133,11 +133,11 @@ macro_rules! panes {
                     "Error", "Predicted minus measured: blue too shallow, red too deep", Error, needs [Comparison],
                     at [Inspect Bottom(1), Evaluate Bottom(3)]
                 }
-                Compare {
+            }
+            versus { Compare {
                     "Compare", "Any two imprints of the touch against each other: side by side, wiped, subtracted, in 3D",
                     Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3)]
-                }
-            }
+            } }
             ledger { Ledger {
                 "Depth chain" as "Chain", "Everything between the decoder and the meters, stage by stage",
                 Form, needs [Ledger], at [Inspect Bottom(1), Evaluate Bottom(3)]

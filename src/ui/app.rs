@@ -313,10 +313,10 @@ impl StudioApp {
                 let memories = &mut self.panes.memories;
                 match self.panes.hovered.map(Pane::kind) {
                     Some(Kind::Scene(_)) => memories.scene.fit(),
-                    Some(Kind::Color) => memories.images.fit(Some(SensorKind::Color)),
-                    Some(Kind::Imprint(_) | Kind::Error) => memories.images.fit(Some(SensorKind::Depth)),
+                    Some(Kind::Color) => self.shared.views.fit(Some(SensorKind::Color)),
+                    Some(Kind::Imprint(_) | Kind::Error) => self.shared.views.fit(Some(SensorKind::Depth)),
                     _ => {
-                        memories.images.fit(None);
+                        self.shared.views.fit(None);
                         memories.scene.fit();
                     }
                 }

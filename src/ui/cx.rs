@@ -8,12 +8,14 @@ use super::dialogs::Dialogs;
 use super::saved::Saved;
 use super::scene_view::Device;
 use super::theme::Palette;
+use super::widget::image_canvas::ViewTransform;
 use super::widget::texture::Textures;
 use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
 use crate::domain::dataset::PairId;
+use crate::domain::rig::SensorKind;
 
 /// What a pane may use while it is drawn.
 pub(super) struct Cx<'a> {
@@ -56,8 +58,47 @@ impl Cx<'_> {
     }
 }
 
+/// What part of pictures is seen, and the colors of errors: one for all panes.
+pub(super) struct Views {
+    /// Of GelSlim images.
+    pub gel: ViewTransform,
+    /// Of bubble images.
+    pub bubble: ViewTransform,
+    /// Half the range of the error's colors, millimeters.
+    pub error_mm: f32,
+    /// Counts how often bubble images were fitted: a 3D view beside them follows.
+    pub fits: u64,
+}
+
+impl Default for Views {
+    fn default() -> Self {
+        let view = ViewTransform::default();
+        Self { gel: view, bubble: view, error_mm: 4.0, fits: 0 }
+    }
+}
+
+impl Views {
+    /// Shows the images whole: all, or those of one kind of sensor.
+    pub(super) fn fit(&mut self, only: Option<SensorKind>) {
+        if only != Some(SensorKind::Depth) {
+            self.gel = ViewTransform::default();
+        }
+        if only != Some(SensorKind::Color) {
+            self.bubble = ViewTransform::default();
+            self.fits += 1;
+        }
+    }
+
+    /// Half the range of the error's colors, meters.
+    pub(super) fn error_m(&self) -> f32 {
+        self.error_mm * 1e-3
+    }
+}
+
 /// What the panes share that only the window knows.
 pub(super) struct Shared {
+    /// What part of pictures is seen.
+    pub views: Views,
     /// Pictures on the graphics card.
     pub textures: Textures,
     /// Dialogs.
@@ -76,6 +117,7 @@ impl Shared {
     /// A fresh window's. `native_dialogs`: whether the system's dialogs are tried before the path box.
     pub(super) fn new(native_dialogs: bool) -> Self {
         Self {
+            views: Views::default(),
             textures: Textures::default(),
             dialogs: Dialogs::new(native_dialogs),
             readout: None,

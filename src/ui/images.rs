@@ -1,9 +1,8 @@
 //! The image panes: GelSlim, measured and predicted imprint, error. Linked pan, zoom and cross-hair.
 
-mod bar;
-mod link;
+pub(super) mod bar;
+pub(super) mod link;
 mod paint;
-mod versus;
 
 use std::sync::Arc;
 
@@ -13,7 +12,7 @@ use super::cx::{Cx, side_color};
 use super::theme::Palette;
 use super::widget::colorbar;
 use super::widget::empty;
-use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, ViewTransform, shows_squares};
+use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, shows_squares};
 use super::widget::texture::{Histogram, Memo, depth_image, picture_image};
 use crate::app::command::{Hover, Pane, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode};
@@ -34,53 +33,16 @@ use link::Link;
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
 pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
 
-/// What part of the images is seen, and what is being painted on them.
+/// What is being painted on the images.
+#[derive(Default)]
 pub(super) struct Memory {
-    /// What part of GelSlim images is seen.
-    gel_view: ViewTransform,
-    /// What part of bubble images is seen.
-    bubble_view: ViewTransform,
-    /// Half the range of the error's colors, millimeters.
-    error_mm: f32,
     /// The stroke that the pointer is drawing: its pane and finger.
     painting: Option<(Pane, PadId)>,
     /// Outlines of masks.
     outlines: Memo<Vec<[[f32; 2]; 2]>>,
-    /// What the comparison of any two imprints remembers.
-    compared: versus::Compared,
-}
-
-impl Default for Memory {
-    fn default() -> Self {
-        let view = ViewTransform::default();
-        Self {
-            gel_view: view,
-            bubble_view: view,
-            error_mm: 4.0,
-            painting: None,
-            outlines: Memo::default(),
-            compared: versus::Compared::default(),
-        }
-    }
 }
 
 impl Memory {
-    /// Shows the images whole: all, or those of one kind of sensor.
-    pub(super) fn fit(&mut self, only: Option<SensorKind>) {
-        if only != Some(SensorKind::Depth) {
-            self.gel_view = ViewTransform::default();
-        }
-        if only != Some(SensorKind::Color) {
-            self.bubble_view = ViewTransform::default();
-            self.compared.fit();
-        }
-    }
-
-    /// Half the range of the error's colors, meters.
-    pub(super) fn error_m(&self) -> f32 {
-        self.error_mm * 1e-3
-    }
-
     /// Follows the pen no further; whether it was drawing.
     pub(super) fn lift_pen(&mut self) -> bool {
         self.painting.take().is_some()
@@ -136,9 +98,6 @@ fn usual_size(cx: &Cx<'_>, kind: SensorKind) -> [usize; 2] {
 
 /// The pane of one kind of image, for every finger on screen.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane) {
-    if pane == Pane::Compare {
-        return versus::show(cx, ui, memory);
-    }
     let bar = matches!(pane, Pane::Measured | Pane::Predicted | Pane::Error);
     let full = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(full);
@@ -174,7 +133,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
         ui.painter().rect_filled(rect, 0.0, cx.p.panel);
         let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt((pane, "bar")));
-        bar::color_bar(cx, &mut child, memory, pane, histogram.as_ref());
+        bar::color_bar(cx, &mut child, pane, histogram.as_ref());
         if pane != Pane::Error
             && let Some(histogram) = &histogram
         {
@@ -197,15 +156,15 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, f
                     state.gelslim(finger).and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.reference))
                 }
             };
-            gel_image(cx, ui, memory, pane, finger, image);
+            gel_image(cx, ui, pane, finger, image);
             None
         }
         Pane::Measured => depth_pane(cx, ui, memory, pane, finger, state.imprint(ImprintSource::Measured, finger)),
         Pane::Predicted => match state.preview(finger) {
-            Some(preview) => preview_image(cx, ui, memory, finger, preview),
+            Some(preview) => preview_image(cx, ui, finger, preview),
             None => match state.predicted_color(finger) {
                 Some(picture) => {
-                    gel_image(cx, ui, memory, pane, finger, picture);
+                    gel_image(cx, ui, pane, finger, picture);
                     None
                 }
                 None => depth_pane(cx, ui, memory, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
@@ -219,21 +178,14 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, f
 }
 
 /// What stands where there is no picture: the one before, dimmed, while the next is on its way; else a sentence.
-fn placeholder<T: ?Sized>(
-    cx: &mut Cx<'_>,
-    ui: &mut Ui,
-    memory: &Memory,
-    slot: (Pane, PadId),
-    lookup: Lookup<'_, T>,
-    size: [usize; 2],
-) {
+fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, PadId), lookup: Lookup<'_, T>, size: [usize; 2]) {
     match lookup {
         Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
             let rect = ui.available_rect_before_wrap();
             ui.painter().rect_filled(rect, 0.0, cx.p.canvas);
             if let Some(picture) = cx.shared.textures.last(slot) {
                 let gel = matches!(slot.0, Pane::GelRaw | Pane::GelReference | Pane::GelDifference);
-                let view = if gel { memory.gel_view } else { memory.bubble_view };
+                let view = if gel { cx.shared.views.gel } else { cx.shared.views.bubble };
                 let turned = gel && cx.state.rig().turned();
                 let map = CanvasMap::new(rect, size, view, turned);
                 let uv = if turned {
@@ -311,20 +263,13 @@ pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     }
 }
 
-fn gel_image(
-    cx: &mut Cx<'_>,
-    ui: &mut Ui,
-    memory: &mut Memory,
-    pane: Pane,
-    finger: PadId,
-    lookup: Lookup<'_, RgbGrid>,
-) {
+fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lookup<'_, RgbGrid>) {
     let Some(image) = lookup.shown() else {
         let size = usual_size(cx, SensorKind::Color);
-        return placeholder(cx, ui, memory, (pane, finger), lookup, size);
+        return placeholder(cx, ui, (pane, finger), lookup, size);
     };
     let Some(touch) = cx.state.touch_key(finger) else { return };
-    let mut view = memory.gel_view;
+    let mut view = cx.shared.views.gel;
     let label = format!("{} {}", pane.title(), cx.state.finger_name(finger));
     let canvas = ImageCanvas {
         label: &label,
@@ -334,7 +279,7 @@ fn gel_image(
         background: cx.p.canvas,
     };
     let output = canvas.show(ui, &mut view);
-    memory.gel_view = view;
+    cx.shared.views.gel = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let recipe = cx.state.chosen(finger).filter(|_| pane == Pane::Predicted);
     let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), (touch, pane, recipe), squares, || {
@@ -381,7 +326,7 @@ impl Palette {
 }
 
 /// `right` where the pane could be either finger's.
-fn finger_text(state: &State, finger: PadId) -> String {
+pub(super) fn finger_text(state: &State, finger: PadId) -> String {
     let mut text = format!("{} finger", state.finger_name(finger));
     if let Some(first) = text.get_mut(0..1) {
         first.make_ascii_uppercase();
@@ -393,7 +338,7 @@ fn finger_text(state: &State, finger: PadId) -> String {
 }
 
 /// Tells the other panes where the pointer is.
-fn hover(cx: &mut Cx<'_>, finger: PadId, at_px: [f32; 2]) {
+pub(super) fn hover(cx: &mut Cx<'_>, finger: PadId, at_px: [f32; 2]) {
     cx.shared.hover_claimed = true;
     let hover = Some(Hover { finger, at_px });
     if cx.state.selection.hover != hover {
@@ -411,7 +356,7 @@ fn depth_pane(
 ) -> Option<Histogram> {
     let Some(depth) = lookup.shown() else {
         let size = usual_size(cx, SensorKind::Depth);
-        placeholder(cx, ui, memory, (pane, finger), lookup, size);
+        placeholder(cx, ui, (pane, finger), lookup, size);
         return None;
     };
     let stale = matches!(lookup, Lookup::Stale(_));
@@ -426,14 +371,14 @@ fn depth_pane(
         && cx.state.settings.mask.tool != MaskTool::Pan
         && cx.state.document.is_editable(cx.state.pair_name());
     let primary = if paintable { Primary::Caller } else { Primary::Pan };
-    let mut view = memory.bubble_view;
+    let mut view = cx.shared.views.bubble;
     let label = format!("{} {}", pane.title(), cx.state.finger_name(finger));
     let canvas = ImageCanvas { label: &label, size: depth.size(), rotated: false, primary, background: cx.p.canvas };
     let output = canvas.show(ui, &mut view);
-    memory.bubble_view = view;
+    cx.shared.views.bubble = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let (map, range) = match pane {
-        Pane::Error => (ColorMap::Diverging, Range::symmetric(memory.error_mm * 1e-3)),
+        Pane::Error => (ColorMap::Diverging, Range::symmetric(cx.shared.views.error_m())),
         _ => (map_of(cx.state), range_of(cx.state)),
     };
     let key = (&recipe, map, range.lo.to_bits(), range.hi.to_bits());
@@ -473,15 +418,9 @@ fn depth_pane(
 }
 
 /// A prediction on its way, in the colors and the place of the result: nothing can be painted or measured on it.
-fn preview_image(
-    cx: &mut Cx<'_>,
-    ui: &mut Ui,
-    memory: &mut Memory,
-    finger: PadId,
-    preview: &Arc<Preview>,
-) -> Option<Histogram> {
+fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Preview>) -> Option<Histogram> {
     let pane = Pane::Predicted;
-    let mut view = memory.bubble_view;
+    let mut view = cx.shared.views.bubble;
     let label = format!("{} {}, preview", pane.title(), cx.state.finger_name(finger));
     let canvas = ImageCanvas {
         label: &label,
@@ -491,7 +430,7 @@ fn preview_image(
         background: cx.p.canvas,
     };
     let output = canvas.show(ui, &mut view);
-    memory.bubble_view = view;
+    cx.shared.views.bubble = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let (map, range) = (map_of(cx.state), range_of(cx.state));
     let key = (&preview.recipe, preview.picture.step, map, range.lo.to_bits(), range.hi.to_bits());

@@ -96,7 +96,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
                 if response.double_clicked() {
                     self.panes.maximized = Some(*pane);
                 }
-                let error_m = self.panes.memories.images.error_m();
+                let error_m = self.cx.shared.views.error_m();
                 response.context_menu(|ui| super::export::menu(self.cx, ui, *pane, error_m));
                 response.on_hover_text(format!("{}. Drag to move, double-click to maximize", pane.tip()))
             }
@@ -125,7 +125,7 @@ impl Behavior<Pane> for Docking<'_, '_> {
             self.panes.maximized = Some(*pane);
         }
         help_mark(self.cx, ui, *pane);
-        super::export::button(self.cx, ui, *pane, self.panes.memories.images.error_m());
+        super::export::button(self.cx, ui, *pane, self.cx.shared.views.error_m());
     }
 
     fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
@@ -190,7 +190,7 @@ pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pa
                     panes.maximized = None;
                 }
                 help_mark(cx, ui, pane);
-                super::export::button(cx, ui, pane, panes.memories.images.error_m());
+                super::export::button(cx, ui, pane, cx.shared.views.error_m());
             });
         });
     });

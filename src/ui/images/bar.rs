@@ -2,7 +2,7 @@
 
 use eframe::egui::{Button, Rect, RichText, Ui, UiBuilder, pos2, vec2};
 
-use super::{Memory, map_of, scale_note};
+use super::{map_of, scale_note};
 use crate::app::action::Action;
 use crate::app::command::{Pane, SettingsCommand};
 use crate::app::settings::ColorRange;
@@ -34,7 +34,8 @@ pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &
     });
 }
 
-pub(super) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, histogram: Option<&Histogram>) {
+/// The bar of a pane's pictures: that of errors, else that of depth.
+pub(in crate::ui) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histogram>) {
     let note = scale_note(cx.state);
     if pane == Pane::Error {
         let bar = Colorbar {
@@ -46,11 +47,11 @@ pub(super) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane:
             locked: None,
             note,
         };
-        match bar.show(ui, Range::symmetric(memory.error_mm)) {
-            Some(Asked::Range(range)) => memory.error_mm = range.hi.clamp(0.05, 100.0),
+        match bar.show(ui, Range::symmetric(cx.shared.views.error_mm)) {
+            Some(Asked::Range(range)) => cx.shared.views.error_mm = range.hi.clamp(0.05, 100.0),
             Some(Asked::Auto) => {
                 if let Some(h) = histogram {
-                    memory.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
+                    cx.shared.views.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
                 }
             }
             Some(Asked::Lock(_)) | None => {}

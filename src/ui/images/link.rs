@@ -5,27 +5,27 @@ use crate::domain::rig::{PadId, Rig};
 /// Which part of a depth picture the color sensor sees (the dashed rectangle), and whether it sees it turned by 180
 /// degrees.
 #[derive(Clone, Copy)]
-pub(super) struct Link {
+pub(in crate::ui) struct Link {
     /// Center and size, depth pixels.
-    pub(super) window: [f64; 4],
+    pub(in crate::ui) window: [f64; 4],
     turned: bool,
 }
 
 impl Link {
     /// What the rig says; `None` where it does not.
-    pub(super) fn of(rig: &Rig, finger: PadId) -> Option<Self> {
+    pub(in crate::ui) fn of(rig: &Rig, finger: PadId) -> Option<Self> {
         Some(Self { window: rig.color_window(finger)?.rectangle(), turned: rig.turned() })
     }
 
     /// Where a depth pixel appears in the color picture of `size` pixels.
-    pub(super) fn color_from_depth(self, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
+    pub(in crate::ui) fn color_from_depth(self, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
         let [cx, cy, w, h] = self.window.map(|v| v as f32);
         let share = [(px[0] - cx) / w + 0.5, (px[1] - cy) / h + 0.5].map(|s| if self.turned { 1.0 - s } else { s });
         [share[0] * size[0] as f32 - 0.5, share[1] * size[1] as f32 - 0.5]
     }
 
     /// The opposite of [`Link::color_from_depth`].
-    pub(super) fn depth_from_color(self, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
+    pub(in crate::ui) fn depth_from_color(self, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
         let [cx, cy, w, h] = self.window.map(|v| v as f32);
         let share = [(px[0] + 0.5) / size[0].max(1) as f32, (px[1] + 0.5) / size[1].max(1) as f32];
         let share = share.map(|s| if self.turned { 1.0 - s } else { s });

@@ -32,7 +32,7 @@ pub(super) struct Space {
     clouds: [Option<Held>; 2],
     apart: Option<(ApartKey, u64, PerPad<Colored>)>,
     mesh: Option<(DatasetSeq, String, u64, Arc<TriMesh>)>,
-    fitted: Option<DatasetSeq>,
+    fitted: Option<(DatasetSeq, u64)>,
     revision: u64,
 }
 
@@ -49,12 +49,6 @@ struct Colored {
     values: Arc<[f32]>,
 }
 
-impl Space {
-    pub(super) fn fit(&mut self) {
-        self.view.placed = false;
-    }
-}
-
 /// The view of what is compared; with `flipped` B stands alone.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, space: &mut Space, versus: &Versus, flipped: bool) {
     let device = match cx.device {
@@ -68,10 +62,10 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, space: &mut Space, versus: &Ver
     if space.clouds.iter().all(Option::is_none) {
         return missing(cx, ui, versus);
     }
-    let open = cx.state.library.open.as_ref().map(|open| open.seq);
+    let open = cx.state.library.open.as_ref().map(|open| (open.seq, cx.shared.views.fits));
     if space.fitted != open {
         space.fitted = open;
-        space.fit();
+        space.view.placed = false;
     }
     space.view.camera.orthographic = cx.state.settings.scene.orthographic;
     let mut scene = scene(cx, space, versus, flipped);

@@ -7,8 +7,8 @@ mod space;
 use eframe::egui::{self, Align2, Color32, Rect, Sense, Stroke, Ui, UiBuilder, pos2, vec2};
 use strum::IntoEnumIterator as _;
 
-use super::link::Link;
-use super::{Memory, absent_text, bar, failed, finger_text, hover, map_of, range_of, scale_note};
+use super::images::link::Link;
+use super::images::{absent_text, bar, failed, finger_text, hover, map_of, range_of, scale_note};
 use crate::app::action::Action;
 use crate::app::command::SettingsCommand;
 use crate::app::keys::VersusKey;
@@ -27,23 +27,16 @@ use crate::ui::widget::texture::{Histogram, depth_image};
 use crate::work::subject::Subject;
 
 /// What the comparison remembers.
-pub(super) struct Compared {
+pub(super) struct Memory {
     /// Where the line of the wipe stands, as a share of the picture's width.
     wipe: f32,
     /// The 3D view.
     space: space::Space,
 }
 
-impl Default for Compared {
+impl Default for Memory {
     fn default() -> Self {
         Self { wipe: 0.5, space: space::Space::default() }
-    }
-}
-
-impl Compared {
-    /// Fits the 3D view to its pane when it is drawn next.
-    pub(super) fn fit(&mut self) {
-        self.space.fit();
     }
 }
 
@@ -83,7 +76,7 @@ fn flickers(ui: &Ui) -> bool {
     held && !ui.ctx().egui_wants_keyboard_input()
 }
 
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     let versus = cx.state.versus();
     let held = egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
         let held = header(cx, ui, &versus);
@@ -95,7 +88,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     ui.advance_cursor_after_rect(full);
     if versus.mode.is_3d() {
         let mut child = ui.new_child(UiBuilder::new().max_rect(full).id_salt("compared in 3D"));
-        return space::show(cx, &mut child, &mut memory.compared.space, &versus, flipped);
+        return space::show(cx, &mut child, &mut memory.space, &versus, flipped);
     }
     let area = full.with_max_y((full.bottom() - colorbar::HEIGHT).max(full.top() + 16.0));
     let shown = cx.state.fingers();
@@ -116,7 +109,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
             let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt(("compared", *finger, letter)));
             child.set_clip_rect(rect.intersect(ui.clip_rect()));
             let found = match versus.mode {
-                VersusMode::Difference => difference(cx, &mut child, memory, &versus, *finger),
+                VersusMode::Difference => difference(cx, &mut child, &versus, *finger),
                 _ => picture(cx, &mut child, memory, &versus, letter, *finger, flipped),
             };
             histogram = found.or(histogram);
@@ -127,7 +120,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt("compared bar"));
     // The error's range is one for all errors.
     let pane = if versus.mode == VersusMode::Difference { Pane::Error } else { Pane::Compare };
-    bar::color_bar(cx, &mut child, memory, pane, histogram.as_ref());
+    bar::color_bar(cx, &mut child, pane, histogram.as_ref());
 }
 
 /// What is compared, and how; whether the button is held that shows B in the place of A.
@@ -163,11 +156,11 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
 }
 
 /// The canvas of a picture of `size` pixels, moved together with all bubble images.
-fn canvas(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, label: &str, size: [usize; 2]) -> CanvasOutput {
-    let mut view = memory.bubble_view;
+fn canvas(cx: &mut Cx<'_>, ui: &mut Ui, label: &str, size: [usize; 2]) -> CanvasOutput {
+    let mut view = cx.shared.views.bubble;
     let canvas = ImageCanvas { label, size, rotated: false, primary: Primary::Pan, background: cx.p.canvas };
     let output = canvas.show(ui, &mut view);
-    memory.bubble_view = view;
+    cx.shared.views.bubble = view;
     output
 }
 
@@ -203,7 +196,7 @@ fn picture(
         return None;
     };
     let label = format!("Compare {letter:?} {}", cx.state.finger_name(finger));
-    let output = canvas(cx, ui, memory, &label, depth.size());
+    let output = canvas(cx, ui, &label, depth.size());
     let histogram = paint(cx, ui, &output, letter, subject, finger, depth)?;
     let wiped = versus.mode == VersusMode::Wipe && !flipped;
     if wiped {
@@ -246,7 +239,7 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
     const REACH: f32 = 6.0;
     let image = output.map.image_rect;
     let clip = output.painter.clip_rect();
-    let x = (image.left() + memory.compared.wipe * image.width()).clamp(clip.left(), clip.right());
+    let x = (image.left() + memory.wipe * image.width()).clamp(clip.left(), clip.right());
     let handle = Rect::from_min_max(pos2(x - REACH, clip.top()), pos2(x + REACH, clip.bottom()));
     let drag = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
     let named = format!("Line between A and B, {}", cx.state.finger_name(finger));
@@ -256,7 +249,7 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
     }
     if drag.dragged() {
         let moved = drag.drag_delta().x / image.width().max(1.0);
-        memory.compared.wipe = (memory.compared.wipe + moved).clamp(0.0, 1.0);
+        memory.wipe = (memory.wipe + moved).clamp(0.0, 1.0);
     }
     let right = clip.with_min_x(x);
     if let Some(depth) = cx.state.subject(&versus.b, finger).shown() {
@@ -278,7 +271,7 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
 }
 
 /// A minus B.
-fn difference(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, versus: &Versus, finger: PadId) -> Option<Histogram> {
+fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> Option<Histogram> {
     for subject in [&versus.a, &versus.b] {
         let lookup = cx.state.subject(subject, finger);
         if lookup.shown().is_none() {
@@ -292,11 +285,11 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, versus: &Versus
         return None;
     };
     let label = format!("A minus B {}", cx.state.finger_name(finger));
-    let output = canvas(cx, ui, memory, &label, found.error.size());
+    let output = canvas(cx, ui, &label, found.error.size());
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let keys = [&versus.a, &versus.b].map(|subject| cx.state.subject_key(subject, finger));
     let [Ok(a), Ok(b)] = keys else { return None };
-    let range = Range::symmetric(memory.error_mm * 1e-3);
+    let range = Range::symmetric(cx.shared.views.error_m());
     let key = (VersusKey { a, b }, range.hi.to_bits());
     let picture = cx.shared.textures.get(ui.ctx(), ("compared difference", finger), key, squares, || {
         (depth_image(&found.error, ColorMap::Diverging, range), Histogram::of(found.error.as_slice()))
