@@ -611,7 +611,7 @@ mod tests {
             assert!(action.help().starts_with(action.tooltip()));
         }
         assert_eq!(Action::Redo.help(), "Does it again (Ctrl+Shift+Z)");
-        assert_eq!(Action::CameraTop.shortcut().unwrap().to_string(), "Ctrl+Alt+4");
+        assert_eq!(Action::CameraTop.shortcut().unwrap().to_string(), "Ctrl+4");
         assert_eq!(Group::iter().flat_map(Group::actions).count(), Action::iter().count());
     }
 

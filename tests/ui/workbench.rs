@@ -315,6 +315,7 @@ fn what_no_pane_shows_is_not_computed_and_rest_is_rest() {
         assert!(off.position_m < 0.02, "{of:?} {off:?}");
     }
     rig.shoot("test-poses");
+    rig.send(TasksCommand::LogSeen(u64::MAX));
     // At rest nothing is painted; while the weak direction is shown moving, it is; and then it rests again.
     rig.harness.step();
     assert!(!rig.asks_to_repaint());

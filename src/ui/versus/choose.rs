@@ -3,12 +3,11 @@
 use std::collections::BTreeSet;
 
 use eframe::egui::containers::menu::{MenuButton, MenuConfig};
-use eframe::egui::{self, Button, ComboBox, DragValue, PopupCloseBehavior, RichText, Ui};
+use eframe::egui::{self, Button, DragValue, PopupCloseBehavior, RichText, Ui};
 use strum::IntoEnumIterator as _;
 
 use super::{Letter, color};
 use crate::app::settings::{STEPS, Versus};
-use crate::domain::postprocess::ShiftMode;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption};
 use crate::ui::widget::cut::cut_in_the_middle;
@@ -98,37 +97,28 @@ fn made(cx: &Cx<'_>) -> BTreeSet<Wish> {
 
 /// Model, seed, steps and way to meters; what was changed.
 fn change(cx: &Cx<'_>, ui: &mut Ui, wish: &Wish) -> Option<Wish> {
-    const AS_SET: &str = "as in Generate";
     let mut new = wish.clone();
-    egui::Grid::new("wish").num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| {
-        ui.label("Model");
-        let rig = cx.state.rig();
-        let models = cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator && b.fits(&rig));
-        let named = new.bundle.clone().unwrap_or(AS_SET.into());
-        let combo = ComboBox::from_id_salt("model").selected_text(cut(&named, 24));
-        let combo = combo.show_ui(ui, |ui| {
-            ui.selectable_value(&mut new.bundle, None, AS_SET);
-            for bundle in models {
-                ui.selectable_value(&mut new.bundle, Some(bundle.name.clone()), &bundle.name);
-            }
-        });
-        combo.response.accessible_name("Model of this prediction");
-        ui.end_row();
-        let generate = &cx.state.settings.generate;
+    ui.spacing_mut().item_spacing.y = 2.0;
+    let rig = cx.state.rig();
+    for bundle in cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator && b.fits(&rig)) {
+        let on = new.bundle.as_deref() == Some(bundle.name.as_str());
+        let tip = "By this model; a second click leaves it to the Generate pane";
+        if ui.selectable_label(on, &bundle.name).on_hover_text(tip).clicked() {
+            new.bundle = (!on).then(|| bundle.name.clone());
+        }
+    }
+    let generate = &cx.state.settings.generate;
+    ui.horizontal(|ui| {
         number(ui, "Seed", &mut new.seed, generate.seed, 0..=u64::from(u32::MAX));
         number(ui, "Steps", &mut new.steps, generate.steps, STEPS);
-        ui.label("To meters");
-        let text = new.shift.map_or(AS_SET, |mapping| mapping.mode().label());
-        let combo = ComboBox::from_id_salt("to meters").selected_text(text).show_ui(ui, |ui| {
-            ui.selectable_value(&mut new.shift, None, AS_SET);
-            for mapping in Mapping::iter() {
-                let mode: ShiftMode = mapping.mode();
-                ui.selectable_value(&mut new.shift, Some(mapping), mode.label());
-            }
-        });
-        combo.response.accessible_name("Way to meters of this prediction");
-        ui.end_row();
     });
+    for mapping in Mapping::iter() {
+        let on = new.shift == Some(mapping);
+        let tip = "Becomes meters in this way; a second click leaves it to the Generate pane";
+        if ui.selectable_label(on, mapping.mode().label()).on_hover_text(tip).clicked() {
+            new.shift = (!on).then_some(mapping);
+        }
+    }
     ui.label(RichText::new("What is not chosen here is as in the Generate pane.").size(SMALL).color(cx.p.weak));
     (new != *wish).then_some(new)
 }
@@ -150,5 +140,4 @@ fn number<N: egui::emath::Numeric>(
     if drag.accessible_name(name).changed() {
         *value = Some(number);
     }
-    ui.end_row();
 }
