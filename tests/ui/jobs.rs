@@ -100,7 +100,7 @@ fn the_distance_between_the_model_and_the_tip_is_read() {
         }
         person.rig.settle();
         let said = person.rig.harness.query_all_by_label_contains("from the model");
-        let said = said.filter_map(|node| number(&node.accesskit_node().label()?)).next();
+        let said = said.filter_map(|node| number(&node.accesskit_node().value()?)).next();
         read.extend(said.map(|mm| (mm - off * 1e3).abs()));
     }
     person.actions += 1;
