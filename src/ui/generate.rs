@@ -117,13 +117,6 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
         let both = ui.checkbox(&mut new.both_fingers, "both fingers");
         both.on_hover_text("Generate for both fingers: the pose needs both. Off: only the active finger");
     });
-    row(ui, cx.p.weak, "", |ui| {
-        let by_itself = ui.checkbox(&mut new.by_itself, "by itself under 1 s");
-        by_itself.on_hover_text(
-            "The pair on screen is predicted without a click where that takes less than a second on this machine, by \
-             what earlier predictions took. Default on",
-        );
-    });
     row(ui, cx.p.weak, "Seed", |ui| {
         let drag = egui::DragValue::new(&mut new.seed).speed(1.0);
         reset(
@@ -154,6 +147,11 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
         reset(ui.add(drag.prefix("every ").suffix(" steps")).accessible_name("Preview"), tip, "4", || {
             new.preview_every = GenerateSettings::default().preview_every;
         });
+        let by_itself = ui.checkbox(&mut new.by_itself, "by itself");
+        by_itself.on_hover_text(
+            "The pair on screen is predicted without a click where that takes less than a second on this machine, by \
+             what earlier predictions took. Default on",
+        );
     });
     if new != spelt_out {
         // Whoever changes a number has left the preset.

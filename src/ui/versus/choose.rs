@@ -8,10 +8,11 @@ use strum::IntoEnumIterator as _;
 
 use super::{Letter, color};
 use crate::app::settings::{STEPS, Versus};
+use crate::domain::rig::SensorKind;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption};
 use crate::ui::widget::cut::cut_in_the_middle;
-use crate::work::bundles::BundleKind;
+use crate::work::bundles::BundleInfo;
 use crate::work::subject::{Mapping, SEEDS, Subject, Wish};
 
 /// Width of a letter in a button, points.
@@ -100,7 +101,8 @@ fn change(cx: &Cx<'_>, ui: &mut Ui, wish: &Wish) -> Option<Wish> {
     let mut new = wish.clone();
     ui.spacing_mut().item_spacing.y = 2.0;
     let rig = cx.state.rig();
-    for bundle in cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator && b.fits(&rig)) {
+    let depth = |b: &&BundleInfo| b.generator.as_ref().is_some_and(|g| g.sensors.output.kind == SensorKind::Depth);
+    for bundle in cx.state.library.bundles.iter().filter(|b| b.fits(&rig)).filter(depth) {
         let on = new.bundle.as_deref() == Some(bundle.name.as_str());
         let tip = "By this model; a second click leaves it to the Generate pane";
         if ui.selectable_label(on, &bundle.name).on_hover_text(tip).clicked() {
