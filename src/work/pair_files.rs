@@ -1,4 +1,4 @@
-//! A pair in files for other programs: its cloud as PLY, its pose as JSON, its CAD model in the hand as STL ([`write`]).
+//! A pair in files for other programs: its cloud as PLY, its pose as JSON, its CAD model in the hand as STL ([`write()`]).
 
 use std::path::{Path, PathBuf};
 

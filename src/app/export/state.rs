@@ -160,7 +160,7 @@ impl PairExport {
     /// Writes the files that there can be: without a pose only the cloud.
     ///
     /// # Errors
-    /// As [`write`].
+    /// As [`write()`].
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, TaskError> {
         let files: Vec<PairFile> =
             PairFile::iter().filter(|file| *file == PairFile::Cloud || self.pose.is_some()).collect();
