@@ -10,7 +10,6 @@ pub use crate::work::mask::MaskRecipe;
 pub use super::results::Request;
 pub use super::results::basin::BasinKey;
 pub use super::results::cloud::CloudKey;
-pub use super::results::comparison::ComparisonKey;
 pub use super::results::ensemble::EnsembleKey;
 pub use super::results::imprint::{ImprintKey, MetersKey};
 pub use super::results::mask::{MaskKey, MaskVersion};

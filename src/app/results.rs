@@ -236,14 +236,12 @@ results! {
     Imprint(imprint::MetersKey) in imprints, 64 * MIB;
     /// A prediction of a color sensor: differences, 0..255 scale.
     Color(imprint::ColorKey) in colors, 32 * MIB;
-    /// A prediction against the measurement.
-    Comparison(comparison::ComparisonKey) in comparisons, 32 * MIB;
     /// The prediction of another program that lies beside a pair as a picture.
     Picture(picture::PictureKey) in pictures, 16 * MIB;
     /// A prediction that is compared with something: kept with the others.
     Compared(versus::ComparedKey);
     /// Any two imprints of a touch against each other.
-    Versus(versus::VersusKey) in versus, 32 * MIB;
+    Versus(versus::VersusKey) in versus, 64 * MIB;
     /// How far the points of one cloud lie from another.
     Apart(versus::ApartKey) in apart, 16 * MIB;
     /// The depth chain of a prediction, stage by stage.

@@ -232,11 +232,18 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
         let (tool, odd) = load_tool(&dataset, name)?;
         notes.take(&output, &odd);
         let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
-        let pose_of = |subject: &Subject, found: &Found| -> anyhow::Result<PoseResult> {
+        let mut predictor = Predictor::new(&args.model, &dataset.rig);
+        let mut pose_of = |subject: &Subject, found: &Found| -> anyhow::Result<PoseResult> {
             // What was drawn was drawn for what is always shown.
             let own = *subject == Subject::Measured || *subject == Subject::shown();
             let labels = args.mask.drawn(&labels).filter(|_| own);
-            posed(args, &dataset, &found.imprints, MaskInputs { sample: &sample, tool: Some(&tool), labels }, &tool)
+            posed(
+                args,
+                &mut predictor,
+                &found.imprints,
+                MaskInputs { sample: &sample, tool: Some(&tool), labels },
+                &tool,
+            )
         };
         match (pose_of(&args.a, &found[0]), pose_of(&args.b, &found[1])) {
             (Ok(a), Ok(b)) => poses = Some(apart(&a, &b)),
@@ -259,12 +266,11 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
 
 fn posed(
     args: &CompareArgs,
-    dataset: &Dataset,
+    predictor: &mut Predictor,
     imprints: &PerPad<DepthMap>,
     inputs: MaskInputs<'_>,
     tool: &ToolModel,
 ) -> anyhow::Result<PoseResult> {
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let contact = predictor.contact(&args.mask, imprints.clone(), inputs)?;
     let points = contact.points(inputs.sample)?;
     Ok(pose(&points, tool, &*args.engine.method(), Ask::default(), inputs.sample.grasp_from_object)?)

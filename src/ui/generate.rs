@@ -8,7 +8,7 @@ use super::theme::{SMALL, caption, section, value};
 use super::widget::progress;
 use crate::app::action::Action;
 use crate::app::command::{Pane, PredictCommand, SettingsCommand, TasksCommand};
-use crate::app::keys::{ComparisonKey, PredictionKey, Preset, Sampler, ShiftMode, shift_tooltip};
+use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode, VersusKey, shift_tooltip};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::domain::diffusion::GUIDANCE;
 use crate::work::bundles::{BundleInfo, BundleKind};
@@ -271,8 +271,8 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
         let psnr = cx
             .state
             .results
-            .comparisons
-            .get(&ComparisonKey(recipe.clone(), shift))
+            .versus
+            .get(&VersusKey::measured(recipe.clone(), shift))
             .and_then(|c| c.psnr_db)
             .map_or(String::new(), |v| format!("{v:.1} dB"));
         let made = cx.state.results.predictions.get(recipe);

@@ -95,7 +95,11 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
         if let Some(pose) = cx.state.pose(source).shown() {
             let p = pose.grasp_from_object;
             let text = format!("y {:.2} mm   z {:.2} mm", units::mm(p.y_m), units::mm(p.z_m));
-            ui.label(value(text, cx.p).size(SMALL)).on_hover_text("Place of the object's origin in the grasp frame");
+            ui.horizontal(|ui| {
+                let place = ui.label(value(text, cx.p).size(SMALL));
+                place.on_hover_text("Place of the object's origin in the grasp frame");
+                ui.label(caption(scene::pose_time(pose), cx.p)).on_hover_text("What this registration took");
+            });
             ui.label(caption(scene::pose_details(pose), cx.p));
             let action = match source {
                 ImprintSource::Measured => Action::AcceptMeasuredPose,

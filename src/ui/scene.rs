@@ -15,7 +15,7 @@ use eframe::egui::{self, Color32, Ui};
 use glam::{DAffine3, DVec3};
 use strum::IntoEnumIterator as _;
 
-use build::{SceneCloud, SceneMesh, SceneSurface};
+use build::{SceneCloud, SceneSurface};
 use gizmo::Gizmo;
 use layers::LayerColors;
 use steps::StepLines;
@@ -35,10 +35,10 @@ use crate::gpu::pick::nearest_point;
 use crate::gpu::view::{Camera, Preset};
 use crate::work::cloud::Clouds;
 
-pub(super) use build::{guides, parts};
+pub(super) use build::{SceneMesh, guides, model_edges, parts, update_mesh};
 pub(super) use layers::{DISTANCE_MAP, outline};
 pub(super) use legend::distances;
-pub(super) use overlay::{angle_text, error_color, pose_details};
+pub(super) use overlay::{angle_text, error_color, pose_details, pose_time};
 
 /// Width of the column of buttons, points.
 const BUTTONS: f32 = 28.0;
@@ -162,7 +162,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
             build::update_cloud(cx, memory, other, key, clouds);
         }
     }
-    build::update_mesh(cx, memory);
+    build::update_mesh(cx, &mut memory.mesh, &mut memory.revision);
     layers::update(cx, memory, source);
     steps::update(cx, memory, source);
     let label = match source {

@@ -9,6 +9,7 @@ use super::super::services::{DataSource, Services};
 use super::preview::Onlooker;
 use super::{Computes, Job, Lane, SharedServices, State, TouchKey, Wanted};
 use crate::domain::diffusion::GenerateConfig;
+use crate::domain::ensemble::seeds;
 use crate::domain::grid::RgbGrid;
 use crate::domain::rig::{PadId, SensorId};
 use crate::domain::sample::Sample;
@@ -56,6 +57,11 @@ impl PredictionKey {
             guidance: (config.guidance as f32).into(),
             runtime,
         }
+    }
+
+    /// The recipes that differ from it in their seeds alone: `count` of them, from its own on.
+    pub fn with_seeds(&self, count: usize) -> Vec<Self> {
+        seeds(self.seed, count).into_iter().map(|seed| Self { seed, ..self.clone() }).collect()
     }
 
     /// The choices of one generation.

@@ -13,7 +13,6 @@ use super::picture::PictureKey;
 use super::pose::PoseKey;
 use super::prediction::{PredictionKey, SeedKey};
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
-use crate::domain::ensemble::seeds;
 use crate::domain::grid::DepthMap;
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
@@ -50,6 +49,13 @@ pub struct VersusKey {
     pub a: ImprintKey,
     /// The other.
     pub b: ImprintKey,
+}
+
+impl VersusKey {
+    /// A prediction against the measurement of its touch.
+    pub fn measured(recipe: PredictionKey, shift: ShiftMode) -> Self {
+        Self { b: ImprintKey::Measured(recipe.touch), a: ImprintKey::Predicted(recipe, shift) }
+    }
 }
 
 /// An imprint with what is known of its picture, as an input of a job.
@@ -94,7 +100,11 @@ impl Computes for VersusKey {
         let parts = [Part::of(&self.a, state)?, Part::of(&self.b, state)?];
         let sample = state.results.samples.get(&touch.pair)?.clone();
         let source = state.library.open.as_ref()?.source.clone();
-        Some(Job::new(Lane::Compute, "Compare A and B", move |_| {
+        let what = match self.b {
+            ImprintKey::Measured(_) => "Compare prediction and measurement",
+            _ => "Compare A and B",
+        };
+        Some(Job::new(Lane::Compute, what, move |_| {
             let tile = match source.as_dataset() {
                 Some(dataset) => tile_of(dataset, touch.pair.pair, &sample)?,
                 None => None,
@@ -176,8 +186,7 @@ impl State {
             Subject::Predicted(wish) => self.wished(touch, wish).map(|(recipe, shift)| (vec![recipe], shift)),
             Subject::Mean(wish, count) => {
                 let (first, shift) = self.wished(touch, wish)?;
-                let recipe = |seed| PredictionKey { seed, ..first.clone() };
-                Ok((seeds(first.seed, *count).into_iter().map(recipe).collect(), shift))
+                Ok((first.with_seeds(*count), shift))
             }
         }
     }

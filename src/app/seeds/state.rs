@@ -5,13 +5,11 @@ use super::super::pane::Need;
 use super::super::results::prediction::SeedKey;
 use super::super::state::{Absent, State};
 use super::super::wanted::Wanted;
-use crate::domain::ensemble::seeds;
 use crate::domain::grid::DepthMap;
 use crate::domain::rig::PadId;
 use crate::work::pose::PoseResult;
 
-/// Fewest and most seeds of an ensemble.
-pub const COUNT: std::ops::RangeInclusive<usize> = 2..=16;
+pub use crate::work::subject::SEEDS as COUNT;
 
 /// What a person chose about seeds.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,8 +43,7 @@ impl State {
         if self.is_color(&first) {
             return Err(Absent::PredictsColor);
         }
-        let recipe = |seed| PredictionKey { seed, ..first.clone() };
-        Ok(seeds(first.seed, self.seeds.count).into_iter().map(recipe).collect())
+        Ok(first.with_seeds(self.seeds.count))
     }
 
     /// The recipe that a run of seeds belongs to: that of the first finger, of the pair on screen.

@@ -44,7 +44,7 @@ pub(super) struct SceneSurface {
 }
 
 /// A CAD model as the renderer takes it.
-pub(super) struct SceneMesh {
+pub(in crate::ui) struct SceneMesh {
     /// The data set and the tool.
     pub key: (DatasetSeq, String),
     /// Counts up with every new model.
@@ -101,15 +101,16 @@ fn window(cx: &Cx<'_>, clouds: &Clouds) -> Option<[DVec3; 2]> {
     found
 }
 
-pub(super) fn update_mesh(cx: &Cx<'_>, memory: &mut Memory) {
+/// Makes the CAD model for the renderer, where it is another one.
+pub(in crate::ui) fn update_mesh(cx: &Cx<'_>, held: &mut Option<SceneMesh>, revision: &mut u64) {
     let Some(tool) = cx.state.tool().shown() else { return };
     let Some(open) = &cx.state.library.open else { return };
-    if memory.mesh.as_ref().is_some_and(|m| m.key.0 == open.seq && m.key.1 == tool.name) {
+    if held.as_ref().is_some_and(|m| m.key.0 == open.seq && m.key.1 == tool.name) {
         return;
     }
-    memory.revision += 1;
+    *revision += 1;
     let key = (open.seq, tool.name.clone());
-    memory.mesh = Some(SceneMesh { key, revision: memory.revision, mesh: Arc::new(tool.model.mesh.clone()) });
+    *held = Some(SceneMesh { key, revision: *revision, mesh: Arc::new(tool.model.mesh.clone()) });
 }
 
 /// The color of a layer: the person's, else the theme's. No two layers share one.
@@ -332,18 +333,21 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64, sce
             // Where the points' own colors are looked at, the model lets them through.
             let through = memory.layer_colors[source as usize].is_some()
                 && matches!(state.workbench.layer, Layer::Residuals | Layer::Reasons);
-            let edge = theme::mix(color, cx.p.canvas, 0.7);
-            let edges = EdgeStyle { color: rgb(edge), opacity: 0.9, width_px: 1.2, creases: true };
             item.style = MeshStyle {
                 look: if through { Look::XRay } else { Look::Solid },
                 opacity: if through { 0.6 } else { look.opacity },
-                edges: settings.edges.then_some(edges),
+                edges: settings.edges.then(|| model_edges(cx, color)),
                 ..item.style
             };
             layers::paint_model(memory, source, world_from_mesh, &mut item);
         }
         scene.meshes.push(item);
     }
+}
+
+/// The edges of a shaded model of a color.
+pub(in crate::ui) fn model_edges(cx: &Cx<'_>, color: Color32) -> EdgeStyle {
+    EdgeStyle { color: rgb(theme::mix(color, cx.p.canvas, 0.7)), opacity: 0.9, width_px: 1.2, creases: true }
 }
 
 /// Floor grid and axes.

@@ -115,20 +115,18 @@ pub(in crate::ui) fn error_color(p: &Palette, error_rad: f64) -> Color32 {
     }
 }
 
-/// Points, residual, stop reason, time.
+/// How long a registration took. On a line of its own: no other text wraps elsewhere because a machine was busy.
+pub(in crate::ui) fn pose_time(pose: &PoseResult) -> String {
+    format!("in {:.0} ms", pose.ms)
+}
+
+/// Points, residual, stop reason.
 pub(in crate::ui) fn pose_details(pose: &PoseResult) -> String {
-    // The unit stays with its number where the line wraps.
-    let ms = pose.ms;
     let report = &pose.report;
     let found = if report.rung == Rung::Fixed { String::new() } else { format!(" · {}", report.rung) };
     let beyond = if report.within_prior { "" } else { " · beyond what the gripper can hold (±22.5°, ±5 mm)" };
     let open = if report.is_degenerate() { " · not fully determined" } else { "" };
-    format!(
-        "{} points · residual {} · {}{found}{open}{beyond} · {ms:.1}\u{a0}ms",
-        pose.num_points,
-        units::text_mm(pose.rms_m),
-        pose.stop
-    )
+    format!("{} points · residual {} · {}{found}{open}{beyond}", pose.num_points, units::text_mm(pose.rms_m), pose.stop)
 }
 
 fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output: &SceneOutput, rect: Rect) {

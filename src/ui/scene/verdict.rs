@@ -3,7 +3,7 @@
 use eframe::egui::{Button, Color32, RichText, Sense, Ui, vec2};
 
 use super::hands;
-use super::overlay::{difference, lower_first, pose_details, step_text};
+use super::overlay::{difference, lower_first, pose_details, pose_time, step_text};
 use crate::app::action::Action;
 use crate::app::command::SettingsCommand;
 use crate::app::keys::ImprintSource;
@@ -140,7 +140,7 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
             if found.is_empty() {
                 text += &format!(" · residual {}", units::text_mm(pose.rms_m));
             }
-            let mut details = vec![pose_details(pose)];
+            let mut details = vec![format!("{}, {}", pose_details(pose), pose_time(pose))];
             details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
             (text, grade.color(cx.p), details)
         }

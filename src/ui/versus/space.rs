@@ -9,15 +9,13 @@ use super::{Letter, color};
 use crate::app::keys::{ApartKey, CloudKey, DatasetSeq};
 use crate::app::settings::{SceneLayer, Versus, VersusMode};
 use crate::domain::colormap::Range;
-use crate::domain::mesh::TriMesh;
 use crate::domain::rig::PerPad;
 use crate::domain::units;
-use crate::gpu::edges::EdgeStyle;
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
 use crate::ui::cx::Cx;
-use crate::ui::scene::{DISTANCE_MAP, distances, guides, outline, parts, rgb};
+use crate::ui::scene::{DISTANCE_MAP, SceneMesh, distances, guides, model_edges, outline, parts, rgb, update_mesh};
 use crate::ui::scene_view::SceneView;
 use crate::ui::theme::{self, SMALL};
 use crate::ui::widget::empty;
@@ -31,7 +29,7 @@ pub(super) struct Space {
     view: SceneView,
     clouds: [Option<Held>; 2],
     apart: Option<(ApartKey, u64, PerPad<Colored>)>,
-    mesh: Option<(DatasetSeq, String, u64, Arc<TriMesh>)>,
+    mesh: Option<SceneMesh>,
     fitted: Option<(DatasetSeq, u64)>,
     revision: u64,
 }
@@ -134,12 +132,7 @@ fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
             }
         }
     }
-    if let (Some(tool), Some(open)) = (cx.state.tool().shown(), &cx.state.library.open)
-        && space.mesh.as_ref().is_none_or(|(seq, name, ..)| (*seq, name) != (open.seq, &tool.name))
-    {
-        space.revision += 1;
-        space.mesh = Some((open.seq, tool.name.clone(), space.revision, Arc::new(tool.model.mesh.clone())));
-    }
+    update_mesh(cx, &mut space.mesh, &mut space.revision);
 }
 
 /// Everything that is drawn.
@@ -173,7 +166,7 @@ fn scene(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool) -> SceneDat
                         revision: held.revision,
                         points: points.clone(),
                         colors: PointColors::One,
-                        style: CloudStyle { size: PointSize::Meters(POINT_M), ..style(color) },
+                        style: style(color),
                     });
                 }
             }
@@ -188,7 +181,7 @@ fn scene(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool) -> SceneDat
 
 /// The model at the pose of each: shaded where A has it, as an outline where B has it.
 fn models(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool, scene: &mut SceneData) {
-    let Some((_, _, revision, mesh)) = &space.mesh else { return };
+    let Some(held) = &space.mesh else { return };
     let cad = cx.state.settings.scene.layer(SceneLayer::Cad);
     for letter in [Letter::A, Letter::B] {
         let Some(pose) = cx.state.subject_pose(letter.of(versus)) else { continue };
@@ -199,21 +192,21 @@ fn models(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool, scene: &mu
         let solid = letter == Letter::A || flipped;
         let plain =
             outline(world_from_mesh, color(cx.p, versus, letter), cx.state.settings.scene.layer(SceneLayer::OtherCad));
-        let edge = EdgeStyle {
-            color: rgb(theme::mix(cx.p.cad, cx.p.canvas, 0.7)),
-            opacity: 0.9,
-            width_px: 1.2,
-            creases: true,
-        };
         let style = if solid {
-            MeshStyle { look: Look::XRay, opacity: 0.5, color: rgb(cx.p.cad), edges: Some(edge), ..plain }
+            MeshStyle {
+                look: Look::XRay,
+                opacity: 0.5,
+                color: rgb(cx.p.cad),
+                edges: Some(model_edges(cx, cx.p.cad)),
+                ..plain
+            }
         } else {
             plain
         };
         scene.meshes.push(MeshItem {
             name: format!("CAD {letter:?}"),
-            revision: *revision,
-            mesh: mesh.clone(),
+            revision: held.revision,
+            mesh: held.mesh.clone(),
             shading: Shading::Smooth,
             values: Arc::default(),
             style,
