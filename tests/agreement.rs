@@ -23,6 +23,7 @@ use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Grid;
 use touch2touch::domain::postprocess::ShiftMode;
 use touch2touch::io::images;
+use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::subject::Subject;
 
 use crate::support::run;
@@ -305,7 +306,8 @@ fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
     studio.send(LabelsCommand::LargestIsland.into());
     studio.send(LabelsCommand::AcceptPose(ImprintSource::Measured, true).into());
     let exported = home.path().join("by_studio");
-    studio.send(LabelsCommand::ExportMasks(exported.clone()).into());
+    studio.send(ExportCommand::SetMasks(ExportChoice { which: Which::Begun, ..ExportChoice::default() }).into());
+    studio.send(ExportCommand::Write(Output::Masks, exported.clone()).into());
     let state = &studio.state;
     assert_eq!(state.document.review(&names[2]).stored(), "skip");
     assert_eq!(state.document.review(&names[0]).stored(), "in_progress");
@@ -322,8 +324,8 @@ fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
     }
     // Both export the same files.
     let by_verb = home.path().join("by_verb");
-    let export = json(&["masks", "export", path, "--out", by_verb.to_str().unwrap()], home.path());
-    assert_eq!((&export["corrected"], &export["skipped"]), (&2.into(), &0.into()));
+    let export = json(&["masks", "export", path, "--pairs", "begun", "--out", by_verb.to_str().unwrap()], home.path());
+    assert_eq!((&export["corrected"], &export["left_out"]), (&2.into(), &serde_json::json!({ "skip": 1 })));
     let files = |root: &Path| {
         let mut found = BTreeMap::new();
         let mut folders = vec![root.to_owned()];

@@ -38,6 +38,7 @@ use touch2touch::io::images;
 use touch2touch::io::masks::{FOLDER, MaskStore};
 use touch2touch::work::bundles::BundleInfo;
 use touch2touch::work::error::TaskError;
+use touch2touch::work::export::{ExportChoice, Plan};
 use touch2touch::work::job::JobCx;
 use touch2touch::work::models::Wanted;
 use touch2touch::work::prediction::Prediction;
@@ -84,7 +85,17 @@ impl DataSource for Source {
     fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError> {
         if self.saves { self.live.save_labels(name, labels) } else { Ok(()) }
     }
-    fn export_masks(&self, _: &BTreeMap<String, PairLabels>, _: &Path, _: &JobCx) -> Result<String, TaskError> {
+    fn plan_masks(&self, _: &BTreeMap<String, PairLabels>, _: ExportChoice) -> Result<Plan, TaskError> {
+        Err(TaskError::new("Export masks", "it is not tried here"))
+    }
+
+    fn export_masks(
+        &self,
+        _: &BTreeMap<String, PairLabels>,
+        _: ExportChoice,
+        _: &Path,
+        _: &JobCx,
+    ) -> Result<String, TaskError> {
         Err(TaskError::new("Export", "not part of this test"))
     }
 }

@@ -3,6 +3,7 @@
 //! Everything is the program's own (files, labels, settings, simulator, registration) but the generator, which is a
 //! quick double: what models do is tested where models are.
 
+mod label;
 mod layout;
 mod look;
 mod rig;

@@ -325,7 +325,7 @@ impl Action {
             Self::SaveCase => when(state.can_draw(), ExportCommand::Place(Output::Case)),
             Self::ExportMeasured => export(state, ImprintSource::Measured),
             Self::ExportPredicted => export(state, ImprintSource::Predicted),
-            Self::ExportMasks => when(open, ViewCommand::Ui(UiRequest::PickExportFolder)),
+            Self::ExportMasks => when(open, ExportCommand::AskMasks(true)),
 
             Self::PreviousSample => when(listed, LibraryCommand::Step(-1)),
             Self::NextSample => when(listed, LibraryCommand::Step(1)),

@@ -17,6 +17,7 @@ use crate::work::adapt::AdaptSetup;
 use crate::work::bundles::BundleInfo;
 use crate::work::case::CaseSetup;
 use crate::work::evaluate::{Evaluation, Setup};
+use crate::work::export::ExportChoice;
 use crate::work::figure::FigureSetup;
 
 /// A pair whose labels are to be written.
@@ -86,6 +87,8 @@ pub enum Effect {
         source: Arc<dyn DataSource>,
         /// Labels changed since they were read, by pair name: newer than the files.
         labels: BTreeMap<String, PairLabels>,
+        /// Which of them, and how they are divided.
+        choice: ExportChoice,
         /// Where to.
         folder: PathBuf,
     },

@@ -14,6 +14,7 @@ use super::view::state::UiRequest;
 use super::{library, predict, settings};
 use crate::io::case_file;
 use crate::work::error::TaskError;
+use crate::work::export::ExportChoice;
 use crate::work::figure::FigureSetup;
 
 /// What can happen to what is taken away.
@@ -23,6 +24,10 @@ pub enum ExportCommand {
     Ask(bool),
     /// Changes what it says.
     SetForm(FigureForm),
+    /// Opens or closes the form of an export of masks.
+    AskMasks(bool),
+    /// Changes what it says.
+    SetMasks(ExportChoice),
     /// Asks where something is to be written.
     Place(Output),
     /// Writes it.
@@ -35,6 +40,8 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
     match command {
         ExportCommand::Ask(asking) => state.export.asking = asking,
         ExportCommand::SetForm(form) => state.export.form = form.validated(),
+        ExportCommand::AskMasks(asking) => state.export.asking_masks = asking,
+        ExportCommand::SetMasks(choice) => state.export.masks = choice,
         ExportCommand::Place(output) => effects.push(Effect::Ui(UiRequest::PickOutput(output))),
         ExportCommand::WriteCase(file, camera) => {
             let (Some(setup), Some(open)) = (state.case_setup(&camera), &state.library.open) else { return };
@@ -117,6 +124,13 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             draw(state, "Draw the figure", setup, ended(file, "png"), effects);
         }
         Output::Case => {}
+        Output::Masks => {
+            let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
+            state.export.asking_masks = false;
+            let ticket = state.tasks.start("Export masks".into(), Vec::new());
+            let (labels, choice) = (state.document.labels.clone(), state.export.masks);
+            effects.push(Effect::ExportMasks { ticket, source, labels, choice, folder: file });
+        }
         Output::Pair(source) => {
             let Some(pair) = state.pair_export(source) else {
                 let err = TaskError::new("Export the pair", format!("there is no {} cloud of it", source.key()));

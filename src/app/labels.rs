@@ -4,7 +4,6 @@ pub mod state;
 
 pub use state::{Document, HandMask, PairLabels, Review, Stored, Stroke};
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::DVec2;
@@ -60,8 +59,6 @@ pub enum LabelsCommand {
     AcceptPose(ImprintSource, bool),
     /// Writes all labels and settings now.
     Save,
-    /// Writes the masks to a folder for UNet training.
-    ExportMasks(PathBuf),
 }
 
 pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<Effect>) {
@@ -86,11 +83,6 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         }
         LabelsCommand::AcceptPose(source, accept) => accept_pose(state, source, accept, effects),
         LabelsCommand::Save => save_all(state, effects),
-        LabelsCommand::ExportMasks(folder) => {
-            let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-            let ticket = state.tasks.start("Export masks".into(), Vec::new());
-            effects.push(Effect::ExportMasks { ticket, source, labels: state.document.labels.clone(), folder });
-        }
     }
 }
 

@@ -28,6 +28,7 @@ pub mod labels;
 pub mod layers;
 pub mod ledger;
 pub mod mask;
+pub mod mask_plan;
 pub mod picture;
 pub mod pose;
 pub mod prediction;
@@ -250,6 +251,8 @@ results! {
     Ambiguity(ambiguity::AmbiguityKey) in ambiguities, MIB;
     /// An automatic mask.
     Mask(mask::MaskKey) in masks, 32 * MIB;
+    /// What an export of masks would write where.
+    MaskPlan(mask_plan::MaskPlanKey) in mask_plans, MIB;
     /// A cloud.
     Cloud(cloud::CloudKey) in clouds, 128 * MIB;
     /// A pose.

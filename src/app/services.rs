@@ -29,6 +29,7 @@ use crate::work::bundles::BundleInfo;
 use crate::work::case::{self, Case, CaseSetup};
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
+use crate::work::export::{ExportChoice, Plan};
 use crate::work::job::JobCx;
 use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
@@ -85,6 +86,12 @@ pub trait DataSource: Send + Sync {
     /// If they cannot be written.
     fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError>;
 
+    /// What an export of masks would write where. `changed` is newer than what is stored.
+    ///
+    /// # Errors
+    /// If the masks cannot be divided.
+    fn plan_masks(&self, changed: &BTreeMap<String, PairLabels>, choice: ExportChoice) -> Result<Plan, TaskError>;
+
     /// Writes masks for UNet training; returns a line for the log. `changed` is newer than what is stored.
     ///
     /// # Errors
@@ -92,6 +99,7 @@ pub trait DataSource: Send + Sync {
     fn export_masks(
         &self,
         changed: &BTreeMap<String, PairLabels>,
+        choice: ExportChoice,
         folder: &Path,
         cx: &JobCx,
     ) -> Result<String, TaskError>;

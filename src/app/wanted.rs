@@ -23,6 +23,7 @@ impl State {
         list.thumbnails();
         list.scores();
         list.neighbors();
+        list.mask_plan();
         list.list
     }
 

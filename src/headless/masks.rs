@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
 
-use super::args::{DatasetArgs, LimitArgs};
+use super::args::{DatasetArgs, LimitArgs, keyed};
 use super::contact_mask::MaskArgs;
 use super::output::says;
 use super::predict::{ModelArgs, Predictor};
@@ -14,9 +14,9 @@ use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
-use crate::io::export_unet::{ExportConfig, PARTS};
+use crate::io::export_unet::ExportReport;
 use crate::work::error::TaskError;
-use crate::work::export::{Automatic, ExportSetup, HandMasks, export_masks};
+use crate::work::export::{Automatic, ExportChoice, ExportSetup, HandMasks, LeftOut, Which, export_masks, plan};
 use crate::work::labels::Labels;
 use crate::work::mask::MaskInputs;
 use crate::work::tool::Tools;
@@ -39,9 +39,19 @@ pub(super) struct ExportArgs {
     /// The form.
     #[arg(long, value_enum, default_value_t = Format::Unet)]
     format: Format,
-    /// Which pairs: only those with a mask corrected by hand, or all (`--mask` makes the missing masks).
-    #[arg(long, value_enum, default_value_t = Pairs::Corrected)]
-    pairs: Pairs,
+    /// Which pairs: those marked "done" with a mask drawn by hand, those begun too, or all (`--mask` makes the missing
+    /// masks). Pairs marked "skip" or "flagged" never go along.
+    #[arg(long, default_value = Which::default().key(), value_parser = keyed::<Which>())]
+    pairs: Which,
+    /// Divides pairs that the data set keeps for tests (test_only) like the rest; else they go to test.
+    #[arg(long)]
+    test_in_train: bool,
+    /// Sends all pairs of a tool to the same part.
+    #[arg(long)]
+    by_tool: bool,
+    /// Says what would go where, and writes nothing.
+    #[arg(long)]
+    dry_run: bool,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -63,14 +73,6 @@ enum Format {
     Unet,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Pairs {
-    /// Those with a mask corrected by hand.
-    Corrected,
-    /// All.
-    All,
-}
-
 #[derive(Serialize)]
 struct Exported {
     out: PathBuf,
@@ -78,8 +80,17 @@ struct Exported {
     val: usize,
     test: usize,
     corrected: usize,
-    /// Pairs left out because of their review state.
-    skipped: usize,
+    /// Pairs that go to test because the data set keeps them for tests.
+    held_out: usize,
+    /// Pairs that do not go along, by their review state.
+    left_out: BTreeMap<LeftOut, usize>,
+    /// Of what was written; missing in a dry run.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    written: Option<Written>,
+}
+
+#[derive(Serialize)]
+struct Written {
     out_of_range_px: usize,
     unmeasured_px: usize,
 }
@@ -92,7 +103,12 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let output = Output::new(args.common, "exporting", ids.len());
     let setup = ExportSetup {
         pairs: Some(ids.into_iter().map(|id| PairId(id as u32)).collect()),
-        split: ExportConfig { seed: args.split_seed, rig: dataset.rig.clone(), ..ExportConfig::default() },
+        choice: ExportChoice {
+            which: args.pairs,
+            test_in_train: args.test_in_train,
+            by_tool: args.by_tool,
+            seed: args.split_seed,
+        },
     };
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let mut tools = Tools::new(&dataset);
@@ -111,37 +127,31 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     };
     let labels = Labels::of(&dataset);
     let masks = HandMasks { labels: &labels, changed: &BTreeMap::new() };
-    let automatic: Option<Automatic<'_>> = (args.pairs == Pairs::All).then_some(&mut automatic);
-    let done = export_masks(&dataset, &masks, &setup, &args.out, automatic, &output.job())?;
-    let report = &done.report;
+    let (plan, written) = if args.dry_run {
+        (plan(&dataset, &masks, &setup)?, None)
+    } else {
+        let automatic: Option<Automatic<'_>> = (args.pairs == Which::All).then_some(&mut automatic);
+        let (plan, report) = export_masks(&dataset, &masks, &setup, &args.out, automatic, &output.job())?;
+        let ExportReport { out_of_range_px, unmeasured_px, .. } = report;
+        (plan, Some(Written { out_of_range_px, unmeasured_px }))
+    };
+    let [train, val, test] = plan.counts;
     let exported = Exported {
         out: args.out.clone(),
-        train: report.counts[0],
-        val: report.counts[1],
-        test: report.counts[2],
-        corrected: done.by_hand,
-        skipped: done.skipped,
-        out_of_range_px: report.out_of_range_px,
-        unmeasured_px: report.unmeasured_px,
+        train,
+        val,
+        test,
+        corrected: plan.by_hand,
+        held_out: plan.held_out,
+        left_out: plan.left_out.clone(),
+        written,
     };
     output.finish(&exported, || {
-        let skipped = match exported.skipped {
-            0 => String::new(),
-            n => format!("; {n} pairs marked \"skip\" left out"),
+        let end = match exported.written {
+            Some(_) => format!("written to {}, read back and accepted by the loader's rules", args.out.display()),
+            None => "nothing was written (--dry-run)".to_owned(),
         };
-        format!(
-            "{} masks in {} ({} {}, {} {}, {} {}); {} corrected by hand{skipped}; read back and accepted by the \
-             loader's rules",
-            report.counts.iter().sum::<usize>(),
-            args.out.display(),
-            report.counts[0],
-            PARTS[0],
-            report.counts[1],
-            PARTS[1],
-            report.counts[2],
-            PARTS[2],
-            exported.corrected
-        )
+        [plan.lines(), vec![end]].concat().join("\n")
     })?;
     Ok(true)
 }

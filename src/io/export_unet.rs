@@ -122,6 +122,8 @@ pub struct ExportEntry {
     pub tool: Option<String>,
     /// The finger.
     pub finger: PadId,
+    /// Whether its data set keeps it for tests of what was never trained on.
+    pub held_out: bool,
 }
 
 /// How to divide.
@@ -133,15 +135,27 @@ pub struct ExportConfig {
     pub val: f64,
     /// Share of pairs for test.
     pub test: f64,
+    /// Whether all pairs of a tool go to the same part, or each pair by itself.
+    pub by_tool: bool,
     /// Tools whose pairs all go to test (unseen tools).
     pub test_tools: Vec<String>,
+    /// Whether what is held out is divided like the rest; else it goes to test.
+    pub held_out_in_train: bool,
     /// The names of the pads.
     pub rig: Arc<Rig>,
 }
 
 impl Default for ExportConfig {
     fn default() -> Self {
-        Self { seed: 0, val: 0.1, test: 0.1, test_tools: Vec::new(), rig: Rig::lab() }
+        Self {
+            seed: 0,
+            val: 0.1,
+            test: 0.1,
+            by_tool: false,
+            test_tools: Vec::new(),
+            held_out_in_train: false,
+            rig: Rig::lab(),
+        }
     }
 }
 
@@ -205,6 +219,16 @@ impl<E: std::fmt::Display> From<E> for LoadFailure {
     fn from(err: E) -> Self {
         Self::Bad(err.to_string())
     }
+}
+
+/// How many of `entries` go to each of [`PARTS`].
+///
+/// # Errors
+/// [`ExportError::Shares`].
+pub fn counts(entries: &[ExportEntry], config: &ExportConfig) -> Result<[usize; 3], ExportError> {
+    let mut counts = [0; 3];
+    split::parts(entries, config)?.into_iter().for_each(|part| counts[part] += 1);
+    Ok(counts)
 }
 
 /// Writes `entries` to `folder`; `load(i)` gives the imprint (meters, raw orientation) and mask of `entries[i]`.

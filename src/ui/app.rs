@@ -295,7 +295,6 @@ impl StudioApp {
             UiRequest::PickFile => self.shared.dialogs.open(Purpose::File, ctx),
             UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
             UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
-            UiRequest::PickExportFolder => self.shared.dialogs.open(Purpose::Export, ctx),
             UiRequest::Camera(preset) => {
                 // The view under the pointer turns; linked cameras turn together.
                 let over = self.panes.hovered.filter(|pane| matches!(pane.kind(), Kind::Scene(_)));
@@ -481,13 +480,13 @@ impl eframe::App for StudioApp {
             });
             bars::hint(&mut cx, &ctx);
             export::form(&mut cx, &ctx);
+            export::masks::form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::sheet(&mut cx, &ctx);
             bars::drop_overlay(&cx, &ctx);
             if let Some((purpose, path)) = cx.shared.dialogs.show(&ctx) {
                 cx.push(match purpose {
                     Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
-                    Purpose::Export => Command::Labels(LabelsCommand::ExportMasks(path)),
                     Purpose::Output(Output::Case) => {
                         let camera = self.panes.memories.scene.camera_text(ImprintSource::default());
                         Command::Export(ExportCommand::WriteCase(path, camera))

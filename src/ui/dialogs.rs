@@ -19,8 +19,6 @@ pub(super) enum Purpose {
     Folder,
     /// A file, whose folder is opened.
     File,
-    /// The folder that masks are exported to.
-    Export,
     /// The folder that the results table is written to.
     Table,
     /// Where something is written.
@@ -32,7 +30,6 @@ impl Purpose {
         match self {
             Self::Folder => "Open a folder of pairs",
             Self::File => "Open a file of a data set",
-            Self::Export => "Export masks to a folder",
             Self::Output(output) => output.title(),
             Self::Table => "Write the results table to a folder",
         }
@@ -78,7 +75,7 @@ impl Dialogs {
         let work = move || {
             let dialog = rfd::FileDialog::new().set_title(purpose.title());
             let path = match purpose {
-                Purpose::Folder | Purpose::Export | Purpose::Table => dialog.pick_folder(),
+                Purpose::Folder | Purpose::Table => dialog.pick_folder(),
                 Purpose::File => dialog.pick_file(),
                 Purpose::Output(output) => match output.file_name() {
                     Some(name) => dialog.set_file_name(name).save_file(),

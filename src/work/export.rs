@@ -1,17 +1,21 @@
-//! Masks as training folders for a mask UNet: [`export_masks`]. The button and `touch2touch masks export` both end here.
+//! Masks as training folders for a mask UNet: [`plan`] says what goes where, [`export_masks`] writes it. The studio and
+//! `touch2touch masks export` both end here.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use serde::Serialize;
+use strum::{EnumIter, EnumString, IntoStaticStr};
+
 use super::error::TaskError;
 use super::job::JobCx;
 use super::labels::{Labels, PairLabels, Review};
-use crate::domain::dataset::PairId;
+use crate::domain::dataset::{PairId, Split};
 use crate::domain::grid::Mask;
 use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
-use crate::io::export_unet::{self, ExportConfig, ExportEntry, ExportReport, LoadFailure};
+use crate::io::export_unet::{self, ExportConfig, ExportEntry, ExportReport, LoadFailure, PARTS};
 
 /// What it is called in errors.
 const WHAT: &str = "Export masks";
@@ -58,31 +62,170 @@ impl HandMasks<'_> {
     }
 }
 
-/// Which pairs are exported, and how they are divided.
+/// Which pairs go along, by their review state. Those marked *skip* or *flagged* never do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter, EnumString, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
+pub enum Which {
+    /// Pairs marked *done* that have a mask drawn by hand.
+    #[default]
+    Done,
+    /// Those, and pairs whose mask was begun.
+    Begun,
+    /// All pairs; the masks that nobody drew are made (`--mask`).
+    All,
+}
+
+impl Which {
+    /// The name on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+}
+
+/// What a person chooses about an export.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ExportChoice {
+    /// Which pairs.
+    pub which: Which,
+    /// Whether pairs that the data set keeps for tests (`test_only`) are divided like the rest; else they go to test.
+    pub test_in_train: bool,
+    /// Whether all pairs of a tool go to the same part.
+    pub by_tool: bool,
+    /// Decides which pair lands in which part.
+    pub seed: u64,
+}
+
+/// What is exported.
 #[derive(Clone, Debug, Default)]
 pub struct ExportSetup {
     /// Only these pairs; `None` takes all.
     pub pairs: Option<Vec<PairId>>,
-    /// How they are divided.
-    pub split: ExportConfig,
+    /// Which of them, and how they are divided.
+    pub choice: ExportChoice,
 }
 
-/// What was exported.
-#[derive(Clone, Debug)]
-pub struct Exported {
-    /// The files.
-    pub report: ExportReport,
+/// Why a pair does not go along.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum LeftOut {
+    /// Its mask was begun and is not marked *done*.
+    NotDone,
+    /// It is marked *done* and no mask was drawn.
+    NotDrawn,
+    /// It is marked *flagged*.
+    Flagged,
+    /// It is marked *skip*.
+    Skip,
+}
+
+impl LeftOut {
+    /// In words, after a number of pairs.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::NotDone => "begun and not marked \"done\"",
+            Self::NotDrawn => "marked \"done\" without a mask drawn (take the automatic one over first)",
+            Self::Flagged => "marked \"flagged\"",
+            Self::Skip => "marked \"skip\"",
+        }
+    }
+}
+
+/// What goes where, before anything is written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Plan {
+    /// Masks in train, val and test.
+    pub counts: [usize; 3],
     /// Masks drawn by hand among them.
     pub by_hand: usize,
-    /// Pairs left out because their review state is "skip".
-    pub skipped: usize,
+    /// Pairs that go to test because the data set keeps them for tests.
+    pub held_out: usize,
+    /// Pairs that do not go along.
+    pub left_out: BTreeMap<LeftOut, usize>,
+    entries: Vec<ExportEntry>,
+    ids: Vec<PairId>,
+    drawn: BTreeSet<(String, PadId)>,
+}
+
+impl Plan {
+    /// All masks.
+    pub fn total(&self) -> usize {
+        self.counts.iter().sum()
+    }
+
+    /// What goes where and what does not, a line each.
+    pub fn lines(&self) -> Vec<String> {
+        let [train, val, test] = self.counts;
+        let by_hand =
+            if self.by_hand < self.total() { format!(", {} drawn by hand", self.by_hand) } else { String::new() };
+        let held_out = match self.held_out {
+            0 => String::new(),
+            n => format!(", {n} pairs of them because the data set keeps them for tests"),
+        };
+        let mut lines = vec![
+            format!("{} masks{by_hand}", self.total()),
+            format!("{train} to {}, {val} to {}, {test} to {}{held_out}", PARTS[0], PARTS[1], PARTS[2]),
+        ];
+        lines.extend(self.left_out.iter().map(|(why, n)| format!("left out: {n} pairs {}", why.text())));
+        lines
+    }
+}
+
+fn split_of(dataset: &Dataset, choice: ExportChoice) -> ExportConfig {
+    ExportConfig {
+        seed: choice.seed,
+        by_tool: choice.by_tool,
+        held_out_in_train: choice.test_in_train,
+        rig: dataset.rig.clone(),
+        ..ExportConfig::default()
+    }
+}
+
+/// Which masks go to which part. Reads the review states and the names of the masks, no pixels.
+///
+/// # Errors
+/// If the masks cannot be divided.
+pub fn plan(dataset: &Dataset, masks: &HandMasks<'_>, setup: &ExportSetup) -> Result<Plan, TaskError> {
+    let choice = setup.choice;
+    let (drawn, reviews) = (masks.all(&dataset.rig), masks.reviews());
+    let all = || (0..dataset.index.pairs.len() as u32).map(PairId).collect::<Vec<_>>();
+    let mut plan = Plan::default();
+    for id in setup.pairs.clone().unwrap_or_else(all) {
+        let Some(entry) = dataset.index.get(id) else { continue };
+        let by_hand = |finger: &PadId| drawn.contains(&(entry.name.clone(), *finger));
+        let review = reviews.get(&entry.name).copied().unwrap_or_default();
+        let is_drawn = dataset.rig.pads().any(|finger| by_hand(&finger));
+        let left_out = match (review, choice.which) {
+            (Review::Skip, _) => Some(LeftOut::Skip),
+            (Review::Flagged, _) => Some(LeftOut::Flagged),
+            (Review::Done, Which::Done | Which::Begun) if !is_drawn => Some(LeftOut::NotDrawn),
+            (Review::Todo | Review::InProgress, Which::Done) if is_drawn => Some(LeftOut::NotDone),
+            _ => None,
+        };
+        if let Some(why) = left_out {
+            *plan.left_out.entry(why).or_default() += 1;
+            continue;
+        }
+        let held_out = entry.split == Split::Test;
+        let wanted: Vec<PadId> = dataset.rig.pads().filter(|f| choice.which == Which::All || by_hand(f)).collect();
+        plan.held_out += usize::from(held_out && !choice.test_in_train && !wanted.is_empty());
+        for finger in wanted {
+            plan.by_hand += usize::from(by_hand(&finger));
+            let (pair, tool) = (entry.name.clone(), entry.tool.clone());
+            plan.entries.push(ExportEntry { pair, tool, finger, held_out });
+            plan.ids.push(id);
+        }
+    }
+    plan.counts = export_unet::counts(&plan.entries, &split_of(dataset, choice))
+        .map_err(|err| TaskError::from_error(WHAT, &err))?;
+    plan.drawn = drawn;
+    Ok(plan)
 }
 
 /// Makes the mask of a finger that has none by hand.
 pub type Automatic<'a> = &'a mut dyn FnMut(&Sample, PadId, Option<&str>) -> Result<Mask, TaskError>;
 
-/// Writes images and masks of the pairs of a data set, and reads them back by the loader's rules. Pairs marked *skip* are
-/// left out. Without `automatic`, only masks drawn by hand are written.
+/// Writes images and masks as [`plan`] says, and reads them back by the loader's rules. Without `automatic`, only masks
+/// drawn by hand can be written.
 ///
 /// # Errors
 /// If there is none, one cannot be read or made, or not all could be written and read back; the folder is then as it
@@ -94,59 +237,40 @@ pub fn export_masks(
     folder: &Path,
     mut automatic: Option<Automatic<'_>>,
     cx: &JobCx,
-) -> Result<Exported, TaskError> {
-    let (by_hand, reviews) = (masks.all(&dataset.rig), masks.reviews());
-    let all = || (0..dataset.index.pairs.len() as u32).map(PairId).collect::<Vec<_>>();
-    let (mut entries, mut ids, mut skipped) = (Vec::new(), Vec::new(), 0);
-    for id in setup.pairs.clone().unwrap_or_else(all) {
-        let Some(entry) = dataset.index.get(id) else { continue };
-        let wanted: Vec<PadId> = dataset
-            .rig
-            .pads()
-            .filter(|finger| automatic.is_some() || by_hand.contains(&(entry.name.clone(), *finger)))
-            .collect();
-        if !wanted.is_empty() && reviews.get(&entry.name) == Some(&Review::Skip) {
-            skipped += 1;
-            continue;
-        }
-        for finger in wanted {
-            entries.push(ExportEntry { pair: entry.name.clone(), tool: entry.tool.clone(), finger });
-            ids.push(id);
-        }
-    }
+) -> Result<(Plan, ExportReport), TaskError> {
+    let plan = plan(dataset, masks, setup)?;
+    let (entries, drawn) = (&plan.entries, &plan.drawn);
     if entries.is_empty() {
-        let left_out = if skipped > 0 { format!("; {skipped} pairs are marked \"skip\"") } else { String::new() };
+        let left_out: Vec<String> =
+            plan.left_out.iter().map(|(why, n)| format!("; {n} pairs {}", why.text())).collect();
         let place = masks.labels.folder().map_or(String::new(), |f| format!(" (they would lie in {})", f.display()));
-        return Err(TaskError::new(WHAT, format!("no mask was corrected by hand yet{place}{left_out}"))
-            .with_hint("Correct masks in the studio, or export automatic ones as well (--pairs all)."));
+        return Err(TaskError::new(WHAT, format!("there is no mask to export{place}{}", left_out.concat())).with_hint(
+            "Correct masks in the studio and mark their pairs \"done\", or export those in progress (--pairs begun) or \
+             automatic ones as well (--pairs all).",
+        ));
     }
-    if !by_hand.is_empty() {
+    if !drawn.is_empty() {
         // A mask that was changed since is taken from memory, and the file may be anything.
         let stored = entries
             .iter()
-            .filter(|e| by_hand.contains(&(e.pair.clone(), e.finger)) && !masks.changed.contains_key(&e.pair));
+            .filter(|e| drawn.contains(&(e.pair.clone(), e.finger)) && !masks.changed.contains_key(&e.pair));
         let store = masks.labels.store(WHAT)?;
         export_unet::check_stored(store, stored).map_err(|err| TaskError::from_error(WHAT, &err))?;
     }
     let total = entries.len() as u64;
-    let split = ExportConfig { rig: dataset.rig.clone(), ..setup.split.clone() };
-    let mut done = Exported { report: ExportReport::default(), by_hand: 0, skipped };
-    done.report = export_unet::export(folder, &entries, &split, |at| {
+    let report = export_unet::export(folder, entries, &split_of(dataset, setup.choice), |at| {
         let entry = &entries[at];
         cx.check(WHAT).map_err(|_| LoadFailure::Stop)?;
         cx.progress(at as u64, total, format!("{}, {}", entry.pair, dataset.rig.pad_key(entry.finger)));
-        let sample = dataset.load(ids[at])?;
+        let sample = dataset.load(plan.ids[at])?;
         let bubble = sample.pad(entry.finger).and_then(|touch| touch.depth());
         let imprint = bubble.ok_or_else(|| TaskError::new(WHAT, "the finger has no imprint"))?.imprint.clone();
-        let drawn = match by_hand.contains(&(entry.pair.clone(), entry.finger)) {
+        let by_hand = match drawn.contains(&(entry.pair.clone(), entry.finger)) {
             true => masks.get(&entry.pair, entry.finger)?,
             false => None,
         };
-        let mask = match (drawn, automatic.as_mut()) {
-            (Some(mask), _) => {
-                done.by_hand += 1;
-                mask
-            }
+        let mask = match (by_hand, automatic.as_mut()) {
+            (Some(mask), _) => mask,
             (None, Some(automatic)) => automatic(&sample, entry.finger, entry.tool.as_deref())?,
             (None, None) => return Err(TaskError::new(WHAT, "its mask disappeared").into()),
         };
@@ -155,5 +279,5 @@ pub fn export_masks(
     .map_err(|err| {
         if cx.cancel.is_cancelled() { TaskError::cancelled(WHAT) } else { TaskError::from_error(WHAT, &err) }
     })?;
-    Ok(done)
+    Ok((plan, report))
 }

@@ -30,6 +30,7 @@ use touch2touch::infer::bundle::SensorPair;
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
+use touch2touch::work::export::{ExportChoice, Plan};
 use touch2touch::work::job::JobCx;
 use touch2touch::work::models::Wanted;
 use touch2touch::work::prediction::Prediction;
@@ -169,9 +170,14 @@ impl DataSource for Source {
         Ok(())
     }
 
+    fn plan_masks(&self, _: &BTreeMap<String, PairLabels>, _: ExportChoice) -> Result<Plan, TaskError> {
+        Ok(Plan::default())
+    }
+
     fn export_masks(
         &self,
         changed: &BTreeMap<String, PairLabels>,
+        _: ExportChoice,
         folder: &Path,
         cx: &JobCx,
     ) -> Result<String, TaskError> {

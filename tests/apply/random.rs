@@ -45,6 +45,7 @@ use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::work::adapt::{Adapted, Scored};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::evaluate::{Evaluation, Setup};
+use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
 use touch2touch::work::subject::Subject;
@@ -189,11 +190,17 @@ fn form() -> impl Strategy<Value = FigureForm> {
         .prop_map(|(first, panes, scale, error_m)| FigureForm { first, panes, scale, error_m, ..FigureForm::default() })
 }
 
+fn mask_choice() -> impl Strategy<Value = ExportChoice> {
+    let flags = (any_of::<Which>(), any::<bool>(), any::<bool>(), any::<u64>());
+    flags.prop_map(|(which, test_in_train, by_tool, seed)| ExportChoice { which, test_in_train, by_tool, seed })
+}
+
 fn output() -> impl Strategy<Value = Output> {
     let picture = (any_of::<Pane>(), proptest::option::of(any::<u8>()), number());
     prop_oneof![
         Just(Output::Figure),
         Just(Output::Case),
+        Just(Output::Masks),
         source().prop_map(Output::Pair),
         picture.prop_map(|(pane, scale, error_m)| Output::Picture { pane, scale, error_m }),
     ]
@@ -324,7 +331,6 @@ draws! {
         2 SetReview(any_of::<Review>()),
         1 AcceptPose(source(), any::<bool>()),
         1 Save,
-        1 ExportMasks(Just(PathBuf::from("masks"))),
     }
     inspect: InspectCommand {
         1 Source(source()),
@@ -371,6 +377,8 @@ draws! {
     export: ExportCommand {
         1 Ask(any::<bool>()),
         1 SetForm(form()),
+        1 AskMasks(any::<bool>()),
+        1 SetMasks(mask_choice()),
         1 Place(output()),
         1 WriteCase(Just(PathBuf::from("no/such/folder/a.t2tcase")), Just(String::new())),
         1 Write(output(), Just(PathBuf::from("no/such/folder/picture.png"))),

@@ -13,6 +13,7 @@ fn entries(n: usize) -> Vec<ExportEntry> {
             pair: format!("pattern_31_rod/data_{i}"),
             tool: Some("pattern_31_rod".into()),
             finger: lab::RIGHT,
+            held_out: false,
         })
         .collect()
 }

@@ -20,7 +20,7 @@ const SIZE: [f32; 2] = [1280.0, 800.0];
 
 impl Rig {
     /// Clicks widgets one after the other; how many that were.
-    fn clicks(&mut self, labels: &[&str]) -> usize {
+    pub(super) fn clicks(&mut self, labels: &[&str]) -> usize {
         for label in labels {
             self.harness.get_by_label(label).click();
             self.harness.step();
@@ -30,7 +30,7 @@ impl Rig {
     }
 
     /// Types a path and Enter: two actions.
-    fn take_to(&mut self, path: &Path) -> usize {
+    pub(super) fn take_to(&mut self, path: &Path) -> usize {
         self.harness.get_by_label("Path").type_text(path.to_str().unwrap());
         self.harness.step();
         self.harness.key_press(Key::Enter);

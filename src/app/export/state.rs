@@ -20,6 +20,7 @@ use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::case::CaseSetup;
 use crate::work::cloud::Clouds;
 use crate::work::error::TaskError;
+use crate::work::export::ExportChoice;
 use crate::work::figure::{FigureLook, FigurePane, FigureSetup, FigureTheme, note};
 use crate::work::mask::made_of;
 use crate::work::pair_files::{PairFile, PairParts, write};
@@ -82,6 +83,10 @@ pub struct ExportState {
     pub asking: bool,
     /// What it says.
     pub form: FigureForm,
+    /// Whether the form of an export of masks is open.
+    pub asking_masks: bool,
+    /// What it says.
+    pub masks: ExportChoice,
     /// Whether the prediction of a case that was opened is still to be made.
     pub predict: bool,
 }
@@ -104,6 +109,8 @@ pub enum Output {
     Pair(ImprintSource),
     /// The selected pair with everything that its results depend on.
     Case,
+    /// Masks for training, as the form says, into a folder.
+    Masks,
 }
 
 impl Output {
@@ -112,6 +119,7 @@ impl Output {
         match self {
             Self::Figure => "Save the figure (.png or .svg)",
             Self::Case => "Save the case (.t2tcase)",
+            Self::Masks => "Export masks to a folder",
             Self::Pair(_) => "Export cloud, pose and mesh to a folder",
             Self::Picture { scale: Some(_), .. } => "Save the picture (.png)",
             Self::Picture { scale: None, .. } => "Save the picture (.svg)",
@@ -124,7 +132,7 @@ impl Output {
             Self::Figure => Some("figure.png".into()),
             Self::Picture { pane, scale, .. } => Some(pane.picture_name(scale.is_some())),
             Self::Case => Some(format!("case.{}", case_file::ENDING)),
-            Self::Pair(_) => None,
+            Self::Pair(_) | Self::Masks => None,
         }
     }
 }

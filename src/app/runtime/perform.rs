@@ -226,10 +226,10 @@ impl Runtime {
                     }),
                 );
             }
-            Effect::ExportMasks { ticket, source, labels, folder } => {
+            Effect::ExportMasks { ticket, source, labels, choice, folder } => {
                 let body = Box::new(move |cx: &JobCx| {
                     let folder = absolute(folder);
-                    let line = source.export_masks(&labels, &folder, cx)?;
+                    let line = source.export_masks(&labels, choice, &folder, cx)?;
                     Ok(Answer::Saved(ticket, line, folder))
                 });
                 self.task(Lane::Compute, ticket, "Export masks".into(), body);

@@ -33,7 +33,7 @@ use crate::work::bundles::{self, BundleInfo};
 use crate::work::case::{self, Case, CaseSetup};
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
-use crate::work::export::{ExportSetup, HandMasks, export_masks};
+use crate::work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
 use crate::work::job::JobCx;
 use crate::work::labels::Labels;
 use crate::work::models::{KeptPrediction, Models, Wanted};
@@ -171,17 +171,22 @@ impl DataSource for LiveSource {
         self.labels.save(name, labels)
     }
 
+    fn plan_masks(&self, changed: &BTreeMap<String, PairLabels>, choice: ExportChoice) -> Result<Plan, TaskError> {
+        let masks = HandMasks { labels: &self.labels, changed };
+        export::plan(&self.dataset, &masks, &ExportSetup { pairs: None, choice })
+    }
+
     fn export_masks(
         &self,
         changed: &BTreeMap<String, PairLabels>,
+        choice: ExportChoice,
         folder: &Path,
         cx: &JobCx,
     ) -> Result<String, TaskError> {
         let masks = HandMasks { labels: &self.labels, changed };
-        let done = export_masks(&self.dataset, &masks, &ExportSetup::default(), folder, None, cx)?;
-        let [train, val, test] = done.report.counts;
-        let total = train + val + test;
-        Ok(format!("Exported {total} masks to {} ({train} train, {val} val, {test} test)", folder.display()))
+        let setup = ExportSetup { pairs: None, choice };
+        let (plan, _) = export::export_masks(&self.dataset, &masks, &setup, folder, None, cx)?;
+        Ok(format!("Exported to {}: {}", folder.display(), plan.lines().join("; ")))
     }
 }
 
@@ -354,6 +359,7 @@ mod tests {
     use crate::domain::hand::{AcceptedPose, HandPose};
     use crate::domain::rig::lab;
     use crate::io::masks::MaskStore;
+    use crate::work::export::{LeftOut, Which};
     use crate::work::labels::{HandMask, Revision};
 
     /// A folder with one pair of pictures.
@@ -422,15 +428,27 @@ mod tests {
         let name = source.index().pairs[0].name.clone();
         let out = folder.path().join("export");
         let cx = JobCx::unwatched();
-        let none = source.export_masks(&BTreeMap::new(), &out, &cx).unwrap_err();
+        let (done, begun) = (ExportChoice::default(), ExportChoice { which: Which::Begun, ..ExportChoice::default() });
+        let none = source.export_masks(&BTreeMap::new(), done, &out, &cx).unwrap_err();
         assert!(none.why.contains("no mask") && !out.exists());
         let finger = source.load(PairId(0)).unwrap().pads.entries().next().unwrap().0;
         let mut labels = labels();
         assert_eq!(finger, lab::RIGHT);
-        let line = source.export_masks(&BTreeMap::from([(name.clone(), labels.clone())]), &out, &cx).unwrap();
-        assert!(line.starts_with("Exported 1 masks"), "{line}");
-        labels.review = Review::Skip;
-        assert!(source.export_masks(&BTreeMap::from([(name, labels)]), &out, &cx).is_err());
+        labels.review = Review::InProgress;
+        let changed = BTreeMap::from([(name.clone(), labels.clone())]);
+        // What was begun goes along if asked only.
+        let plan = source.plan_masks(&changed, done).unwrap();
+        assert_eq!((plan.total(), &plan.left_out), (0, &BTreeMap::from([(LeftOut::NotDone, 1)])));
+        assert!(source.export_masks(&changed, done, &out, &cx).unwrap_err().why.contains("not marked \"done\""));
+        let line = source.export_masks(&changed, begun, &out, &cx).unwrap();
+        assert!(line.contains("1 masks"), "{line}");
+        labels.review = Review::Done;
+        let changed = BTreeMap::from([(name.clone(), labels.clone())]);
+        assert!(source.export_masks(&changed, done, &out, &cx).is_ok());
+        for left_out in [Review::Skip, Review::Flagged] {
+            labels.review = left_out;
+            assert!(source.export_masks(&BTreeMap::from([(name.clone(), labels.clone())]), begun, &out, &cx).is_err());
+        }
         cx.cancel.cancel();
     }
 

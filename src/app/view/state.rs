@@ -61,8 +61,6 @@ pub enum UiRequest {
     PickFile,
     /// Ask for the folder to write the results table to; answer with `EvaluateCommand::Export`.
     PickTableFolder,
-    /// Ask for the folder to export masks to; answer with `LabelsCommand::ExportMasks`.
-    PickExportFolder,
     /// Ask where something is to be written; answer with `ExportCommand::Write`.
     PickOutput(Output),
     /// Turn the 3D cameras.

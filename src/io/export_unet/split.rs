@@ -1,6 +1,6 @@
 //! Stems, and which part a pair belongs to.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use sha2::Digest as _;
 
@@ -15,33 +15,49 @@ fn hash(seed: u64, text: &str) -> [u8; 32] {
     hasher.finalize().into()
 }
 
-/// The part (0 train, 1 val, 2 test) of each entry. Independent of the order of entries.
+/// The part (0 train, 1 val, 2 test) of each entry, by its group's name and the seed alone: entries that come later
+/// change nothing for those before, but where a part would be empty.
 pub(super) fn parts(entries: &[ExportEntry], config: &ExportConfig) -> Result<Vec<usize>, ExportError> {
     let (val, test) = (config.val, config.test);
     if !(val >= 0.0 && test >= 0.0 && val + test < 1.0) {
         return Err(ExportError::Shares { val, test });
     }
-    let is_unseen = |entry: &ExportEntry| entry.tool.as_ref().is_some_and(|t| config.test_tools.contains(t));
-    let mut pairs: Vec<&str> = entries.iter().filter(|e| !is_unseen(e)).map(|e| e.pair.as_str()).collect();
-    pairs.sort_unstable();
-    pairs.dedup();
-    // A shuffle that only depends on names and seed.
-    pairs.sort_by_cached_key(|pair| (hash(config.seed, pair), *pair));
-    // A wanted part gets at least one pair as soon as every part can have one.
-    let count = |share: f64| {
-        let least = usize::from(share > 0.0 && pairs.len() >= 3);
-        ((pairs.len() as f64 * share).round() as usize).max(least)
+    let group = |entry: &'_ ExportEntry| match &entry.tool {
+        Some(tool) if config.by_tool => tool.clone(),
+        _ => entry.pair.clone(),
     };
-    let (num_val, num_test) = (count(val), count(test));
-    let in_val: HashSet<&str> = pairs.iter().take(num_val).copied().collect();
-    let in_test: HashSet<&str> = pairs.iter().skip(num_val).take(num_test).copied().collect();
-    let part = |entry: &ExportEntry| {
-        if is_unseen(entry) || in_test.contains(entry.pair.as_str()) {
-            2
-        } else {
-            usize::from(in_val.contains(entry.pair.as_str()))
+    let is_unseen = |entry: &ExportEntry| {
+        (entry.held_out && !config.held_out_in_train)
+            || entry.tool.as_ref().is_some_and(|tool| config.test_tools.contains(tool))
+    };
+    let place = |name: &str| {
+        let [a, b, c, d, e, f, g, h, ..] = hash(config.seed, name);
+        u64::from_be_bytes([a, b, c, d, e, f, g, h]) as f64 / 2f64.powi(64)
+    };
+    let names: BTreeSet<String> = entries.iter().filter(|e| !is_unseen(e)).map(group).collect();
+    let mut places: Vec<(f64, String)> = names.into_iter().map(|name| (place(&name), name)).collect();
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let by_place = |at: f64| if at < val { 1 } else { 2 * usize::from(at < val + test) };
+    let mut parts: Vec<usize> = places.iter().map(|(at, _)| by_place(*at)).collect();
+    // The lab's trainer refuses an empty part: each wanted one takes its nearest, as soon as every part can have one.
+    if parts.len() >= 3 {
+        let held_out = entries.iter().any(is_unseen);
+        if test > 0.0 && !held_out && !parts.contains(&2) {
+            let at = parts.iter().rposition(|part| *part == 1).filter(|at| *at > 0);
+            let at = at.or_else(|| parts.iter().position(|part| *part == 0));
+            at.into_iter().for_each(|at| parts[at] = 2);
         }
-    };
+        if val > 0.0 && !parts.contains(&1) {
+            let at = parts.iter().position(|part| *part == 0).or(Some(0));
+            at.into_iter().for_each(|at| parts[at] = 1);
+        }
+        if !parts.contains(&0) {
+            parts.iter_mut().next_back().into_iter().for_each(|part| *part = 0);
+        }
+    }
+    let by_name: HashMap<String, usize> = places.into_iter().map(|(_, name)| name).zip(parts).collect();
+    let part =
+        |entry: &ExportEntry| if is_unseen(entry) { 2 } else { by_name.get(&group(entry)).copied().unwrap_or(0) };
     Ok(entries.iter().map(part).collect())
 }
 
@@ -88,39 +104,74 @@ mod tests {
                     pair: format!("pattern_0{}/data_{i}", i % 2),
                     tool: Some(format!("pattern_0{}", i % 2)),
                     finger,
+                    held_out: false,
                 })
             })
             .collect()
     }
 
+    fn counts(parts: &[usize]) -> [usize; 3] {
+        [0, 1, 2].map(|part| parts.iter().filter(|&&p| p == part).count())
+    }
+
     #[test]
     fn parts_depend_on_names_and_seed_only() {
-        let list = entries(50);
+        let list = entries(500);
         let config = ExportConfig { val: 0.2, test: 0.1, ..ExportConfig::default() };
-        let parts_here = parts(&list, &config).unwrap();
-        for part in 0..3 {
-            let n = parts_here.iter().filter(|&&p| p == part).count();
-            assert_eq!(n, [70, 20, 10][part]);
-        }
-        assert!(parts_here.chunks(2).all(|p| p[0] == p[1]), "fingers of a pair stay together");
+        let here = parts(&list, &config).unwrap();
+        let [train, val, test] = counts(&here);
+        assert!((650..750).contains(&train) && (160..240).contains(&val) && (70..130).contains(&test), "{train} {val}");
+        assert!(here.chunks(2).all(|p| p[0] == p[1]), "fingers of a pair stay together");
         let mut reversed = list.clone();
         reversed.reverse();
         let mut back = parts(&reversed, &config).unwrap();
         back.reverse();
-        assert_eq!(back, parts_here);
-        assert_ne!(parts(&list, &ExportConfig { seed: 1, ..config.clone() }).unwrap(), parts_here);
+        assert_eq!(back, here);
+        assert_eq!(parts(&list[..600], &config).unwrap(), here[..600], "what comes later changes nothing before");
+        assert_ne!(parts(&list, &ExportConfig { seed: 1, ..config.clone() }).unwrap(), here);
         let unseen = ExportConfig { test_tools: vec!["pattern_01".into()], ..config };
         let unseen_parts = parts(&list, &unseen).unwrap();
         assert!(list.iter().zip(unseen_parts).all(|(e, p)| e.tool.as_deref() != Some("pattern_01") || p == 2));
-        assert_eq!(parts(&entries(3), &ExportConfig::default()).unwrap().iter().filter(|&&p| p == 0).count(), 2);
         assert!(parts(&list, &ExportConfig { val: 0.6, test: 0.4, ..ExportConfig::default() }).is_err());
         assert!(parts(&list, &ExportConfig { val: f64::NAN, ..ExportConfig::default() }).is_err());
     }
 
     #[test]
+    fn no_wanted_part_is_empty_as_soon_as_every_part_can_have_one() {
+        for n in 3..12 {
+            for seed in 0..40 {
+                let config = ExportConfig { seed, ..ExportConfig::default() };
+                let counts = counts(&parts(&entries(n), &config).unwrap());
+                assert!(counts.iter().all(|&n| n > 0), "{n} pairs, seed {seed}: {counts:?}");
+            }
+        }
+        assert_eq!(counts(&parts(&entries(1), &ExportConfig::default()).unwrap()).iter().sum::<usize>(), 2);
+    }
+
+    #[test]
+    fn what_is_held_out_never_trains_and_tools_stay_together() {
+        let mut list = entries(200);
+        list.iter_mut().take(100).for_each(|entry| entry.held_out = true);
+        let out = parts(&list, &ExportConfig::default()).unwrap();
+        assert!(out[..100].iter().all(|&p| p == 2) && out[100..].contains(&0));
+        let asked = ExportConfig { held_out_in_train: true, ..ExportConfig::default() };
+        assert!(parts(&list, &asked).unwrap()[..100].contains(&0));
+        let by_tool = parts(&list[100..], &ExportConfig { by_tool: true, ..ExportConfig::default() }).unwrap();
+        let of = |tool: &str| {
+            let mine = list[100..].iter().zip(&by_tool).filter(|(e, _)| e.tool.as_deref() == Some(tool));
+            mine.map(|(_, part)| *part).collect::<BTreeSet<_>>()
+        };
+        assert!(of("pattern_00").len() == 1 && of("pattern_01").len() == 1);
+    }
+
+    #[test]
     fn stems_hold_the_tool_and_are_unique() {
-        let entry =
-            |pair: &str, tool: &str| ExportEntry { pair: pair.into(), tool: Some(tool.into()), finger: lab::RIGHT };
+        let entry = |pair: &str, tool: &str| ExportEntry {
+            pair: pair.into(),
+            tool: Some(tool.into()),
+            finger: lab::RIGHT,
+            held_out: false,
+        };
         let list = [entry("a/data_1", "a"), entry("a_data_1", "a"), entry("x[1].*", "b.c"), entry("A/data_1", "A")];
         let out = stems(&list, &Rig::lab());
         assert_eq!(out[0], "a_data_1_right");
