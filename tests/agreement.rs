@@ -17,13 +17,17 @@ use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, Versus, VersusMode};
+use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, MaskTool, Versus, VersusMode};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Grid;
+use touch2touch::domain::label::CleanKind;
 use touch2touch::domain::postprocess::ShiftMode;
+use touch2touch::domain::rig::lab;
+use touch2touch::io::dataset::Dataset;
 use touch2touch::io::images;
 use touch2touch::work::export::{ExportChoice, Which};
+use touch2touch::work::labels::Labels;
 use touch2touch::work::subject::Subject;
 
 use crate::support::run;
@@ -64,9 +68,17 @@ fn how(action: Action) -> How {
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
         A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),
-        A::FillHoles => Verb(&["label", "demo", "--pair", "a", "--fill-holes"]),
-        A::LargestIsland => Verb(&["label", "demo", "--pair", "a", "--largest-island"]),
+        A::FillHoles => Verb(&["label", "demo", "--pair", "a", "--clean", "fill_holes"]),
+        A::LargestIsland => Verb(&["label", "demo", "--pair", "a", "--clean", "largest_island"]),
+        A::ClearBorder => Verb(&["label", "demo", "--pair", "a", "--clean", "clear_border"]),
+        A::DropSmall => Verb(&["label", "demo", "--pair", "a", "--clean", "drop_small=1"]),
+        A::OpenMask => Verb(&["label", "demo", "--pair", "a", "--clean", "open=1"]),
+        A::CloseMask => Verb(&["label", "demo", "--pair", "a", "--clean", "close=1"]),
+        A::SmoothMask => Verb(&["label", "demo", "--pair", "a", "--clean", "smooth=1"]),
+        A::GrowMask => Verb(&["label", "demo", "--pair", "a", "--clean", "grow=1"]),
+        A::ShrinkMask => Verb(&["label", "demo", "--pair", "a", "--clean", "shrink=1"]),
         A::AdoptAutomatic => Verb(&["label", "demo", "--pair", "a", "--adopt", "--mask", "top_percent"]),
+        A::TakeOver => Verb(&["label", "demo", "--pair", "a", "--imprint", "predicted", "--from", "measured"]),
         A::ResetMask => Verb(&["label", "demo", "--pair", "a", "--remove-mask"]),
         A::DoneAndNext => Verb(&["label", "demo", "--pair", "a", "--review", "done"]),
         A::Flag => Verb(&["label", "demo", "--pair", "a", "--review", "flagged"]),
@@ -88,8 +100,15 @@ fn how(action: Action) -> How {
         A::CancelJobs | A::Undo | A::Redo => Shell,
         A::PreviousSample | A::NextSample | A::TenBack | A::TenForward | A::FirstSample | A::LastSample => Window,
         A::NextUnfinished | A::NextWorst | A::OtherFinger | A::BothFingers | A::FindSample => Window,
-        // A stroke is drawn by a hand.
-        A::Brush | A::Eraser | A::PanTool | A::LastTool | A::BrushSmaller | A::BrushLarger => Window,
+        A::Brush | A::Eraser | A::Lasso | A::Polygon | A::RectangleTool | A::Wand => Verb(&[
+            "label",
+            "demo",
+            "--pair",
+            "a",
+            "--draw",
+            r#"{"tool": "lasso", "add": true, "points": [[9, 9], [30, 9], [9, 30]]}"#,
+        ]),
+        A::PanTool | A::LastTool | A::BrushSmaller | A::BrushLarger => Window,
         A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger => Window,
         A::PoseTool | A::SixDof | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
         A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
@@ -303,7 +322,7 @@ fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
     let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
     studio.send(LibraryCommand::Select(PairId(1)).into());
     studio.send(LabelsCommand::AdoptAutomatic.into());
-    studio.send(LabelsCommand::LargestIsland.into());
+    studio.send(LabelsCommand::CleanUp(CleanKind::LargestIsland.into()).into());
     studio.send(LabelsCommand::AcceptPose(ImprintSource::Measured, true).into());
     let exported = home.path().join("by_studio");
     studio.send(ExportCommand::SetMasks(ExportChoice { which: Which::Begun, ..ExportChoice::default() }).into());
@@ -463,4 +482,51 @@ fn every_pane_says_a_command_that_the_program_understands() {
         let shown = studio.state.pose(source).ready().unwrap();
         assert_eq!(case["angle_deg"], number(shown.angle_rad.to_degrees()), "{source:?}");
     }
+}
+
+#[test]
+fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let path = folder.to_str().unwrap();
+    let name = name_of(&json(&["pose", path], home.path()), 0);
+    let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
+    let mask = MaskSettings { tool: MaskTool::Polygon, wand_m: 0.0004, clean_mm: 1.5, ..MaskSettings::default() };
+    let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
+    let mask = MaskSettings { choice, ..mask };
+    studio.send(SettingsCommand::SetMask(mask).into());
+    let finger = lab::RIGHT;
+    let begin = |at_px, erase| LabelsCommand::BeginStroke { finger, source: ImprintSource::Measured, at_px, erase };
+    studio.send(begin([20.0, 20.0], false).into());
+    for corner in [[60.5, 25.0], [50.0, 70.0]] {
+        studio.send(LabelsCommand::Corner(corner).into());
+    }
+    studio.send(LabelsCommand::EndStroke.into());
+    studio.send(SettingsCommand::SetMaskTool(MaskTool::Wand).into());
+    studio.send(begin([87.0, 70.0], true).into());
+    studio.send(LabelsCommand::StrokeTo([99.0, 70.0]).into());
+    studio.send(LabelsCommand::EndStroke.into());
+    studio.send(LabelsCommand::CleanUp(studio.state.settings.mask.clean_up(CleanKind::Smooth)).into());
+    let drawn = studio.state.hand_mask(ImprintSource::Measured, finger).unwrap().mask.clone();
+    drop(studio);
+    let stored =
+        || Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap().measured(finger).unwrap().mask.clone();
+    assert_eq!(stored(), drawn, "on the disk");
+    let begun = ["label", path, "--pair", &name, "--finger", "right", "--mask", "threshold"];
+    json(&[&begun[..], &["--remove-mask"]].concat(), home.path());
+    let polygon = r#"{"tool": "polygon", "add": true, "points": [[20, 20], [60.5, 25], [50, 70], [50, 70]]}"#;
+    let wand = r#"{"tool": "wand", "tolerance_m": 0.0004, "add": false, "points": [[87, 70], [99, 70]]}"#;
+    let draw = ["--draw", polygon, "--draw", wand, "--clean", "smooth=1.5"];
+    json(&[&begun[..], &draw[..]].concat(), home.path());
+    assert_eq!(stored(), drawn, "by the verb");
+    assert!(drawn.as_slice().contains(&true));
+    // The mask of a prediction is another one, until it is taken over.
+    let of_prediction = ["--imprint", "predicted", "--from", "measured", "--steps", "1"];
+    let labeled = json(&[&begun[..], &of_prediction[..]].concat(), home.path());
+    let pair = &labeled["pairs"][0];
+    assert_eq!((pair["masks"].as_array().unwrap().len(), pair["predicted"].as_array().unwrap().len()), (1, 1));
+    let labels = Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap();
+    let taken = labels.masks.iter().find(|(place, _)| place.of.source() == ImprintSource::Predicted).unwrap();
+    assert_eq!(taken.1.mask, drawn);
+    assert!(taken.1.base.contains("measured"), "{}", taken.1.base);
 }

@@ -21,7 +21,7 @@ use touch2touch::io::dataset::Dataset;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch::work::evaluate::{Evaluation, Report, Setup, evaluate, known};
 use touch2touch::work::job::{Cancel, JobCx};
-use touch2touch::work::labels::{HandMask, Labels, PairLabels, Revision};
+use touch2touch::work::labels::{HandMask, Labels, MaskPlace, PairLabels, Revision};
 use touch2touch::work::mask::{MaskChoice, MaskSource};
 use touch2touch::work::models::Models;
 
@@ -164,7 +164,7 @@ fn what_was_changed_or_damaged_is_computed_again() {
     let mask = Arc::new(Mask::from_fn(175, 140, |x, y| (40..140).contains(&x) && (60..80).contains(&y)));
     let drawn = HandMask { mask, revision: Revision(1), base: "Threshold".into() };
     let mut drawn_on = PairLabels::default();
-    drawn_on.draw(lab::RIGHT, Some(drawn));
+    drawn_on.draw(&MaskPlace::measured(lab::RIGHT), Some(drawn));
     labels.save(&name, &drawn_on).unwrap();
     let (hand, fresh) = run(&data, &setup(), &cache);
     assert_eq!(fresh, 1);

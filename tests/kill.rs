@@ -19,7 +19,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Opened, Pane, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
-use touch2touch::app::labels::{PairLabels, Review};
+use touch2touch::app::labels::{HandMask, MaskPlace, PairLabels, Review};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::{LiveSource, open_source};
@@ -30,8 +30,9 @@ use touch2touch::domain::contact::ContactMask;
 use touch2touch::domain::dataset::{Index, PairId, Problem};
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::grid::{DepthMap, Grid, Mask};
+use touch2touch::domain::label::CleanKind;
 use touch2touch::domain::mesh::TriMesh;
-use touch2touch::domain::rig::{PerPad, lab};
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::Sample;
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::images;
@@ -165,7 +166,10 @@ fn script(seed: u64) -> Vec<Vec<Command>> {
                     Command::Labels(LabelsCommand::EndStroke),
                 ]
             }
-            11 => vec![Command::View(ViewCommand::SelectFinger(finger)), Command::Labels(LabelsCommand::FillHoles)],
+            11 => vec![
+                Command::View(ViewCommand::SelectFinger(finger)),
+                Command::Labels(LabelsCommand::CleanUp(CleanKind::FillHoles.into())),
+            ],
             12 => vec![Command::View(ViewCommand::SelectFinger(finger)), Command::Labels(LabelsCommand::ResetMask)],
             13 | 14 => vec![Command::Labels(LabelsCommand::Undo)],
             15 => vec![Command::Labels(LabelsCommand::Redo)],
@@ -238,10 +242,11 @@ fn act(role: &str) -> ! {
     }
 }
 
-type Labels = (PerPad<Mask>, Review);
+type Labels = (BTreeMap<MaskPlace, Mask>, Review);
 
 fn plain(labels: &PairLabels) -> Labels {
-    (labels.masks.clone().map(|mask| mask.map(|hand| (*hand.mask).clone())), labels.review)
+    let mask = |(place, hand): (&MaskPlace, &HandMask)| (place.clone(), (*hand.mask).clone());
+    (labels.masks.iter().map(mask).collect(), labels.review)
 }
 
 /// What each pair says before the first act and after each one.
@@ -333,7 +338,8 @@ fn compare(folder: &Path, played: &[BTreeMap<String, Labels>], said: &Said) -> u
         // A line may be on its way when the kill comes, an act is announced before it is begun.
         let may_be = &played[confirmed..=said.begun];
         for finger in lab::PADS {
-            let fits = |labels: &BTreeMap<String, Labels>| labels[&entry.name].0[finger] == masks[finger];
+            let place = MaskPlace::measured(finger);
+            let fits = |labels: &BTreeMap<String, Labels>| labels[&entry.name].0.get(&place) == masks.get(&place);
             assert!(
                 may_be.iter().any(fits),
                 "{}, finger {finger:?}: confirmed at act {confirmed}, begun {}; on the disk is the mask of acts {:?}",

@@ -20,6 +20,7 @@ use super::settings::state::{ColorRange, MaskTool, Theme, Workspace};
 use super::state::{Absent, State};
 use super::workbench::state::{Layer, SceneTool, Section};
 use crate::domain::hand::HandAxis;
+use crate::domain::label::CleanKind;
 pub use key::{Key, Shortcut};
 use key::{alt, alt_shift, ctrl, ctrl_alt, ctrl_shift, plain, shift};
 
@@ -134,13 +135,25 @@ actions! {
 
     Brush, Mask, "Brush", "Adds to the mask while the button is down", [plain(K::Num1), plain(K::B)];
     Eraser, Mask, "Eraser", "Removes from the mask while the button is down", [plain(K::Num2), plain(K::E)];
+    Lasso, Mask, "Lasso", "Adds what a drawn line encloses; the right button removes", [plain(K::L)];
+    Polygon, Mask, "Polygon", "Adds what lines between clicks enclose; a double click ends it, the right button removes", [plain(K::P)];
+    RectangleTool, Mask, "Rectangle", "Adds a rectangle; the right button removes", [plain(K::R)];
+    Wand, Mask, "Wand", "Adds what is connected with the point and about as deep; drag to the right for more", [plain(K::M)];
     PanTool, Mask, "Move the image", "The pointer moves the image instead of drawing", [plain(K::Num8)];
     LastTool, Mask, "Last tool", "Goes back to the tool before", [plain(K::Q)];
     BrushSmaller, Mask, "Smaller brush", "Makes the brush smaller", [plain(K::OpenBracket)];
     BrushLarger, Mask, "Larger brush", "Makes the brush larger", [plain(K::CloseBracket)];
     FillHoles, Mask, "Fill holes", "Fills the holes of the mask", [plain(K::H)];
     LargestIsland, Mask, "Largest island", "Keeps only the largest connected part of the mask", [plain(K::K)];
+    DropSmall, Mask, "Drop small islands", "Removes islands smaller across than the clean-up size", [];
+    OpenMask, Mask, "Open the mask", "Removes what is thinner than the clean-up size", [];
+    CloseMask, Mask, "Close the mask", "Fills gaps thinner than the clean-up size", [];
+    SmoothMask, Mask, "Smooth the mask", "Makes each pixel what most around it are, within the clean-up size", [];
+    GrowMask, Mask, "Grow the mask", "Adds what lies within the clean-up size", [];
+    ShrinkMask, Mask, "Shrink the mask", "Removes what lies within the clean-up size of the outside", [];
+    ClearBorder, Mask, "Clear the border", "Removes islands that touch the edge of the image", [];
     AdoptAutomatic, Mask, "Threshold to mask", "Makes the mask of the chosen automatic source the corrected one", [plain(K::T)];
+    TakeOver, Mask, "Take the other imprint's mask", "Copies the mask of the measured imprint to the predicted one, or the other way round; each keeps its own", [];
     ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)];
     Undo, Mask, "Undo", "Takes back the last change of what is on screen", [ctrl(K::Z)];
     Redo, Mask, "Redo", "Does it again", [ctrl_shift(K::Z), ctrl(K::Y)];
@@ -259,6 +272,7 @@ impl Action {
             Self::NextShift => "depth offset gain millimeters scale",
             Self::Refit => "statistics mean deviation shift",
             Self::AdoptAutomatic => "use copy automatic mask",
+            Self::TakeOver => "copy mask across measured predicted",
             Self::ResetMask => "clear delete mask",
             Self::Undo => "revert back",
             Self::BrushSmaller | Self::BrushLarger => "pen size radius width",
@@ -310,8 +324,8 @@ impl Action {
         let listed = !state.library.order.is_empty();
         let editable = state.document.is_editable(state.pair_name());
         let settings = &state.settings;
-        let fingers = state.fingers();
         let ui = |request: UiRequest| does(ViewCommand::Ui(request));
+        let clean_up = |kind| when(editable, LabelsCommand::CleanUp(settings.mask.clean_up(kind)));
         match self {
             Self::OpenFolder => ui(UiRequest::PickFolder),
             Self::OpenDemo => does(LibraryCommand::Open(Place::Demo)),
@@ -394,19 +408,36 @@ impl Action {
 
             Self::Brush => does(SettingsCommand::SetMaskTool(MaskTool::Brush)),
             Self::Eraser => does(SettingsCommand::SetMaskTool(MaskTool::Eraser)),
+            Self::Lasso => does(SettingsCommand::SetMaskTool(MaskTool::Lasso)),
+            Self::Polygon => does(SettingsCommand::SetMaskTool(MaskTool::Polygon)),
+            Self::RectangleTool => does(SettingsCommand::SetMaskTool(MaskTool::Rectangle)),
+            Self::Wand => does(SettingsCommand::SetMaskTool(MaskTool::Wand)),
             Self::PanTool => does(SettingsCommand::SetMaskTool(MaskTool::Pan)),
             Self::LastTool => does(SettingsCommand::LastMaskTool),
             Self::BrushSmaller => does(SettingsCommand::SetBrushRadius(settings.mask.radius_px / BRUSH_STEP)),
             Self::BrushLarger => does(SettingsCommand::SetBrushRadius(settings.mask.radius_px * BRUSH_STEP)),
-            Self::FillHoles => when(editable, LabelsCommand::FillHoles),
-            Self::LargestIsland => when(editable, LabelsCommand::LargestIsland),
+            Self::FillHoles => clean_up(CleanKind::FillHoles),
+            Self::LargestIsland => clean_up(CleanKind::LargestIsland),
+            Self::DropSmall => clean_up(CleanKind::DropSmall),
+            Self::OpenMask => clean_up(CleanKind::Open),
+            Self::CloseMask => clean_up(CleanKind::Close),
+            Self::SmoothMask => clean_up(CleanKind::Smooth),
+            Self::GrowMask => clean_up(CleanKind::Grow),
+            Self::ShrinkMask => clean_up(CleanKind::Shrink),
+            Self::ClearBorder => clean_up(CleanKind::ClearBorder),
             Self::AdoptAutomatic => when(editable, LabelsCommand::AdoptAutomatic),
+            Self::TakeOver => when(editable, LabelsCommand::TakeOver),
             Self::ResetMask => {
-                let corrected = state.document.hand_mask(state.pair_name(), state.selection.finger).is_some();
+                let finger = state.selection.finger;
+                let corrected = state.hand_mask(state.worked_on(finger), finger).is_some();
                 when(editable && corrected, LabelsCommand::ResetMask)
             }
-            Self::Undo => when(state.history.next_undo(state.pair_name(), &fingers).is_some(), LabelsCommand::Undo),
-            Self::Redo => when(state.history.next_redo(state.pair_name(), &fingers).is_some(), LabelsCommand::Redo),
+            Self::Undo => {
+                when(state.history.next_undo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Undo)
+            }
+            Self::Redo => {
+                when(state.history.next_redo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Redo)
+            }
             Self::MaskVisible => does(SettingsCommand::SetMaskVisible(!settings.mask_visible)),
             Self::MaskOutline => does(SettingsCommand::SetMaskOutline(!settings.mask_outline)),
             Self::MaskFainter => does(SettingsCommand::SetMaskOpacity(settings.mask_opacity - OPACITY_STEP)),

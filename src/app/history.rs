@@ -1,10 +1,9 @@
 //! Undo: reversible changes of the document, one entry per gesture, within a budget of bytes.
 
 use super::keys::ImprintSource;
-use super::labels::state::{Document, HandMask, Review};
+use super::labels::state::{Document, HandMask, MaskPlace, Review};
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::Patch;
-use crate::domain::rig::PadId;
 
 /// One reversible change of the document.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,8 +12,8 @@ pub enum Edit {
     Patch {
         /// The pair's name.
         pair: String,
-        /// The finger.
-        finger: PadId,
+        /// What the mask is of.
+        place: MaskPlace,
         /// The pixels.
         patch: Patch,
     },
@@ -22,8 +21,8 @@ pub enum Edit {
     HandMask {
         /// The pair's name.
         pair: String,
-        /// The finger.
-        finger: PadId,
+        /// What the mask is of.
+        place: MaskPlace,
         /// The mask.
         mask: Option<HandMask>,
     },
@@ -49,9 +48,9 @@ impl Edit {
     /// Exchanges the value held here with the one in `doc`; afterwards `self` is the inverse edit.
     pub fn swap(&mut self, doc: &mut Document) {
         match self {
-            Self::Patch { pair, finger, patch } => {
+            Self::Patch { pair, place, patch } => {
                 let revision = doc.next_revision();
-                let hand = doc.labels.get_mut(pair).and_then(|l| l.masks[*finger].as_mut());
+                let hand = doc.labels.get_mut(pair).and_then(|l| l.masks.get_mut(place));
                 // The edits of a gesture are swapped in order, so the mask is there and as large as it was.
                 let Some(hand) = hand else { return };
                 if patch.swap(std::sync::Arc::make_mut(&mut hand.mask)).is_err() {
@@ -59,9 +58,9 @@ impl Edit {
                 }
                 hand.revision = revision;
             }
-            Self::HandMask { pair, finger, mask } => {
+            Self::HandMask { pair, place, mask } => {
                 let labels = doc.labels.entry(pair.clone()).or_default();
-                std::mem::swap(&mut labels.masks[*finger], mask);
+                *mask = labels.put(place, mask.take());
             }
             Self::Review { pair, review } => *review = doc.set_review(pair, *review),
             Self::Pose { pair, source, pose } => {
@@ -81,10 +80,10 @@ impl Edit {
         }
     }
 
-    /// The finger, if it concerns one.
-    pub fn finger(&self) -> Option<PadId> {
+    /// What the mask is of, if it concerns one.
+    pub fn place(&self) -> Option<&MaskPlace> {
         match self {
-            Self::Patch { finger, .. } | Self::HandMask { finger, .. } => Some(*finger),
+            Self::Patch { place, .. } | Self::HandMask { place, .. } => Some(place),
             Self::Review { .. } | Self::Pose { .. } => None,
         }
     }
@@ -115,8 +114,8 @@ impl Gesture {
     }
 
     /// Whether everything it changes is on screen.
-    fn is_on_screen(&self, pair: &str, fingers: &[PadId]) -> bool {
-        self.edits.iter().all(|e| e.pair() == pair && e.finger().is_none_or(|f| fingers.contains(&f)))
+    fn is_on_screen(&self, pair: &str, shown: &[MaskPlace]) -> bool {
+        self.edits.iter().all(|e| e.pair() == pair && e.place().is_none_or(|place| shown.contains(place)))
     }
 
     /// Whether undoing one before the other would matter.
@@ -124,8 +123,8 @@ impl Gesture {
         self.edits.iter().any(|a| {
             other.edits.iter().any(|b| {
                 a.pair() == b.pair()
-                    && a.finger() == b.finger()
-                    && (a.finger().is_some() || std::mem::discriminant(a) == std::mem::discriminant(b))
+                    && a.place() == b.place()
+                    && (a.place().is_some() || std::mem::discriminant(a) == std::mem::discriminant(b))
             })
         })
     }
@@ -137,7 +136,8 @@ impl Gesture {
 
 /// Gestures done and undone.
 ///
-/// Undo takes the last gesture whose every change is on screen, so it never touches a pair or a finger that is not;
+/// Undo takes the last gesture whose every change is on screen, so it never touches a pair, a finger or a prediction that
+/// is not;
 /// a gesture that others were made on top of waits for these to be undone first.
 #[derive(Clone, Debug)]
 pub struct History {
@@ -173,8 +173,8 @@ impl History {
     }
 
     /// Takes back the last gesture on screen. Returns what it did.
-    pub fn undo(&mut self, doc: &mut Document, pair: &str, fingers: &[PadId]) -> Option<&Gesture> {
-        let at = Self::position(&self.done, pair, fingers)?;
+    pub fn undo(&mut self, doc: &mut Document, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
+        let at = Self::position(&self.done, pair, shown)?;
         let mut gesture = self.done.remove(at);
         gesture.edits.iter_mut().rev().for_each(|edit| edit.swap(doc));
         self.undone.push(gesture);
@@ -182,22 +182,27 @@ impl History {
     }
 
     /// Does the last gesture taken back on screen again. Returns what it did.
-    pub fn redo(&mut self, doc: &mut Document, pair: &str, fingers: &[PadId]) -> Option<&Gesture> {
-        let at = Self::position(&self.undone, pair, fingers)?;
+    pub fn redo(&mut self, doc: &mut Document, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
+        let at = Self::position(&self.undone, pair, shown)?;
         let mut gesture = self.undone.remove(at);
         gesture.edits.iter_mut().for_each(|edit| edit.swap(doc));
         self.done.push(gesture);
         self.done.last()
     }
 
+    /// What can be taken back, the oldest first.
+    pub fn done(&self) -> &[Gesture] {
+        &self.done
+    }
+
     /// What undo would take back.
-    pub fn next_undo(&self, pair: &str, fingers: &[PadId]) -> Option<&Gesture> {
-        Self::position(&self.done, pair, fingers).map(|at| &self.done[at])
+    pub fn next_undo(&self, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
+        Self::position(&self.done, pair, shown).map(|at| &self.done[at])
     }
 
     /// What redo would do.
-    pub fn next_redo(&self, pair: &str, fingers: &[PadId]) -> Option<&Gesture> {
-        Self::position(&self.undone, pair, fingers).map(|at| &self.undone[at])
+    pub fn next_redo(&self, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
+        Self::position(&self.undone, pair, shown).map(|at| &self.undone[at])
     }
 
     /// Forgets everything: another data set is open.
@@ -206,9 +211,9 @@ impl History {
         self.undone.clear();
     }
 
-    fn position(stack: &[Gesture], pair: &str, fingers: &[PadId]) -> Option<usize> {
+    fn position(stack: &[Gesture], pair: &str, shown: &[MaskPlace]) -> Option<usize> {
         (0..stack.len()).rev().find(|&at| {
-            stack[at].is_on_screen(pair, fingers) && !stack[at + 1..].iter().any(|later| later.overlaps(&stack[at]))
+            stack[at].is_on_screen(pair, shown) && !stack[at + 1..].iter().any(|later| later.overlaps(&stack[at]))
         })
     }
 }
@@ -220,11 +225,12 @@ mod tests {
     use super::super::keys::Revision;
     use super::*;
     use crate::domain::grid::Mask;
-    use crate::domain::rig::lab;
+    use crate::domain::rig::{PadId, lab};
+    use crate::work::labels::ImprintOf;
 
     fn hand(doc: &mut Document, pair: &str, finger: PadId) -> HandMask {
         let hand = HandMask { mask: Arc::new(Mask::filled(8, 4, false)), revision: Revision(0), base: String::new() };
-        doc.labels.entry(pair.into()).or_default().masks[finger] = Some(hand.clone());
+        doc.labels.entry(pair.into()).or_default().put(&MaskPlace::measured(finger), Some(hand.clone()));
         hand
     }
 
@@ -232,7 +238,11 @@ mod tests {
     fn edit(pair: &str, finger: PadId, x: usize) -> Edit {
         let empty = Mask::filled(8, 4, false);
         let full = Mask::from_fn(8, 4, |px, py| (x..x + 2).contains(&px) && (1..3).contains(&py));
-        Edit::Patch { pair: pair.into(), finger, patch: Patch::between(&empty, &full).unwrap() }
+        Edit::Patch {
+            pair: pair.into(),
+            place: MaskPlace::measured(finger),
+            patch: Patch::between(&empty, &full).unwrap(),
+        }
     }
 
     fn patch(doc: &mut Document, history: &mut History, pair: &str, finger: PadId, x: usize) {
@@ -248,12 +258,15 @@ mod tests {
         let mut edit = edit("a", lab::RIGHT, 6);
         let copy = edit.clone();
         edit.swap(&mut doc);
-        assert!(doc.hand_mask("a", lab::RIGHT).unwrap().mask[(7, 2)]);
+        assert!(doc.hand_mask("a", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(7, 2)]);
         assert!(!before[(7, 2)], "the mask that others hold is not changed under them");
         edit.swap(&mut doc);
-        assert_eq!(doc.hand_mask("a", lab::RIGHT).unwrap().mask, before);
+        assert_eq!(doc.hand_mask("a", &MaskPlace::measured(lab::RIGHT)).unwrap().mask, before);
         assert_eq!(edit, copy);
-        assert!(doc.hand_mask("a", lab::RIGHT).unwrap().revision > Revision(1), "revisions are never reused");
+        assert!(
+            doc.hand_mask("a", &MaskPlace::measured(lab::RIGHT)).unwrap().revision > Revision(1),
+            "revisions are never reused"
+        );
     }
 
     #[test]
@@ -264,17 +277,24 @@ mod tests {
             hand(&mut doc, pair, finger);
             patch(&mut doc, &mut history, pair, finger, 0);
         }
-        assert!(history.undo(&mut doc, "c", &lab::PADS).is_none());
-        assert!(history.undo(&mut doc, "a", &[lab::RIGHT]).is_some());
-        assert!(history.undo(&mut doc, "a", &[lab::RIGHT]).is_none());
-        assert!(!doc.hand_mask("a", lab::RIGHT).unwrap().mask[(0, 1)]);
-        assert!(doc.hand_mask("a", lab::LEFT).unwrap().mask[(0, 1)]);
-        assert!(doc.hand_mask("b", lab::RIGHT).unwrap().mask[(0, 1)]);
+        assert!(history.undo(&mut doc, "c", &lab::PADS.map(MaskPlace::measured)).is_none());
+        assert!(history.undo(&mut doc, "a", &[MaskPlace::measured(lab::RIGHT)]).is_some());
+        assert!(history.undo(&mut doc, "a", &[MaskPlace::measured(lab::RIGHT)]).is_none());
+        assert!(!doc.hand_mask("a", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(0, 1)]);
+        assert!(doc.hand_mask("a", &MaskPlace::measured(lab::LEFT)).unwrap().mask[(0, 1)]);
+        assert!(doc.hand_mask("b", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(0, 1)]);
+        // A prediction that is not on screen is not touched either.
+        let predicted = MaskPlace { pad: lab::RIGHT, of: ImprintOf::Predicted("a prediction".into()) };
+        let mut edit = Edit::HandMask { pair: "a".into(), place: predicted.clone(), mask: None };
+        edit.swap(&mut doc);
+        history.record(Gesture { name: "stroke", edits: vec![edit] });
+        assert!(history.next_undo("a", &[MaskPlace::measured(lab::RIGHT)]).is_none());
+        assert!(history.undo(&mut doc, "a", &[predicted]).is_some());
         // A new stroke on the other finger does not take the redo of this one away; one on this finger does.
         patch(&mut doc, &mut history, "a", lab::LEFT, 4);
-        assert!(history.next_redo("a", &[lab::RIGHT]).is_some());
+        assert!(history.next_redo("a", &[MaskPlace::measured(lab::RIGHT)]).is_some());
         patch(&mut doc, &mut history, "a", lab::RIGHT, 4);
-        assert!(history.next_redo("a", &[lab::RIGHT]).is_none());
+        assert!(history.next_redo("a", &[MaskPlace::measured(lab::RIGHT)]).is_none());
     }
 
     #[test]
@@ -286,7 +306,7 @@ mod tests {
             patch(&mut doc, &mut history, "a", lab::RIGHT, x);
         }
         let mut undone = 0;
-        while history.undo(&mut doc, "a", &lab::PADS).is_some() {
+        while history.undo(&mut doc, "a", &lab::PADS.map(MaskPlace::measured)).is_some() {
             undone += 1;
         }
         assert_eq!(undone, 3);

@@ -2,24 +2,22 @@
 
 pub mod state;
 
-pub use state::{Document, HandMask, PairLabels, Review, Stored, Stroke};
+pub use state::{Document, HandMask, MaskPlace, PairLabels, Review, Stored, Stroke};
 
 use std::sync::Arc;
-
-use glam::DVec2;
 
 use super::effect::{Effect, LabelsToSave};
 use super::history::{Edit, Gesture};
 use super::keys::ImprintSource;
 use super::settings;
-use super::settings::state::MaskTool;
 use super::state::{Lookup, State};
 use super::tasks::state::Level;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{self, Patch};
+use crate::domain::label::{CleanUp, DrawTool, Drawing, Ground, Patch};
 use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
+use crate::work::labels::taken_over;
 
 /// What can happen to the document.
 #[derive(Clone, Debug)]
@@ -37,16 +35,18 @@ pub enum LabelsCommand {
     },
     /// Pointer moved, raw bubble pixels.
     StrokeTo([f32; 2]),
-    /// Pointer up.
+    /// A corner of a drawing that is made of clicks, raw bubble pixels.
+    Corner([f32; 2]),
+    /// Pointer up, or the last corner.
     EndStroke,
     /// Gives the stroke up.
     CancelStroke,
-    /// Fills the holes of the mask in force.
-    FillHoles,
-    /// Keeps the largest island of the mask in force.
-    LargestIsland,
+    /// Cleans the mask in force up.
+    CleanUp(CleanUp),
     /// Makes the automatic mask the corrected one.
     AdoptAutomatic,
+    /// Makes a copy of the other imprint's mask the corrected one.
+    TakeOver,
     /// Removes the corrected mask: the automatic source is in force again.
     ResetMask,
     /// Takes back the last change of what is on screen.
@@ -69,11 +69,13 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         LabelsCommand::StrokeTo(at_px) => stroke_to(state, at_px),
         LabelsCommand::EndStroke => end_stroke(state, effects),
         LabelsCommand::CancelStroke => cancel_stroke(state),
-        LabelsCommand::FillHoles => replace(state, "fill holes", "Fill holes", effects, label::fill_holes),
-        LabelsCommand::LargestIsland => {
-            replace(state, "largest island", "Largest island", effects, label::largest_island);
+        LabelsCommand::Corner(at_px) => corner(state, at_px),
+        LabelsCommand::CleanUp(clean_up) => {
+            let px_per_mm = state.rig().depth().map_or(f64::NAN, |sensor| sensor.px_per_m * 1e-3);
+            replace(state, clean_up.kind.name(), effects, |mask| clean_up.apply(mask, px_per_mm));
         }
         LabelsCommand::AdoptAutomatic => adopt_automatic(state, effects),
+        LabelsCommand::TakeOver => take_over(state, effects),
         LabelsCommand::ResetMask => reset(state, effects),
         LabelsCommand::Undo => undo(state, effects),
         LabelsCommand::Redo => redo(state, effects),
@@ -109,7 +111,7 @@ pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
 fn start_from(state: &State, source: ImprintSource, finger: PadId) -> Option<(Arc<Mask>, String)> {
     match state.mask_in_force(source, finger) {
         Ok(mask) => {
-            let base = match state.document.hand_mask(state.pair_name(), finger) {
+            let base = match state.hand_mask(source, finger) {
                 Some(hand) if Arc::ptr_eq(&hand.mask, mask.mask) => hand.base.clone(),
                 _ => mask.label,
             };
@@ -123,12 +125,12 @@ fn start_from(state: &State, source: ImprintSource, finger: PadId) -> Option<(Ar
     }
 }
 
-/// The imprint whose mask the clean-ups work on: the measured one where it is there.
-fn edited_source(state: &State, finger: PadId) -> ImprintSource {
-    if state.imprint(ImprintSource::Measured, finger).ready().is_some() {
-        ImprintSource::Measured
-    } else {
-        ImprintSource::Predicted
+impl State {
+    /// The imprint whose mask the clean-ups work on: the one chosen, else the one that is there.
+    pub fn worked_on(&self, finger: PadId) -> ImprintSource {
+        let chosen = self.selection.imprint;
+        let is_there = |source: &ImprintSource| self.imprint(*source, finger).ready().is_some();
+        [chosen, chosen.other()].into_iter().find(is_there).unwrap_or(chosen)
     }
 }
 
@@ -141,13 +143,7 @@ fn begin_stroke(
     effects: &mut Vec<Effect>,
 ) {
     end_stroke(state, effects);
-    let settings = &state.settings.mask;
-    let value = match settings.tool {
-        MaskTool::Brush => !erase,
-        MaskTool::Eraser => erase,
-        MaskTool::Pan => return,
-    };
-    let radius_px = settings.radius_px;
+    let Some((tool, adds)) = state.settings.mask.drawing() else { return };
     if !state.fingers().contains(&finger) || !check_editable(state, "Correct the mask") {
         return;
     }
@@ -155,27 +151,56 @@ fn begin_stroke(
         let err = TaskError::new("Correct the mask", "the mask is still being computed").with_hint("Try again.");
         return state.log.error(&err);
     };
+    let allowed = match state.allowed(source, finger) {
+        Ok(allowed) => allowed,
+        Err(why) => return state.log.error(&TaskError::new("Paint within limits", why)),
+    };
+    let Some(place) = state.mask_place(source, finger) else { return };
+    state.selection.imprint = source;
     let pair = state.pair_name().to_owned();
     let revision = state.document.next_revision();
     let labels = state.document.labels.entry(pair.clone()).or_default();
-    let before = labels.masks[finger].replace(HandMask { mask: pixels.clone(), revision, base });
-    state.document.stroke = Some(Stroke { pair, finger, value, radius_px, at: at_px, before, pixels });
-    stroke_to(state, at_px);
+    let before = labels.put(&place, Some(HandMask { mask: pixels.clone(), revision, base }));
+    let drawing = Drawing::begin(tool, at_px, adds != erase);
+    state.document.stroke = Some(Stroke { pair, place, source, drawing, allowed, before, pixels });
+    redraw(state, 0);
 }
 
 fn stroke_to(state: &mut State, at_px: [f32; 2]) {
-    let doc = &mut state.document;
-    let Some(stroke) = &mut doc.stroke else { return };
-    if !at_px.iter().all(|v| v.is_finite()) {
-        return;
+    let Some(stroke) = &mut state.document.stroke else { return };
+    let before = stroke.drawing.points.len();
+    stroke.drawing.move_to(at_px);
+    redraw(state, before);
+}
+
+fn corner(state: &mut State, at_px: [f32; 2]) {
+    if let Some(stroke) = &mut state.document.stroke {
+        stroke.drawing.corner(at_px);
+        redraw(state, 0);
     }
-    let [a, b] = [stroke.at, at_px].map(|p| DVec2::new(p[0].into(), p[1].into()));
-    stroke.at = at_px;
-    let (value, radius) = (stroke.value, f64::from(stroke.radius_px));
-    let hand = doc.labels.get_mut(&stroke.pair).and_then(|labels| labels.masks[stroke.finger].as_mut());
-    if let Some(hand) = hand
-        && label::paint(Arc::make_mut(&mut hand.mask), [a, b], radius, value).is_some()
-    {
+}
+
+/// Draws the stroke on its mask: what a brush did since its first `from` points, anything else anew.
+fn redraw(state: &mut State, from: usize) {
+    let Some(stroke) = &state.document.stroke else { return };
+    let Some(imprint) = state.imprint(stroke.source, stroke.place.pad).ready().cloned() else { return };
+    let doc = &mut state.document;
+    let Some(stroke) = &doc.stroke else { return };
+    let hand = doc.labels.get_mut(&stroke.pair).and_then(|labels| labels.masks.get_mut(&stroke.place));
+    let Some(hand) = hand else { return };
+    let ground = Ground { imprint: &imprint, allowed: stroke.allowed.as_ref() };
+    let changed = if matches!(stroke.drawing.tool, DrawTool::Brush { .. }) {
+        stroke.drawing.apply(Arc::make_mut(&mut hand.mask), ground, from).is_some()
+    } else {
+        let mut mask = (*stroke.pixels).clone();
+        stroke.drawing.apply(&mut mask, ground, 0);
+        let changed = mask != *hand.mask;
+        if changed {
+            hand.mask = Arc::new(mask);
+        }
+        changed
+    };
+    if changed {
         doc.last_revision += 1;
         hand.revision = super::keys::Revision(doc.last_revision);
     }
@@ -184,26 +209,34 @@ fn stroke_to(state: &mut State, at_px: [f32; 2]) {
 pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     let doc = &mut state.document;
     let Some(stroke) = doc.stroke.take() else { return };
-    let slot = &mut doc.labels.entry(stroke.pair.clone()).or_default().masks[stroke.finger];
-    let Some(now) = slot.as_ref() else { return };
+    let labels = doc.labels.entry(stroke.pair.clone()).or_default();
+    let Some(now) = labels.masks.get(&stroke.place) else { return };
     // The patch that leads back: what undo needs.
     let Some(patch) = Patch::between(&now.mask, &stroke.pixels) else {
-        *slot = stroke.before;
+        labels.put(&stroke.place, stroke.before);
         return;
     };
-    let (pair, finger) = (stroke.pair, stroke.finger);
+    let (pair, place) = (stroke.pair, stroke.place);
     let edit = match stroke.before {
-        Some(before) if before.mask.size() == now.mask.size() => Edit::Patch { pair: pair.clone(), finger, patch },
-        before => Edit::HandMask { pair: pair.clone(), finger, mask: before },
+        Some(before) if before.mask.size() == now.mask.size() => Edit::Patch { pair: pair.clone(), place, patch },
+        before => Edit::HandMask { pair: pair.clone(), place, mask: before },
     };
-    record(state, &pair, if stroke.value { "brush stroke" } else { "eraser stroke" }, edit, effects);
+    let name = match (stroke.drawing.tool, stroke.drawing.add) {
+        (DrawTool::Brush { .. }, true) => "brush stroke",
+        (DrawTool::Brush { .. }, false) => "eraser stroke",
+        (DrawTool::Lasso, _) => "lasso",
+        (DrawTool::Polygon, _) => "polygon",
+        (DrawTool::Rectangle, _) => "rectangle",
+        (DrawTool::Wand { .. }, _) => "wand",
+    };
+    record(state, &pair, name, edit, effects);
 }
 
 fn cancel_stroke(state: &mut State) {
     let doc = &mut state.document;
     let Some(stroke) = doc.stroke.take() else { return };
     if let Some(labels) = doc.labels.get_mut(&stroke.pair) {
-        labels.masks[stroke.finger] = stroke.before;
+        labels.put(&stroke.place, stroke.before);
     }
 }
 
@@ -219,39 +252,35 @@ fn record(state: &mut State, pair: &str, name: &'static str, edit: Edit, effects
 }
 
 /// Replaces the active finger's mask by `f` of the mask in force.
-fn replace(
-    state: &mut State,
-    name: &'static str,
-    what: &str,
-    effects: &mut Vec<Effect>,
-    f: impl FnOnce(&Mask) -> Mask,
-) {
+fn replace(state: &mut State, what: &'static str, effects: &mut Vec<Effect>, f: impl FnOnce(&Mask) -> Mask) {
     end_stroke(state, effects);
     if !check_editable(state, what) {
         return;
     }
     let finger = state.selection.finger;
-    let Some((pixels, base)) = start_from(state, edited_source(state, finger), finger) else {
+    let source = state.worked_on(finger);
+    let (Some((pixels, base)), Some(place)) = (start_from(state, source, finger), state.mask_place(source, finger))
+    else {
         return state.log.error(&TaskError::new(what, "there is no mask to work on yet"));
     };
     let mask = f(&pixels);
     if mask == *pixels {
         return state.log.info(format!("{what}: nothing to change"));
     }
-    set_hand_mask(state, name, finger, Some((Arc::new(mask), base)), effects);
+    set_hand_mask(state, what, place, Some((Arc::new(mask), base)), effects);
 }
 
 fn set_hand_mask(
     state: &mut State,
     name: &'static str,
-    finger: PadId,
+    place: MaskPlace,
     mask: Option<(Arc<Mask>, String)>,
     effects: &mut Vec<Effect>,
 ) {
     let pair = state.pair_name().to_owned();
     let revision = state.document.next_revision();
     let mask = mask.map(|(mask, base)| HandMask { mask, revision, base });
-    let mut edit = Edit::HandMask { pair: pair.clone(), finger, mask };
+    let mut edit = Edit::HandMask { pair: pair.clone(), place, mask };
     edit.swap(&mut state.document);
     record(state, &pair, name, edit, effects);
 }
@@ -263,11 +292,12 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
         return;
     }
     let finger = state.selection.finger;
-    let source = edited_source(state, finger);
+    let source = state.worked_on(finger);
+    let Some(place) = state.mask_place(source, finger) else { return };
     match (state.automatic_mask(source, finger), state.mask_recipe(finger)) {
         (Lookup::Ready(mask), Ok(recipe)) => {
             let adopted = (mask.clone(), state.automatic_label(source, finger, &recipe));
-            set_hand_mask(state, "automatic mask taken over", finger, Some(adopted), effects);
+            set_hand_mask(state, "automatic mask taken over", place, Some(adopted), effects);
         }
         (Lookup::Failed(err), _) => {
             let err = err.clone();
@@ -281,9 +311,32 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
 fn reset(state: &mut State, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
     let finger = state.selection.finger;
-    if state.document.hand_mask(state.pair_name(), finger).is_some() && check_editable(state, "Remove the correction") {
-        set_hand_mask(state, "correction removed", finger, None, effects);
+    let source = state.worked_on(finger);
+    let Some(place) = state.mask_place(source, finger) else { return };
+    if state.hand_mask(source, finger).is_some() && check_editable(state, "Remove the correction") {
+        set_hand_mask(state, "correction removed", place, None, effects);
     }
+}
+
+/// Makes a copy of the other imprint's mask that of the one worked on. Nothing else carries a mask from one to another.
+fn take_over(state: &mut State, effects: &mut Vec<Effect>) {
+    const WHAT: &str = "Take the other imprint's mask";
+    end_stroke(state, effects);
+    if !check_editable(state, WHAT) {
+        return;
+    }
+    let finger = state.selection.finger;
+    let to = state.worked_on(finger);
+    let from = to.other();
+    let size = state.imprint(to, finger).ready().map(|imprint| imprint.size());
+    let (Some((mask, base)), Some(place)) = (start_from(state, from, finger), state.mask_place(to, finger)) else {
+        let why = format!("there is no mask on the {} imprint", from.key());
+        return state.log.error(&TaskError::new(WHAT, why));
+    };
+    if Some(mask.size()) != size {
+        return state.log.error(&TaskError::new(WHAT, "the imprints are not of one size"));
+    }
+    set_hand_mask(state, "mask of the other imprint taken over", place, Some((mask, taken_over(from, &base))), effects);
 }
 
 pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Effect>) {
@@ -330,8 +383,8 @@ fn undo(state: &mut State, effects: &mut Vec<Effect>) {
     if state.document.stroke.is_some() {
         return cancel_stroke(state);
     }
-    let (pair, fingers) = (state.pair_name().to_owned(), state.fingers());
-    let name = state.history.undo(&mut state.document, &pair, &fingers).map(|gesture| gesture.name);
+    let (pair, shown) = (state.pair_name().to_owned(), state.mask_places());
+    let name = state.history.undo(&mut state.document, &pair, &shown).map(|gesture| gesture.name);
     travelled(state, "Undone", &pair, name, effects);
 }
 
@@ -339,8 +392,8 @@ fn redo(state: &mut State, effects: &mut Vec<Effect>) {
     if state.document.stroke.is_some() {
         return;
     }
-    let (pair, fingers) = (state.pair_name().to_owned(), state.fingers());
-    let name = state.history.redo(&mut state.document, &pair, &fingers).map(|gesture| gesture.name);
+    let (pair, shown) = (state.pair_name().to_owned(), state.mask_places());
+    let name = state.history.redo(&mut state.document, &pair, &shown).map(|gesture| gesture.name);
     travelled(state, "Done again", &pair, name, effects);
 }
 

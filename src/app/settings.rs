@@ -5,8 +5,8 @@ pub mod state;
 pub use state::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
 pub use state::versus::{Versus, VersusMode};
 pub use state::{
-    BRUSH_RADIUS_PX, ColorMap, ColorRange, GenerateSettings, Last, MAX_CACHE_MIB, MAX_RECENT, MaskChoice, MaskSettings,
-    MaskSource, MaskTool, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
+    BRUSH_RADIUS_PX, CLEAN_MM, ColorMap, ColorRange, GenerateSettings, Last, MAX_CACHE_MIB, MAX_RECENT, MaskChoice,
+    MaskSettings, MaskSource, MaskTool, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
 };
 
 use super::effect::Effect;

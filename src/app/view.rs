@@ -9,6 +9,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 use super::effect::Effect;
+use super::keys::ImprintSource;
 use super::labels;
 use super::pane::Pane;
 use super::state::State;
@@ -19,6 +20,8 @@ use crate::domain::rig::PadId;
 pub enum ViewCommand {
     /// Makes a finger the active one.
     SelectFinger(PadId),
+    /// Makes an imprint the one whose mask clean-ups work on.
+    SelectImprint(ImprintSource),
     /// Shows both fingers, or only the active one.
     ShowBothFingers(bool),
     /// The pixel under the pointer, shared by all images.
@@ -44,6 +47,10 @@ pub(super) fn step(state: &mut State, command: ViewCommand, effects: &mut Vec<Ef
                 labels::end_stroke(state, effects);
                 state.selection.finger = finger;
             }
+        }
+        ViewCommand::SelectImprint(source) => {
+            labels::end_stroke(state, effects);
+            state.selection.imprint = source;
         }
         ViewCommand::ShowBothFingers(both) => {
             labels::end_stroke(state, effects);

@@ -30,10 +30,7 @@ impl State {
     /// Whether the cloud of an imprint is needed for the 3D views and what lies beside them (with its pose), and
     /// whether it is needed at all.
     pub(super) fn shows_cloud(&self, source: ImprintSource) -> (bool, bool) {
-        let other = match source {
-            ImprintSource::Measured => ImprintSource::Predicted,
-            ImprintSource::Predicted => ImprintSource::Measured,
-        };
+        let other = source.other();
         let layers = self.needs(Need::Layers) && self.workbench.side == source;
         let both = self.workbench.both_clouds && self.needs(Need::Scene(other));
         let scene = layers || both || self.needs(Need::Scene(source)) || self.needs(Need::Poses);

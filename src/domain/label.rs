@@ -1,14 +1,21 @@
-//! Editing contact masks: brush strokes, clean-ups, and patches that undo them.
+//! Editing contact masks: drawings, clean-ups, and patches that undo them.
 //!
 //! Everything is a function of masks; who may edit what, and where masks are stored, is decided elsewhere.
 
+mod clean_up;
+mod drawing;
+mod gate;
 mod morphology;
+mod region;
 mod rle;
 
 use glam::DVec2;
 
 use super::grid::Mask;
 
+pub use clean_up::{CleanKind, CleanUp};
+pub use drawing::{DrawTool, Drawing, Ground};
+pub use gate::Gate;
 pub use morphology::{fill_holes, grow, islands, largest_island, remove_islands, shrink};
 pub use rle::{RleError, decode_runs, encode_runs};
 

@@ -98,11 +98,12 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let (tool, odd) = load_tool(&dataset, name)?;
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let imprints = predictor.imprints(&sample, args.imprint, &JobCx::unwatched())?;
+    let of = predictor.of(args.imprint)?;
     let mut notes = Notes::default();
     notes.take(&output, &sample.notes);
     notes.take(&output, &odd);
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
-    let inputs = MaskInputs { sample: &sample, tool: Some(&tool), labels: args.mask.drawn(&labels) };
+    let inputs = MaskInputs { sample: &sample, tool: Some(&tool), labels: args.mask.drawn(&labels), of: Some(&of) };
     let contact = predictor.contact(&args.mask, imprints, inputs)?;
     let points = contact.points(&sample)?;
     // What keeps every start from an answer keeps the registration itself from one, and is said once.

@@ -27,7 +27,7 @@ use crate::io::npz;
 use crate::work::compare::{Comparison, Depicted, beside, between, tile_of};
 use crate::work::imprint;
 use crate::work::job::JobCx;
-use crate::work::labels::Labels;
+use crate::work::labels::{ImprintOf, ImprintSource, Labels};
 use crate::work::mask::MaskInputs;
 use crate::work::pose::{PoseResult, pose};
 use crate::work::prediction::Prediction;
@@ -135,6 +135,8 @@ struct Found {
     imprints: PerPad<DepthMap>,
     drawn: PerPad<Prediction>,
     shift: ShiftMode,
+    /// What masks drawn on it are told by; `None` where nobody can have drawn on it.
+    of: Option<ImprintOf>,
     tile: Option<DepthMap>,
 }
 
@@ -166,7 +168,7 @@ fn find(
     match subject {
         Subject::Measured => {
             let tile = tile_of(dataset, pair, sample)?;
-            Ok(Found { imprints: imprint::measured(sample), tile, ..Found::default() })
+            Ok(Found { imprints: imprint::measured(sample), tile, of: Some(ImprintOf::Measured), ..Found::default() })
         }
         Subject::Stored => {
             let found = beside(dataset, pair, sample)?;
@@ -179,7 +181,8 @@ fn find(
             let mut predictor = predictor(wish);
             let drawn = predictor.predictions(sample, &JobCx::unwatched())?;
             let imprints = predictor.in_meters(sample, &drawn)?;
-            Ok(Found { imprints, drawn, shift: predictor.shift(), tile: None })
+            let of = Some(predictor.of(ImprintSource::Predicted)?);
+            Ok(Found { imprints, drawn, shift: predictor.shift(), of, tile: None })
         }
         Subject::Mean(wish, count) => {
             let mut predictor = predictor(wish);
@@ -233,19 +236,12 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
         notes.take(&output, &odd);
         let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
         let mut predictor = Predictor::new(&args.model, &dataset.rig);
-        let mut pose_of = |subject: &Subject, found: &Found| -> anyhow::Result<PoseResult> {
-            // What was drawn was drawn for what is always shown.
-            let own = *subject == Subject::Measured || *subject == Subject::shown();
-            let labels = args.mask.drawn(&labels).filter(|_| own);
-            posed(
-                args,
-                &mut predictor,
-                &found.imprints,
-                MaskInputs { sample: &sample, tool: Some(&tool), labels },
-                &tool,
-            )
+        let mut pose_of = |found: &Found| -> anyhow::Result<PoseResult> {
+            let (labels, of) = (args.mask.drawn(&labels), found.of.as_ref());
+            let inputs = MaskInputs { sample: &sample, tool: Some(&tool), labels, of };
+            posed(args, &mut predictor, &found.imprints, inputs, &tool)
         };
-        match (pose_of(&args.a, &found[0]), pose_of(&args.b, &found[1])) {
+        match (pose_of(&found[0]), pose_of(&found[1])) {
             (Ok(a), Ok(b)) => poses = Some(apart(&a, &b)),
             (Err(err), _) | (_, Err(err)) => output.note(&format!("no poses: {err:#}")),
         }

@@ -93,8 +93,9 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
     };
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let imprints = predictor.imprints(&sample, args.imprint, &JobCx::unwatched())?;
+    let of = predictor.of(args.imprint)?;
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
-    let inputs = MaskInputs { sample: &sample, tool: tool.as_ref(), labels: args.mask.drawn(&labels) };
+    let inputs = MaskInputs { sample: &sample, tool: tool.as_ref(), labels: args.mask.drawn(&labels), of: Some(&of) };
     let contact = predictor.contact(&args.mask, imprints, inputs)?;
     let parts = sample.rig.pads().map(|pad| {
         let mask = contact.masks[pad].as_ref().map(|found| &found.mask);

@@ -13,12 +13,12 @@ use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{fill_holes, largest_island};
+use crate::domain::label::Ground;
 use crate::domain::pose::ToolModel;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::work::job::JobCx;
-use crate::work::labels::{HandMask, ImprintSource, Labels, PairLabels, Revision};
+use crate::work::labels::{HandMask, ImprintSource, Labels, MaskPlace, PairLabels, Revision, taken_over};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
 use crate::work::tool::load_tool;
@@ -81,8 +81,9 @@ impl<'a> Touch<'a> {
     }
 
     fn contact(&mut self, imprint: ImprintSource, labels: Option<&PairLabels>) -> anyhow::Result<Contact> {
+        let of = self.predictor.of(imprint)?;
         let imprints = self.predictor.imprints(&self.sample, imprint, &JobCx::unwatched())?;
-        let inputs = MaskInputs { sample: &self.sample, tool: self.tool.as_ref().ok(), labels };
+        let inputs = MaskInputs { sample: &self.sample, tool: self.tool.as_ref().ok(), labels, of: Some(&of) };
         self.predictor.contact(&self.args.mask, imprints, inputs)
     }
 
@@ -98,26 +99,38 @@ impl<'a> Touch<'a> {
 /// only read where something is made from it.
 fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabels) -> anyhow::Result<()> {
     let pads = args.finger.fingers(&dataset.rig)?;
-    for &pad in pads.iter().filter(|_| args.remove_mask) {
-        labels.draw(pad, None);
-    }
-    if args.adopt || args.fill_holes || args.largest_island {
-        let found = Touch::load(args, dataset, id)?.contact(args.imprint, (!args.adopt).then_some(&*labels))?;
-        for pad in pads {
-            let Some(one) = &found.masks[pad] else { continue };
-            let base = match (&labels.masks[pad], one.basis) {
-                (Some(hand), MaskBasis::Hand) => hand.base.clone(),
-                _ => one.basis.label(&found.recipe.label(found.model.as_deref().unwrap_or_default())),
-            };
-            let mut mask = one.mask.clone();
-            if args.fill_holes {
-                mask = fill_holes(&mask);
-            }
-            if args.largest_island {
-                mask = largest_island(&mask);
-            }
-            if args.adopt || mask != one.mask {
-                labels.draw(pad, Some(HandMask { mask: Arc::new(mask), revision: Revision::default(), base }));
+    let mut touch = None;
+    if args.remove_mask || args.adopt || args.from.is_some() || !(args.clean.is_empty() && args.draw.is_empty()) {
+        let touch = touch.insert(Touch::load(args, dataset, id)?);
+        let of = touch.predictor.of(args.imprint)?;
+        let place = |pad| MaskPlace { pad, of: of.clone() };
+        for &pad in pads.iter().filter(|_| args.remove_mask) {
+            labels.draw(&place(pad), None);
+        }
+        if !args.remove_mask {
+            let found = touch.contact(args.from.unwrap_or(args.imprint), (!args.adopt).then_some(&*labels))?;
+            for pad in pads {
+                let Some(one) = &found.masks[pad] else { continue };
+                let made = || one.basis.label(&found.recipe.label(found.model.as_deref().unwrap_or_default()));
+                let base = match (labels.masks.get(&place(pad)), one.basis, args.from) {
+                    (_, _, Some(from)) => taken_over(from, &made()),
+                    (Some(hand), MaskBasis::Hand, None) => hand.base.clone(),
+                    _ => made(),
+                };
+                let mut mask = one.mask.clone();
+                if let Some(imprint) = &found.imprints[pad] {
+                    for drawing in &args.draw {
+                        drawing.apply(&mut mask, Ground { imprint, allowed: None }, 0);
+                    }
+                }
+                let px_per_mm = dataset.rig.depth().map_or(f64::NAN, |sensor| sensor.px_per_m * 1e-3);
+                for clean_up in &args.clean {
+                    mask = clean_up.apply(&mask, px_per_mm);
+                }
+                if args.adopt || args.from.is_some() || mask != one.mask {
+                    let hand = HandMask { mask: Arc::new(mask), revision: Revision::default(), base };
+                    labels.draw(&place(pad), Some(hand));
+                }
             }
         }
     }
@@ -127,7 +140,10 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
     if let Some(imprint) = args.accept {
         labels.accepted[imprint as usize] = Some(match args.pose {
             Some(planar) => AcceptedPose { pose: planar.into(), by_hand: true },
-            None => Touch::load(args, dataset, id)?.pose(imprint, labels)?.into(),
+            None => match &mut touch {
+                Some(touch) => touch.pose(imprint, labels)?.into(),
+                None => Touch::load(args, dataset, id)?.pose(imprint, labels)?.into(),
+            },
         });
     }
     if let Some(review) = args.review {

@@ -117,7 +117,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         let tool = tool.and_then(|name| tools.get(name));
         let touch = sample.pad(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;
         let bubble = touch.depth().ok_or_else(|| TaskError::new(WHAT, "it has no such imprint"))?;
-        let inputs = MaskInputs { sample, tool, labels: None };
+        let inputs = MaskInputs::measured(sample, tool, None);
         let found = predictor.contact_mask(&args.mask, &bubble.imprint, finger, inputs);
         let found = found.map_err(|err| TaskError::new(WHAT, says(&err)))?;
         if let Some(note) = found.basis.note() {

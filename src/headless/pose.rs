@@ -86,7 +86,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             let asked = Asked {
                 name: &entry.name,
                 stem: stem.as_deref(),
-                inputs: MaskInputs { sample: &sample, tool: Some(tool), labels: args.mask.drawn(&labels) },
+                inputs: MaskInputs { sample: &sample, tool: Some(tool), labels: args.mask.drawn(&labels), of: None },
                 tool,
                 accepted: labels.accepted(imprint),
             };
@@ -136,7 +136,8 @@ fn pose_cases(
     let Asked { name, stem, inputs, tool, accepted } = *asked;
     let sample = inputs.sample;
     let imprints = predictor.imprints(sample, imprint, &JobCx::unwatched())?;
-    let contact = predictor.contact(&args.mask, imprints, inputs)?;
+    let of = predictor.of(imprint)?;
+    let contact = predictor.contact(&args.mask, imprints, MaskInputs { of: Some(&of), ..inputs })?;
     let points = contact.points(sample);
     let truth = sample.grasp_from_object;
     let predicted = imprint == ImprintSource::Predicted;

@@ -22,7 +22,7 @@ use crate::work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
 use crate::work::error::TaskError;
 use crate::work::imprint::{self, chain_of, imprint_of};
 use crate::work::job::JobCx;
-use crate::work::labels::ImprintSource;
+use crate::work::labels::{ImprintOf, ImprintSource};
 use crate::work::mask::{Contact, MaskChoice, MaskInputs, MaskSource};
 use crate::work::models::{Masking, Models, Wanted};
 use crate::work::prediction::Prediction;
@@ -240,6 +240,15 @@ impl Predictor {
         }
         let made = self.predictions(sample, cx)?;
         self.in_meters(sample, &made)
+    }
+
+    /// What the imprints of [`Self::imprints`] are, for masks that were drawn on them.
+    pub(super) fn of(&mut self, source: ImprintSource) -> anyhow::Result<ImprintOf> {
+        if source == ImprintSource::Measured {
+            return Ok(ImprintOf::Measured);
+        }
+        let (config, id) = (self.config()?, self.bundle()?.id.clone());
+        Ok(ImprintOf::predicted(&id, &config, self.shift()))
     }
 
     /// The predictions of a pair's touches, all in one batch.

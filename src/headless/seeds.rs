@@ -11,6 +11,7 @@ use super::contact_mask::MaskArgs;
 use super::predict::Predictor;
 use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
+use crate::domain::diffusion::GenerateConfig;
 use crate::domain::ensemble::{AngleFan, Spread, seeds};
 use crate::domain::grid::DepthMap;
 use crate::domain::pose::{Registration, ToolModel};
@@ -20,6 +21,7 @@ use crate::domain::units::angle_error;
 use crate::io::{images, names, npz};
 use crate::work::ensemble::{Ensemble, ensemble};
 use crate::work::imprint::imprint_of;
+use crate::work::labels::ImprintOf;
 use crate::work::mask::MaskInputs;
 use crate::work::pose;
 use crate::work::prediction::Prediction;
@@ -173,7 +175,10 @@ pub(super) fn fan(
         }
     }
     let mut made_otherwise = BTreeMap::new();
-    let mut angle = |imprints: PerPad<&DepthMap>| -> anyhow::Result<Option<f64>> {
+    let (bundle, config, shift) = (predictor.bundle()?.id.clone(), predictor.config()?, predictor.shift());
+    let mut angle = |imprints: PerPad<&DepthMap>, seed: Option<u64>| -> anyhow::Result<Option<f64>> {
+        let of = seed.map(|seed| ImprintOf::predicted(&bundle, &GenerateConfig { seed, ..config }, shift));
+        let inputs = MaskInputs { of: of.as_ref(), ..inputs };
         let contact = predictor.contact(args, imprints.map(|imprint| imprint.cloned()), inputs)?;
         for (pad, found) in contact.masks.entries().filter(|(_, found)| found.basis != MaskBasis::Source) {
             let made_of = format!("{} finger: {}", sample.rig.pad_key(pad), found.basis.key(contact.source().key()));
@@ -185,17 +190,17 @@ pub(super) fn fan(
         Ok(found.ok().map(|found| found.angle_rad))
     };
     let mut angles = Vec::new();
-    for i in 0..usize::from(count) {
-        angles.push(angle(fingers.as_ref().map(|f| Some(&*f?.imprints[i])))?);
+    for (i, seed) in seeds(config.seed, count.into()).into_iter().enumerate() {
+        angles.push(angle(fingers.as_ref().map(|f| Some(&*f?.imprints[i])), Some(seed))?);
     }
-    let of_mean = angle(fingers.as_ref().map(|f| Some(&f?.spread.mean)))?;
+    let of_mean = angle(fingers.as_ref().map(|f| Some(&f?.spread.mean)), None)?;
     let fan = AngleFan::of(&angles.iter().flatten().copied().collect::<Vec<_>>());
     let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
     let mean = fan.as_ref().and_then(|f| f.mean_rad);
     let error = |angle: Option<f64>| Some(angle_error(angle?, truth?).to_degrees());
     let finite = |v: f64| v.is_finite().then_some(v.to_degrees());
     Ok(PoseFan {
-        seeds: seeds(predictor.config()?.seed, count.into()),
+        seeds: seeds(config.seed, count.into()),
         angles_deg: angles.iter().map(|a| a.map(f64::to_degrees)).collect(),
         mean_deg: mean.map(f64::to_degrees),
         std_deg: fan.as_ref().and_then(|f| finite(f.std_rad)),

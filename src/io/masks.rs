@@ -1,8 +1,8 @@
 //! Corrected masks on disk: saved after every stroke, never half, never replaced by something empty.
 //!
 //! One folder per dataset, beside it (`touch2touch_masks`) if that can be written, else in the user's data folder.
-//! Per pair and finger one JSON file with a run-length coded mask; per pair one with the review state and accepted
-//! poses; and one append-only journal of strokes. Files are written beside their place, flushed and renamed, so a
+//! Per pair and finger one JSON file with the run-length coded mask of the measured imprint, and one with those of
+//! predictions; per pair one with the review state and accepted poses; and one append-only journal of strokes. Files are written beside their place, flushed and renamed, so a
 //! crash costs at most the stroke that was being saved.
 //!
 //! A file that cannot be understood blocks its pair: it is reported, and nothing overwrites it.
@@ -30,6 +30,8 @@ const VERSION: u32 = 1;
 /// Reviews whose accepted poses were set by hand or leave the plane; others are written as version 1.
 const HAND_VERSION: u32 = 2;
 const MASK_SUFFIX: &str = ".mask.json";
+const PREDICTED_SUFFIX: &str = ".predicted.json";
+const PREDICTED_FORMAT: &str = "touch2touch-predicted-masks";
 const REVIEW_SUFFIX: &str = ".review.json";
 
 /// Why stored labels cannot be read or written.
@@ -148,6 +150,27 @@ struct MaskFile {
     saved_unix_s: u64,
     /// Pixels in contact: checked against the runs.
     contact_px: usize,
+    runs: Vec<u32>,
+}
+
+/// The masks of one finger that were drawn on predictions, each with the prediction that it belongs to.
+#[derive(Default, Serialize, Deserialize)]
+struct PredictedFile {
+    format: String,
+    version: u32,
+    pair: String,
+    finger: String,
+    masks: Vec<PredictedMask>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct PredictedMask {
+    of: String,
+    width: usize,
+    height: usize,
+    base: String,
+    person: String,
+    saved_unix_s: u64,
     runs: Vec<u32>,
 }
 
@@ -276,6 +299,66 @@ impl MaskStore {
             saved_unix_s: stored.saved_unix_s,
             contact_px: stored.mask.as_slice().iter().filter(|&&v| v).count(),
             runs: encode_runs(&stored.mask),
+        };
+        self.write(&file, &content)
+    }
+
+    fn predicted_name(&self, pair: &str, finger: PadId) -> String {
+        format!("{}.{}{PREDICTED_SUFFIX}", names::label(pair), self.rig.pad_key(finger))
+    }
+
+    /// Reads the masks drawn on predictions of a finger, with what each prediction is.
+    ///
+    /// # Errors
+    /// As [`MaskStore::load`].
+    pub fn load_predicted(&self, pair: &str, finger: PadId) -> Result<Vec<(String, StoredMask)>, StoreError> {
+        let Some((file, bytes)) = self.find(&self.predicted_name(pair, finger))? else { return Ok(Vec::new()) };
+        let damaged = |reason: String| StoreError::Damaged { file: file.clone(), reason };
+        let content: PredictedFile = serde_json::from_slice(&bytes).map_err(|err| damaged(err.to_string()))?;
+        check_format(&file, &content.format, PREDICTED_FORMAT, content.version, VERSION)?;
+        if content.pair != pair || content.finger != self.rig.pad_key(finger) {
+            return Err(damaged(format!("it belongs to the {} finger of {}", content.finger, content.pair)));
+        }
+        let one = |m: PredictedMask| {
+            let mask = decode_runs(m.width, m.height, &m.runs).map_err(|err| damaged(err.to_string()))?;
+            Ok((m.of, StoredMask { mask, base: m.base, person: m.person, saved_unix_s: m.saved_unix_s }))
+        };
+        content.masks.into_iter().map(one).collect()
+    }
+
+    /// Saves the mask drawn on the prediction `of`, beside those of other predictions; `None` removes it.
+    ///
+    /// # Errors
+    /// As [`MaskStore::save`].
+    pub fn save_predicted(
+        &self,
+        pair: &str,
+        finger: PadId,
+        of: &str,
+        mask: Option<&StoredMask>,
+    ) -> Result<(), StoreError> {
+        let mut all = self.load_predicted(pair, finger)?;
+        all.retain(|(other, _)| other != of);
+        all.extend(mask.map(|mask| (of.to_owned(), mask.clone())));
+        let file = self.folder.join(self.predicted_name(pair, finger));
+        if all.is_empty() && !file.exists() {
+            return Ok(());
+        }
+        let one = |(of, stored): (String, StoredMask)| PredictedMask {
+            of,
+            width: stored.mask.width(),
+            height: stored.mask.height(),
+            runs: encode_runs(&stored.mask),
+            base: stored.base,
+            person: stored.person,
+            saved_unix_s: stored.saved_unix_s,
+        };
+        let content = PredictedFile {
+            format: PREDICTED_FORMAT.into(),
+            version: VERSION,
+            pair: pair.into(),
+            finger: self.rig.pad_key(finger).into(),
+            masks: all.into_iter().map(one).collect(),
         };
         self.write(&file, &content)
     }

@@ -7,11 +7,12 @@ use super::browser::review_color;
 use super::cx::Cx;
 use super::theme::{SMALL, caption, section};
 use crate::app::action::Action;
-use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand};
+use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Review;
-use crate::app::settings::{BRUSH_RADIUS_PX, MaskChoice, MaskSettings, MaskSource, MaskTool};
+use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use crate::app::state::Lookup;
+use crate::domain::rig::PadId;
 
 /// Nothing is kept between frames.
 pub(super) type Memory = ();
@@ -36,18 +37,33 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 }
 
 fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
-        for (tool, action) in
-            [(MaskTool::Brush, Action::Brush), (MaskTool::Eraser, Action::Eraser), (MaskTool::Pan, Action::PanTool)]
-        {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        for (tool, action) in [
+            (MaskTool::Brush, Action::Brush),
+            (MaskTool::Eraser, Action::Eraser),
+            (MaskTool::Lasso, Action::Lasso),
+            (MaskTool::Polygon, Action::Polygon),
+            (MaskTool::Rectangle, Action::RectangleTool),
+            (MaskTool::Wand, Action::Wand),
+            (MaskTool::Pan, Action::PanTool),
+        ] {
             let on = cx.state.settings.mask.tool == tool;
             let button = ui.add(egui::Button::selectable(on, tool.name()).min_size(vec2(56.0, 24.0)));
-            if button.on_hover_text(action.help()).clicked() {
+            if button.on_hover_text(action.tooltip()).clicked() {
                 cx.push(SettingsCommand::SetMaskTool(tool));
             }
         }
     });
+    match cx.state.settings.mask.tool {
+        MaskTool::Brush | MaskTool::Eraser => radius(cx, ui),
+        MaskTool::Wand => wand(cx, ui),
+        MaskTool::Lasso | MaskTool::Polygon | MaskTool::Rectangle | MaskTool::Pan => {}
+    }
+    gate(cx, ui);
+}
+
+fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         let mut radius = cx.state.settings.mask.radius_px;
         ui.spacing_mut().slider_width = (ui.available_width() - 148.0).max(40.0);
@@ -61,9 +77,65 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         let mm = f64::from(radius) / cx.state.rig().depth().map_or(f64::NAN, |sensor| sensor.px_per_m) * 1e3;
         ui.label(caption(format!("{mm:.2} mm"), cx.p));
-        response
-            .on_hover_text("Radius of brush and eraser, image pixels ([ and ], or Shift + wheel). Double-click resets");
+        response.on_hover_text(
+            "Radius of brush and eraser, image pixels ([ and ], Shift + wheel, Alt + move). Double-click resets",
+        );
     });
+}
+
+/// A slider over millimeters of a length in meters; whether it changed.
+fn slider_mm(ui: &mut Ui, name: &str, meters: &mut f32, range: std::ops::RangeInclusive<f32>, tip: &str) -> bool {
+    let mut mm = *meters * 1e3;
+    let slider = egui::Slider::new(&mut mm, range).fixed_decimals(2).suffix(" mm");
+    let changed = ui.add(slider).accessible_name(name).on_hover_text(tip).changed();
+    if changed {
+        *meters = mm * 1e-3;
+    }
+    changed
+}
+
+fn wand(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let mut new = cx.state.settings.mask.clone();
+    ui.spacing_mut().slider_width = (ui.available_width() - 86.0).max(40.0);
+    let tip = "By how much the depth may differ from the point clicked; dragging to the right doubles it, to the left \
+               halves it";
+    if slider_mm(ui, "Wand tolerance", &mut new.wand_m, 0.01..=5.0, tip) {
+        cx.push(SettingsCommand::SetMask(new));
+    }
+}
+
+/// Where a hand may change the mask.
+fn gate(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let mut new = cx.state.settings.mask.clone();
+    let gate = &mut new.gate;
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        ui.label(caption("Only", cx.p));
+        let mut by_depth = gate.depth_m.is_some();
+        let tip = "Tools change only pixels whose imprint lies between two depths";
+        if ui.checkbox(&mut by_depth, "in depth").on_hover_text(tip).changed() {
+            gate.depth_m = by_depth.then_some([cx.state.settings.mask.choice.threshold_m, 0.02]);
+        }
+        let mut by_cad = gate.cad_m.is_some();
+        let tip = "Tools change only pixels whose membrane point lies near the CAD model at the true pose";
+        if ui.checkbox(&mut by_cad, "near CAD").on_hover_text(tip).changed() {
+            gate.cad_m = by_cad.then_some(cx.state.settings.mask.choice.cad_distance_m);
+        }
+        let invert = egui::Checkbox::new(&mut gate.inverted, "invert");
+        let open = gate.depth_m.is_none() && gate.cad_m.is_none();
+        ui.add_enabled(!open, invert).on_hover_text("Tools change everything but that");
+    });
+    ui.spacing_mut().slider_width = (ui.available_width() - 86.0).max(40.0);
+    if let Some([lo, hi]) = &mut gate.depth_m {
+        slider_mm(ui, "Gate from depth", lo, -5.0..=20.0, "The least depth that may change");
+        slider_mm(ui, "Gate to depth", hi, -5.0..=20.0, "The greatest depth that may change");
+    }
+    if let Some(cad_m) = &mut gate.cad_m {
+        slider_mm(ui, "Gate around CAD", cad_m, 0.0..=5.0, "The greatest distance to the CAD model");
+    }
+    if new.gate != cx.state.settings.mask.gate {
+        cx.push(SettingsCommand::SetMask(new));
+    }
 }
 
 /// The automatic source, with its number.
@@ -124,38 +196,86 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
         cx.push(SettingsCommand::SetMask(new));
     }
     for finger in cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f)) {
-        let text = match cx.state.mask_in_force(ImprintSource::Measured, finger) {
-            Ok(mask) => mask.label,
-            Err(Lookup::Failed(err)) => err.why.clone(),
-            Err(Lookup::Absent(absent)) => absent.text().to_owned(),
-            Err(_) => "…".to_owned(),
-        };
-        let by_hand = cx.state.document.hand_mask(cx.state.pair_name(), finger).is_some();
-        let color = if by_hand { cx.p.strong } else { cx.p.weak };
-        let label = egui::Label::new(
-            RichText::new(format!("{}: {text}", cx.state.finger_name(finger))).size(SMALL).color(color),
-        );
-        ui.add(label.truncate()).on_hover_text("The mask in force on the measured imprint of this finger");
+        let several = cx.state.imprint(ImprintSource::Predicted, finger).ready().is_some();
+        for source in ImprintSource::iter() {
+            if several || source == cx.state.worked_on(finger) {
+                in_force(cx, ui, source, finger);
+            }
+        }
     }
+}
+
+/// Where the mask of one imprint comes from.
+fn in_force(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, finger: PadId) {
+    let text = match cx.state.mask_in_force(source, finger) {
+        Ok(mask) => mask.label,
+        Err(Lookup::Failed(err)) => err.why.clone(),
+        Err(Lookup::Absent(absent)) => absent.text().to_owned(),
+        Err(_) => "…".to_owned(),
+    };
+    let color = if cx.state.hand_mask(source, finger).is_some() { cx.p.strong } else { cx.p.weak };
+    let text = format!("{}, {}: {text}", cx.state.finger_name(finger), source.key());
+    let label = egui::Label::new(RichText::new(&text).size(SMALL).color(color)).truncate();
+    ui.add(label).on_hover_text(format!("The mask in force. {text}"));
 }
 
 fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(2.0);
     let finger = cx.state.selection.finger;
     ui.label(section(&format!("Correct, {} finger", cx.state.finger_name(finger)), cx.p));
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let worked_on = cx.state.worked_on(finger);
+        for source in ImprintSource::iter() {
+            let there = cx.state.imprint(source, finger).ready().is_some();
+            let button = ui.add_enabled(there, egui::Button::selectable(worked_on == source, source.name()));
+            let button = button.accessible_name(format!("Correct the {} imprint's mask", source.key()));
+            let tip =
+                "The imprint that the buttons below work on: the last one painted on. Each imprint has its own mask";
+            if button.on_hover_text(tip).on_disabled_hover_text("There is no such imprint yet").clicked() {
+                cx.push(ViewCommand::SelectImprint(source));
+            }
+        }
+    });
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         cx.action_button(ui, Action::AdoptAutomatic, "Take automatic");
-        cx.action_button(ui, Action::FillHoles, "Fill holes");
-        cx.action_button(ui, Action::LargestIsland, "Largest island");
+        cx.action_button(ui, Action::TakeOver, "Other's mask");
         cx.action_button(ui, Action::ResetMask, "Remove");
+    });
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        for (action, text) in [
+            (Action::FillHoles, "Fill holes"),
+            (Action::LargestIsland, "Largest"),
+            (Action::ClearBorder, "No border"),
+            (Action::DropSmall, "Drop small"),
+            (Action::OpenMask, "Open"),
+            (Action::CloseMask, "Close"),
+            (Action::SmoothMask, "Smooth"),
+            (Action::GrowMask, "Grow"),
+            (Action::ShrinkMask, "Shrink"),
+        ] {
+            cx.action_button(ui, action, text);
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.label(caption("by", cx.p));
+        let mut new = cx.state.settings.mask.clone();
+        ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
+        let slider = egui::Slider::new(&mut new.clean_mm, CLEAN_MM).logarithmic(true).fixed_decimals(2).suffix(" mm");
+        let slider = ui.add(slider).accessible_name("Clean-up size");
+        let tip =
+            "Of Drop small (across), Open, Close, Smooth, Grow and Shrink (radius). Less than a pixel changes nothing";
+        if slider.on_hover_text(tip).changed() {
+            cx.push(SettingsCommand::SetMask(new));
+        }
     });
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let fingers = cx.state.fingers();
-        let name = cx.state.pair_name();
-        let undo = cx.state.history.next_undo(name, &fingers).map(|g| g.name);
-        let redo = cx.state.history.next_redo(name, &fingers).map(|g| g.name);
+        let (name, shown) = (cx.state.pair_name(), cx.state.mask_places());
+        let undo = cx.state.history.next_undo(name, &shown).map(|g| g.name);
+        let redo = cx.state.history.next_redo(name, &shown).map(|g| g.name);
         for (action, text, what) in [(Action::Undo, "Undo", undo), (Action::Redo, "Redo", redo)] {
             let response = cx.action_button(ui, action, text);
             if let Some(what) = what {

@@ -11,7 +11,7 @@ use super::bundles::{BundleInfo, BundleKind, FoundBundles};
 use super::error::TaskError;
 use super::imprint::{imprint_of, measured};
 use super::job::JobCx;
-use super::labels::{HandMask, ImprintSource, Labels, PairLabels, Review};
+use super::labels::{HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review};
 use super::mask::{MaskChoice, MaskInputs};
 use super::models::{Masking, Models, Wanted};
 use super::pose::pose;
@@ -74,6 +74,9 @@ struct CaseMask {
     /// Lengths of runs, row by row, the first one of pixels without contact.
     runs: Vec<u32>,
     base: String,
+    /// The imprint that it was drawn on.
+    #[serde(default)]
+    of: ImprintOf,
 }
 
 /// The labels of a pair.
@@ -167,13 +170,14 @@ fn mask_hash(mask: &Mask) -> String {
 
 impl CaseLabels {
     fn of(labels: &PairLabels) -> Self {
-        let mask = |(finger, hand): (PadId, &HandMask)| CaseMask {
-            finger,
+        let mask = |(place, hand): (&MaskPlace, &HandMask)| CaseMask {
+            finger: place.pad,
+            of: place.of.clone(),
             size: hand.mask.size(),
             runs: encode_runs(&hand.mask),
             base: hand.base.clone(),
         };
-        Self { masks: labels.masks.entries().map(mask).collect(), review: labels.review, accepted: labels.accepted }
+        Self { masks: labels.masks.iter().map(mask).collect(), review: labels.review, accepted: labels.accepted }
     }
 
     fn labels(&self) -> Result<PairLabels, TaskError> {
@@ -185,7 +189,7 @@ impl CaseLabels {
             if mask.finger.index() >= 16 {
                 return Err(TaskError::new(WHAT, "it has a mask of a finger that no gripper has"));
             }
-            labels.masks[mask.finger] = Some(hand);
+            labels.masks.insert(MaskPlace { pad: mask.finger, of: mask.of.clone() }, hand);
         }
         Ok(labels)
     }
@@ -204,7 +208,7 @@ fn results(
     let tool = dataset.index.get(pair).and_then(|entry| entry.tool.as_deref());
     let tool = tool.and_then(|name| load_tool(dataset, name).ok()).map(|(tool, _)| tool);
     let mut out = Vec::new();
-    let mut sources = vec![(ImprintSource::Measured, measured(sample))];
+    let mut sources = vec![(ImprintOf::Measured, measured(sample))];
     if let (Some(bundle), Some((_, config))) = (generator, &recipe.generator) {
         let ends = bundle.ends(&sample.rig).transpose().map_err(|err| TaskError::from_error(WHAT, &err))?;
         let input = ends.ok_or_else(|| TaskError::new(WHAT, format!("{} is no generator", bundle.name)))?.input;
@@ -216,12 +220,12 @@ fn results(
             let made = made.filter(|made| made.color.is_none());
             imprints[pad] = made.map(|made| imprint_of(&made, recipe.shift, sample, pad)).transpose()?;
         }
-        sources.push((ImprintSource::Predicted, imprints));
+        sources.push((ImprintOf::predicted(&bundle.id, config, recipe.shift), imprints));
     }
-    for (source, imprints) in sources.into_iter().filter(|(_, imprints)| !imprints.is_empty()) {
+    for (of, imprints) in sources.into_iter().filter(|(_, imprints)| !imprints.is_empty()) {
         cx.check(WHAT)?;
         let by = Masking { choice: recipe.mask, model: mask_model, engine: recipe.runtime };
-        let inputs = MaskInputs { sample, tool: tool.as_ref(), labels: Some(labels) };
+        let inputs = MaskInputs { sample, tool: tool.as_ref(), labels: Some(labels), of: Some(&of) };
         let contact = models.contact(by, imprints, inputs)?;
         let hashes = contact.imprints.entries().map(|(pad, imprint)| {
             let mask = contact.masks[pad].as_ref().map_or_else(String::new, |found| mask_hash(&found.mask));
@@ -233,7 +237,7 @@ fn results(
             pose(&points, tool, &*recipe.engine.method(), ask, sample.grasp_from_object).ok()
         });
         out.push(CaseResult {
-            imprint: source,
+            imprint: of.source(),
             fingers: hashes.collect(),
             pose: found.as_ref().map(|found| found.grasp_from_object),
             rms_m: found.as_ref().map(|found| found.rms_m),
@@ -474,7 +478,8 @@ mod tests {
     fn drawn() -> PairLabels {
         let mask = Arc::new(Mask::from_fn(175, 140, |x, y| (60..110).contains(&x) && (40..90).contains(&y)));
         let hand = HandMask { mask, revision: Default::default(), base: "Threshold".into() };
-        PairLabels { masks: [Some(hand), None].into(), review: Review::Flagged, ..PairLabels::default() }
+        let masks = [(MaskPlace::measured(lab::RIGHT), hand)].into();
+        PairLabels { masks, review: Review::Flagged, ..PairLabels::default() }
     }
 
     fn checked(file: &Path, folder: &Path) -> (OpenedCase, CaseReport) {
@@ -505,10 +510,7 @@ mod tests {
         assert!(report.same && report.compared == 6, "{report:?}");
         assert_eq!((opened.case.pair, opened.dataset.index.pairs.len()), (made.pair.clone(), 1));
         assert_eq!(opened.labels.review, Review::Flagged);
-        assert_eq!(
-            opened.labels.masks[lab::RIGHT].as_ref().unwrap().mask,
-            drawn().masks[lab::RIGHT].as_ref().unwrap().mask
-        );
+        assert_eq!(opened.labels.measured(lab::RIGHT).unwrap().mask, drawn().measured(lab::RIGHT).unwrap().mask);
     }
 
     #[test]

@@ -20,7 +20,7 @@ use crate::io::export_unet::{self, ExportConfig, ExportEntry, ExportReport, Load
 /// What it is called in errors.
 const WHAT: &str = "Export masks";
 
-/// The masks drawn by hand: those on the disk, and over them what was changed since.
+/// The masks drawn by hand on measured imprints: those on the disk, and over them what was changed since.
 #[derive(Clone, Copy, Debug)]
 pub struct HandMasks<'a> {
     /// What is stored.
@@ -36,7 +36,7 @@ impl HandMasks<'_> {
         for (pair, labels) in self.changed {
             for finger in rig.pads() {
                 let key = (pair.clone(), finger);
-                match labels.masks[finger] {
+                match labels.measured(finger) {
                     Some(_) => all.insert(key),
                     None => all.remove(&key),
                 };
@@ -51,7 +51,7 @@ impl HandMasks<'_> {
             Some(labels) => labels.clone(),
             None => self.labels.load(pair)?,
         };
-        Ok(labels.masks[finger].as_ref().map(|hand| (*hand.mask).clone()))
+        Ok(labels.measured(finger).map(|hand| (*hand.mask).clone()))
     }
 
     /// The review states that are not "todo", by pair name.

@@ -1,7 +1,7 @@
 //! [`Labels`]: what people said about the pairs of a data set (masks drawn by hand, review states, accepted poses), as
 //! it lies on the disk. The studio and every verb read and write it here.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -10,9 +10,11 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::error::TaskError;
 use crate::domain::dataset::Problem;
+use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::hand::AcceptedPose;
-use crate::domain::rig::{PadId, PerPad};
+use crate::domain::postprocess::ShiftMode;
+use crate::domain::rig::PadId;
 use crate::io::dataset::Dataset;
 use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
 
@@ -47,6 +49,15 @@ impl ImprintSource {
     /// The name in files and on the command line.
     pub fn key(self) -> &'static str {
         self.into()
+    }
+
+    /// The other one.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::Measured => Self::Predicted,
+            Self::Predicted => Self::Measured,
+        }
     }
 
     /// The name on screen.
@@ -119,6 +130,50 @@ impl Review {
     }
 }
 
+/// The imprint that a mask belongs to. A mask says which pixels of *this* picture are contact: another picture of the
+/// same touch has its own.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ImprintOf {
+    /// What the Soft Bubble measured.
+    #[default]
+    Measured,
+    /// One prediction, by all that decides it; see [`ImprintOf::predicted`].
+    Predicted(Arc<str>),
+}
+
+impl ImprintOf {
+    /// The prediction of a generator (its bundle's identity) with these choices.
+    pub fn predicted(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> Self {
+        let choices = serde_json::to_string(&(config, shift)).unwrap_or_else(|_| format!("{config:?} {shift:?}"));
+        Self::Predicted(format!("{bundle} {choices}").into())
+    }
+
+    /// Which of the two it is.
+    pub fn source(&self) -> ImprintSource {
+        match self {
+            Self::Measured => ImprintSource::Measured,
+            Self::Predicted(_) => ImprintSource::Predicted,
+        }
+    }
+}
+
+/// What a mask is of.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MaskPlace {
+    /// The pad.
+    pub pad: PadId,
+    /// Its imprint.
+    pub of: ImprintOf,
+}
+
+impl MaskPlace {
+    /// The measured imprint of a pad.
+    pub fn measured(pad: PadId) -> Self {
+        Self { pad, of: ImprintOf::Measured }
+    }
+}
+
 /// Counts changes: equal revisions of the same thing are equal. Never reused within a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Revision(pub u64);
@@ -134,11 +189,16 @@ pub struct HandMask {
     pub base: String,
 }
 
+/// Where a mask comes from that was taken over from another imprint, whose own mask is `label`.
+pub fn taken_over(from: ImprintSource, label: &str) -> String {
+    format!("the {} imprint's mask ({label})", from.name().to_lowercase())
+}
+
 /// What a person said about one pair.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairLabels {
     /// Corrected masks.
-    pub masks: PerPad<HandMask>,
+    pub masks: BTreeMap<MaskPlace, HandMask>,
     /// The review state.
     pub review: Review,
     /// Accepted `grasp_from_object` poses: from the measured, from the predicted imprint.
@@ -151,14 +211,27 @@ impl PairLabels {
         *self == Self::default()
     }
 
-    /// The mask drawn by hand of a pad, if it is as large as the imprint.
-    pub fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&HandMask> {
-        self.masks[pad].as_ref().filter(|hand| hand.mask.size() == imprint.size())
+    /// The mask drawn by hand on the measured imprint of a pad.
+    pub fn measured(&self, pad: PadId) -> Option<&HandMask> {
+        self.masks.get(&MaskPlace::measured(pad))
     }
 
-    /// Corrects the mask of a pad, or takes the correction back; the pair counts as begun.
-    pub fn draw(&mut self, pad: PadId, mask: Option<HandMask>) {
-        self.masks[pad] = mask;
+    /// The mask drawn by hand on an imprint, if it is as large.
+    pub fn drawn(&self, place: &MaskPlace, imprint: &DepthMap) -> Option<&HandMask> {
+        self.masks.get(place).filter(|hand| hand.mask.size() == imprint.size())
+    }
+
+    /// Puts a mask in its place, or takes it away; returns what was there.
+    pub fn put(&mut self, place: &MaskPlace, mask: Option<HandMask>) -> Option<HandMask> {
+        match mask {
+            Some(mask) => self.masks.insert(place.clone(), mask),
+            None => self.masks.remove(place),
+        }
+    }
+
+    /// Corrects a mask, or takes the correction back; the pair counts as begun.
+    pub fn draw(&mut self, place: &MaskPlace, mask: Option<HandMask>) {
+        self.put(place, mask);
         if self.review == Review::Todo {
             self.review = Review::InProgress;
         }
@@ -243,12 +316,18 @@ impl Labels {
         let Ok(store) = &*self.store else { return Ok(PairLabels::default()) };
         let fail = |err: StoreError| store_error(&what, &err);
         let mut labels = PairLabels::default();
-        for finger in store.rig().pads() {
-            labels.masks[finger] = store.load(name, finger).map_err(fail)?.map(|stored| HandMask {
-                mask: Arc::new(stored.mask),
-                revision: Revision::default(),
-                base: stored.base,
-            });
+        let hand = |stored: StoredMask| HandMask {
+            mask: Arc::new(stored.mask),
+            revision: Revision::default(),
+            base: stored.base,
+        };
+        for pad in store.rig().pads() {
+            if let Some(stored) = store.load(name, pad).map_err(fail)? {
+                labels.masks.insert(MaskPlace::measured(pad), hand(stored));
+            }
+            for (of, stored) in store.load_predicted(name, pad).map_err(fail)? {
+                labels.masks.insert(MaskPlace { pad, of: ImprintOf::Predicted(of.into()) }, hand(stored));
+            }
         }
         if let Some(stored) = store.load_review(name).map_err(fail)? {
             labels.review = Review::from_stored(&stored.review).ok_or_else(|| {
@@ -270,22 +349,27 @@ impl Labels {
         let store = self.store(&what)?;
         let fail = |err: StoreError| store_error(&what, &err);
         let before = lock(&self.saved).get(name).cloned().unwrap_or_default();
-        for finger in store.rig().pads() {
-            let same = match (&before.masks[finger], &labels.masks[finger]) {
-                (None, None) => true,
+        let places: BTreeSet<&MaskPlace> = before.masks.keys().chain(labels.masks.keys()).collect();
+        for place in places {
+            let (old, new) = (before.masks.get(place), labels.masks.get(place));
+            let same = match (old, new) {
                 (Some(a), Some(b)) => a.mask == b.mask && a.base == b.base,
                 _ => false,
             };
             if same {
                 continue;
             }
-            let stored = labels.masks[finger].as_ref().map(|hand| StoredMask {
+            let stored = new.map(|hand| StoredMask {
                 mask: (*hand.mask).clone(),
                 base: hand.base.clone(),
                 person: masks::person(),
                 saved_unix_s: masks::now_unix_s(),
             });
-            store.save(name, finger, stored.as_ref()).map_err(fail)?;
+            match &place.of {
+                ImprintOf::Measured => store.save(name, place.pad, stored.as_ref()),
+                ImprintOf::Predicted(of) => store.save_predicted(name, place.pad, of, stored.as_ref()),
+            }
+            .map_err(fail)?;
         }
         if before.review != labels.review || before.accepted != labels.accepted {
             let review = StoredReview { review: labels.review.stored().into(), accepted: labels.accepted };

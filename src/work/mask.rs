@@ -11,7 +11,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::cloud::contact_points;
 use super::error::TaskError;
-use super::labels::PairLabels;
+use super::labels::{HandMask, ImprintOf, MaskPlace, PairLabels};
 use crate::domain::bits::Bits;
 use crate::domain::contact::{self, ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
 use crate::domain::grid::DepthMap;
@@ -177,6 +177,20 @@ pub struct MaskInputs<'a> {
     pub tool: Option<&'a ToolModel>,
     /// What people drew; `None` leaves that out.
     pub labels: Option<&'a PairLabels>,
+    /// The imprint that masks are made for; `None` where nobody can have drawn on it.
+    pub of: Option<&'a ImprintOf>,
+}
+
+impl<'a> MaskInputs<'a> {
+    /// The measured imprint of a pair.
+    pub fn measured(sample: &'a Sample, tool: Option<&'a ToolModel>, labels: Option<&'a PairLabels>) -> Self {
+        Self { sample, tool, labels, of: Some(&ImprintOf::Measured) }
+    }
+
+    /// The mask that a person drew on this imprint of a pad.
+    fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&'a HandMask> {
+        self.labels?.drawn(&MaskPlace { pad, of: self.of?.clone() }, imprint)
+    }
 }
 
 /// The mask of one pad's imprint: the one drawn by hand, else by the recipe; `unet` runs the mask model.
@@ -190,7 +204,7 @@ pub fn contact_mask(
     inputs: MaskInputs<'_>,
     unet: impl FnOnce(&DepthMap) -> Result<ContactMask, TaskError>,
 ) -> Result<ContactMask, TaskError> {
-    if let Some(hand) = inputs.labels.and_then(|labels| labels.drawn(pad, imprint)) {
+    if let Some(hand) = inputs.drawn(pad, imprint) {
         return Ok(ContactMask { mask: (*hand.mask).clone(), basis: MaskBasis::Hand });
     }
     match recipe {
@@ -285,9 +299,10 @@ impl Contact {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::domain::diffusion::GenerateConfig;
     use crate::domain::grid::Mask;
+    use crate::domain::postprocess::ShiftMode;
     use crate::domain::rig::lab;
-    use crate::work::labels::HandMask;
 
     #[test]
     fn auto_is_the_model_or_else_the_threshold_and_a_drawn_mask_wins_over_all() {
@@ -299,8 +314,9 @@ mod tests {
         let sample = Sample::default();
         let drawn = Mask::from_fn(175, 140, |x, _| x > 170);
         let hand = HandMask { mask: Arc::new(drawn.clone()), revision: Default::default(), base: String::new() };
-        let labels = PairLabels { masks: [None, Some(hand)].into(), ..PairLabels::default() };
-        let inputs = MaskInputs { sample: &sample, tool: None, labels: Some(&labels) };
+        let mut labels = PairLabels::default();
+        labels.draw(&MaskPlace::measured(lab::LEFT), Some(hand));
+        let inputs = MaskInputs::measured(&sample, None, Some(&labels));
         let threshold = MaskRecipe::Threshold(0.005.into());
         let never = |_: &DepthMap| panic!("no model is asked");
         let right = contact_mask(&threshold, &imprint, lab::RIGHT, inputs, never).unwrap();
@@ -310,6 +326,17 @@ mod tests {
         // One of another size is of another image.
         let small = DepthMap::from_fn(60, 60, |x, _| if x < 30 { 0.008 } else { 0.0 });
         assert_eq!(contact_mask(&threshold, &small, lab::LEFT, inputs, never).unwrap().basis, MaskBasis::Source);
+        // A mask is of one picture of the touch: not of a prediction, and not of one with another seed.
+        let of =
+            |seed| ImprintOf::predicted("id", &GenerateConfig { seed, ..GenerateConfig::default() }, ShiftMode::Raw);
+        let on = |of: &ImprintOf, labels: &PairLabels| {
+            let inputs = MaskInputs { sample: &sample, tool: None, labels: Some(labels), of: Some(of) };
+            contact_mask(&threshold, &imprint, lab::LEFT, inputs, never).unwrap().basis
+        };
+        assert_eq!(on(&of(1), &labels), MaskBasis::Source);
+        let hand = labels.measured(lab::LEFT).cloned();
+        labels.draw(&MaskPlace { pad: lab::LEFT, of: of(1) }, hand);
+        assert_eq!((on(&of(1), &labels), on(&of(2), &labels)), (MaskBasis::Hand, MaskBasis::Source));
         let masks = [Some(right), Some(left)].into();
         let contact = Contact { imprints: PerPad::default(), masks, recipe: threshold, model: None };
         assert_eq!(contact.made_of(), "threshold, hand");

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::error::{Remark, TaskError};
 use super::job::JobCx;
-use super::labels::{Labels, PairLabels, Review};
+use super::labels::{Labels, MaskPlace, PairLabels, Review};
 use super::mask::{MaskChoice, MaskInputs, MaskRecipe, without_model};
 use super::tool::Tools;
 use super::usable::unusable;
@@ -364,11 +364,11 @@ fn touch(sample: &Sample, pad: PadId, at: usize, tool: Option<usize>) -> Option<
 /// The contact by hand, else near the CAD model at the true pose.
 fn contact(sample: &Sample, pad: PadId, tool: Option<&ToolModel>, labels: &PairLabels) -> Option<(Mask, Known)> {
     let imprint = &sample.pad(pad)?.depth()?.imprint;
-    if let Some(hand) = labels.drawn(pad, imprint) {
+    if let Some(hand) = labels.drawn(&MaskPlace::measured(pad), imprint) {
         return Some(((*hand.mask).clone(), Known::Hand));
     }
     let recipe = MaskRecipe::Cad(MaskChoice::default().cad_distance_m.into());
-    let found = without_model(&recipe, imprint, pad, MaskInputs { sample, tool, labels: None }).ok()?;
+    let found = without_model(&recipe, imprint, pad, MaskInputs::measured(sample, tool, None)).ok()?;
     (found.basis == MaskBasis::Source).then_some((found.mask, Known::Cad))
 }
 

@@ -3,12 +3,15 @@
 use std::sync::atomic::Ordering;
 
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, SettingsCommand, ViewCommand};
+use touch2touch::app::command::{
+    Answer, Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand,
+};
 use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
-use touch2touch::app::labels::Review;
+use touch2touch::app::labels::{MaskPlace, Review};
 use touch2touch::app::settings::{MaskSource, MaskTool};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::grid::Mask;
+use touch2touch::domain::label::CleanKind;
 use touch2touch::domain::rig::{PadId, lab};
 
 use super::double::Bench;
@@ -59,8 +62,8 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     assert_eq!(in_force.label, "By hand, from Threshold 5.00 mm");
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
-    assert_eq!(*saved.masks[lab::RIGHT].as_ref().unwrap().mask, drawn);
-    assert_eq!(saved.masks[lab::LEFT], None);
+    assert_eq!(*saved.measured(lab::RIGHT).unwrap().mask, drawn);
+    assert_eq!(saved.measured(lab::LEFT), None);
     assert_eq!(saved.review, Review::InProgress);
     assert!(bench.state.document.unsaved.is_empty());
     // Another automatic source does not touch it; removing it brings that source back.
@@ -74,7 +77,7 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     bench.send(LabelsCommand::Undo);
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
-    assert_eq!(*saved.masks[lab::RIGHT].as_ref().unwrap().mask, drawn);
+    assert_eq!(*saved.measured(lab::RIGHT).unwrap().mask, drawn);
 }
 
 #[test]
@@ -85,7 +88,7 @@ fn a_stroke_that_changes_nothing_leaves_nothing() {
     bench.send(SettingsCommand::SetMaskTool(MaskTool::Brush));
     stroke(&mut bench, lab::RIGHT, [900.0, -900.0], [f32::NAN, 1.0]);
     bench.settle();
-    assert!(bench.state.document.hand_mask("tool_a/data_0", lab::RIGHT).is_none());
+    assert!(bench.state.document.hand_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).is_none());
     assert!(Action::Undo.command(&bench.state).is_none());
     assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0);
     assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
@@ -141,11 +144,11 @@ fn undo_and_redo_follow_what_is_on_screen() {
 #[test]
 fn clean_ups_work_on_the_mask_in_force() {
     let mut bench = bench();
-    bench.send(LabelsCommand::FillHoles);
+    bench.send(LabelsCommand::CleanUp(CleanKind::FillHoles.into()));
     assert_eq!(count(&mask(&bench, lab::RIGHT)), 36 + 4);
-    bench.send(LabelsCommand::LargestIsland);
+    bench.send(LabelsCommand::CleanUp(CleanKind::LargestIsland.into()));
     assert_eq!(count(&mask(&bench, lab::RIGHT)), 36);
-    bench.send(LabelsCommand::LargestIsland);
+    bench.send(LabelsCommand::CleanUp(CleanKind::LargestIsland.into()));
     assert!(bench.log().last().unwrap().contains("nothing to change"));
     bench.send(LabelsCommand::AdoptAutomatic);
     assert_eq!(count(&mask(&bench, lab::RIGHT)), 39);
@@ -153,7 +156,7 @@ fn clean_ups_work_on_the_mask_in_force() {
         bench.send(LabelsCommand::Undo);
         assert_eq!(count(&mask(&bench, lab::RIGHT)), expected);
     }
-    assert!(bench.state.document.hand_mask("tool_a/data_0", lab::RIGHT).is_none());
+    assert!(bench.state.document.hand_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).is_none());
 }
 
 #[test]
@@ -167,7 +170,7 @@ fn labels_that_cannot_be_read_are_never_written() {
     let automatic = mask(&bench, lab::RIGHT);
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     for command in [
-        Command::Labels(LabelsCommand::FillHoles),
+        Command::Labels(LabelsCommand::CleanUp(CleanKind::FillHoles.into())),
         Command::Labels(LabelsCommand::AdoptAutomatic),
         Command::Labels(LabelsCommand::SetReview(Review::Done)),
         Command::Labels(LabelsCommand::ResetMask),
@@ -225,7 +228,7 @@ fn moving_on_ends_the_stroke() {
     bench.send(LibraryCommand::Step(1));
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
-    assert!(saved.masks[lab::RIGHT].as_ref().unwrap().mask[(12, 2)]);
+    assert!(saved.measured(lab::RIGHT).unwrap().mask[(12, 2)]);
     assert!(bench.state.document.stroke.is_none());
 }
 
@@ -240,7 +243,7 @@ fn strokes_waiting_for_the_disk_become_one_and_survive_the_end() {
     // The program ends before the disk had its turn: what waits to be written is written first.
     drop(bench);
     assert_eq!(source.saves.load(Ordering::Relaxed), 1);
-    assert_eq!(*source.labels.lock().unwrap()["tool_a/data_0"].masks[lab::RIGHT].as_ref().unwrap().mask, drawn);
+    assert_eq!(*source.labels.lock().unwrap()["tool_a/data_0"].measured(lab::RIGHT).unwrap().mask, drawn);
 }
 
 #[test]
@@ -270,4 +273,101 @@ fn opening_again_brings_the_masks_back() {
     bench.settle();
     assert_eq!(mask(&bench, lab::RIGHT), drawn);
     assert!(Action::Undo.command(&bench.state).is_none(), "what was undone before is not on the list any more");
+}
+
+#[test]
+fn a_mask_belongs_to_one_imprint_until_it_is_taken_over() {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Masks]));
+    bench.send(PredictCommand::Generate);
+    bench.settle();
+    let label = |bench: &Bench, source| bench.state.mask_in_force(source, lab::RIGHT).unwrap().label;
+    stroke(&mut bench, lab::RIGHT, [12.0, 2.0], [14.0, 2.0]);
+    bench.settle();
+    assert!(label(&bench, MEASURED).starts_with("By hand"));
+    assert!(!label(&bench, ImprintSource::Predicted).starts_with("By hand"), "painted on another picture");
+    // The explicit way, which says so.
+    bench.send(ViewCommand::SelectImprint(ImprintSource::Predicted));
+    bench.send(LabelsCommand::TakeOver);
+    bench.settle();
+    let taken = label(&bench, ImprintSource::Predicted);
+    assert!(taken.contains("the measured imprint's mask"), "{taken}");
+    let masks = [MEASURED, ImprintSource::Predicted]
+        .map(|source| bench.state.mask_in_force(source, lab::RIGHT).unwrap().mask.clone());
+    assert_eq!(masks[0], masks[1]);
+    // From now on each goes its own way.
+    bench.send(LabelsCommand::CleanUp(CleanKind::LargestIsland.into()));
+    let changed = bench.state.mask_in_force(ImprintSource::Predicted, lab::RIGHT).unwrap().mask.clone();
+    assert_ne!(changed, masks[0]);
+    assert_eq!(*bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().mask, masks[0]);
+    // Another prediction has none, and undo does not reach the one that is not on screen.
+    bench.send(PredictCommand::GenerateNewSeed);
+    bench.settle();
+    assert!(!label(&bench, ImprintSource::Predicted).starts_with("By hand"));
+    for _ in 0..9 {
+        bench.send(LabelsCommand::Undo);
+    }
+    bench.settle();
+    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    assert_eq!(saved.masks.len(), 1, "that of the measured imprint is undone");
+    let (place, kept) = saved.masks.iter().next().unwrap();
+    assert_eq!((place.of.source(), &kept.mask), (ImprintSource::Predicted, &changed));
+}
+
+#[test]
+fn every_tool_draws_and_undo_takes_it_back() {
+    let mut bench = bench();
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+    bench.settle();
+    let before = mask(&bench, lab::RIGHT);
+    for (tool, name) in [
+        (MaskTool::Lasso, "lasso"),
+        (MaskTool::Polygon, "polygon"),
+        (MaskTool::Rectangle, "rectangle"),
+        (MaskTool::Wand, "wand"),
+    ] {
+        bench.send(SettingsCommand::SetMaskTool(tool));
+        begin(&mut bench, lab::RIGHT, [10.0, 8.0]);
+        for at in [[18.0, 8.0], [18.0, 13.0], [11.0, 13.0]] {
+            bench.send(LabelsCommand::StrokeTo(at));
+            bench.send(LabelsCommand::Corner(at));
+        }
+        bench.send(LabelsCommand::EndStroke);
+        assert_ne!(mask(&bench, lab::RIGHT), before, "{name}");
+        assert_eq!(bench.state.history.next_undo("tool_a/data_0", &bench.state.mask_places()).unwrap().name, name);
+        bench.send(LabelsCommand::Undo);
+        assert_eq!(mask(&bench, lab::RIGHT), before, "{name}");
+    }
+    // A stroke given up leaves nothing.
+    begin(&mut bench, lab::RIGHT, [10.0, 8.0]);
+    bench.send(LabelsCommand::StrokeTo([12.0, 9.0]));
+    bench.send(LabelsCommand::CancelStroke);
+    assert_eq!(mask(&bench, lab::RIGHT), before);
+}
+
+#[test]
+fn a_gate_keeps_tools_to_a_depth() {
+    let mut bench = bench();
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+    bench.settle();
+    let before = mask(&bench, lab::RIGHT);
+    let imprint = bench.state.imprint(MEASURED, lab::RIGHT).ready().unwrap().clone();
+    let deep = |depth: f32| depth >= 0.002;
+    assert!(imprint.as_slice().iter().any(|d| deep(*d)) && imprint.as_slice().iter().any(|d| !deep(*d)));
+    let mut settings = bench.state.settings.mask.clone();
+    settings.gate.depth_m = Some([0.002, 0.02]);
+    settings.tool = MaskTool::Rectangle;
+    bench.send(SettingsCommand::SetMask(settings.clone()));
+    stroke(&mut bench, lab::RIGHT, [-1.0, -1.0], [99.0, 99.0]);
+    let gated = mask(&bench, lab::RIGHT);
+    for (at, on) in gated.as_slice().iter().enumerate() {
+        assert_eq!(*on, before.as_slice()[at] || deep(imprint.as_slice()[at]), "pixel {at}");
+    }
+    // What lies near the CAD model is not known here: that is said, and nothing is painted.
+    settings.gate.cad_m = Some(0.001);
+    bench.send(SettingsCommand::SetMask(settings));
+    let said = bench.state.log.entries.len();
+    stroke(&mut bench, lab::RIGHT, [-1.0, -1.0], [99.0, 99.0]);
+    assert_eq!(mask(&bench, lab::RIGHT), gated);
+    assert!(bench.state.log.entries.len() > said);
 }

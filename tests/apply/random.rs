@@ -1,6 +1,7 @@
 //! Any order of commands: nothing panics, what is on the disk is what is on the screen, and undoing everything brings
 //! the document back.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -21,7 +22,7 @@ use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Request, Revision, ShiftMode, TouchKey,
 };
-use touch2touch::app::labels::{Document, Review};
+use touch2touch::app::labels::{Document, MaskPlace, Review};
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::results::ambiguity::AmbiguityKey;
 use touch2touch::app::results::{Computed, Preview};
@@ -39,6 +40,7 @@ use touch2touch::domain::evaluation::Figure;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::hand::{HandAxis, HandPose};
+use touch2touch::domain::label::{CleanKind, CleanUp};
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::statistics::ShiftStatistics;
@@ -54,15 +56,15 @@ use super::double::{Bench, Double, SIMULATED};
 use super::panes;
 
 /// What a document says, without revisions: equal if it looks the same.
-type Said = Vec<(String, [Option<Mask>; 2], Review)>;
+type Said = Vec<(String, BTreeMap<MaskPlace, Mask>, Review)>;
 
 fn said(doc: &Document) -> Said {
     doc.labels
         .iter()
         .filter(|(_, labels)| !labels.is_empty())
         .map(|(name, labels)| {
-            let mask = |pad| labels.masks.get(pad).map(|hand| (*hand.mask).clone());
-            (name.clone(), lab::PADS.map(mask), labels.review)
+            let masks = labels.masks.iter().map(|(place, hand)| (place.clone(), (*hand.mask).clone()));
+            (name.clone(), masks.collect(), labels.review)
         })
         .collect()
 }
@@ -298,6 +300,7 @@ draws! {
     }
     view: ViewCommand {
         3 SelectFinger(finger()),
+        1 SelectImprint(source()),
         2 ShowBothFingers(any::<bool>()),
         1 HoverPixel(proptest::option::of((finger(), position()).prop_map(|(finger, at_px)| Hover { finger, at_px }))),
         1 HoverPoint(proptest::option::of(point())),
@@ -322,9 +325,10 @@ draws! {
         6 StrokeTo(position()),
         6 EndStroke,
         1 CancelStroke,
-        2 FillHoles,
-        2 LargestIsland,
+        2 Corner(position()),
+        4 CleanUp((any_of::<CleanKind>(), number()).prop_map(|(kind, size)| CleanUp { kind, size_mm: size.into() })),
         2 AdoptAutomatic,
+        1 TakeOver,
         1 ResetMask,
         3 Undo,
         3 Redo,
@@ -547,8 +551,9 @@ fn carry_out(bench: &mut Bench, commands: Vec<(Command, u8)>) -> Result<(), Test
     for (name, masks, review) in said(&bench.state.document) {
         let stored = bench.services.source.labels.lock().unwrap().get(&name).cloned().unwrap_or_default();
         prop_assert_eq!(stored.review, review);
-        for (stored, shown) in stored.masks.iter().zip(masks) {
-            prop_assert_eq!(stored.as_ref().map(|hand| &*hand.mask), shown.as_ref());
+        prop_assert_eq!(stored.masks.len(), masks.len());
+        for (place, shown) in masks {
+            prop_assert_eq!(&*stored.masks[&place].mask, &shown);
         }
     }
     Ok(())
@@ -565,24 +570,19 @@ proptest! {
         let mut bench = Bench::open();
         carry_out(&mut bench, commands)?;
         let end = said(&bench.state.document);
-        bench.send(ViewCommand::ShowBothFingers(true));
-        let mut steps = [0u32; 12];
-        for pair in 0..12 {
-            bench.send(LibraryCommand::Select(PairId(pair)));
-            let name = bench.state.pair_name().to_owned();
-            while bench.state.history.next_undo(&name, &lab::PADS).is_some() {
-                bench.send(LabelsCommand::Undo);
-                steps[pair as usize] += 1;
-            }
+        // As if all predictions that were ever drawn on were on screen.
+        let gestures = bench.state.history.done().iter();
+        let places: Vec<MaskPlace> = gestures.flat_map(|g| g.edits.iter().filter_map(|e| e.place().cloned())).collect();
+        let touch2touch::app::state::State { history, document, .. } = &mut bench.state;
+        let names: Vec<String> = document.labels.keys().cloned().collect();
+        for name in &names {
+            while history.undo(document, name, &places).is_some() {}
         }
-        prop_assert_eq!(said(&bench.state.document), Said::new());
-        for (pair, count) in (0..).zip(steps) {
-            bench.send(LibraryCommand::Select(PairId(pair)));
-            for _ in 0..count {
-                bench.send(LabelsCommand::Redo);
-            }
+        prop_assert_eq!(said(document), Said::new());
+        for name in &names {
+            while history.redo(document, name, &places).is_some() {}
         }
-        prop_assert_eq!(said(&bench.state.document), end);
+        prop_assert_eq!(said(document), end);
     }
 }
 

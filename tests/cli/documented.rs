@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use touch2touch::domain::rig::lab;
 use touch2touch::headless::check_command;
 use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::{MaskStore, StoredMask};
+use touch2touch::io::masks::{MaskStore, StoredMask, StoredReview};
 
 use super::{error_text, run};
 use crate::cli_generate::full_size_bundle;
@@ -124,7 +124,9 @@ impl Stage {
         let imprint = &sample.pad(lab::RIGHT).unwrap().depth().unwrap().imprint;
         let mask = imprint.map(|&depth| depth > 0.005);
         let stored = StoredMask { mask, base: "Threshold 5.00 mm".into(), person: "test".into(), saved_unix_s: 1 };
-        MaskStore::for_dataset(&dataset).unwrap().save(&name, lab::RIGHT, Some(&stored)).unwrap();
+        let store = MaskStore::for_dataset(&dataset).unwrap();
+        store.save(&name, lab::RIGHT, Some(&stored)).unwrap();
+        store.save_review(&name, &StoredReview { review: "done".into(), ..StoredReview::default() }).unwrap();
         let robot = dir.path().join("robot");
         std::fs::create_dir(&robot).unwrap();
         let touch = dataset.gelslim_file(id).unwrap();

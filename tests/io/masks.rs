@@ -250,3 +250,36 @@ fn a_kill_in_mid_stroke_loses_at_most_that_stroke() {
         assert_eq!(store.load(PAIR, lab::RIGHT).unwrap().unwrap().mask, expected);
     }
 }
+
+#[test]
+fn masks_of_predictions_lie_beside_each_other_and_never_for_each_other() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = MaskStore::in_folder(dir.path().join("masks"));
+    let mask = |n: usize| stored(Mask::from_fn(175, 140, |x, y| x * y % (n + 7) == 0));
+    store.save_predicted(PAIR, lab::RIGHT, "never", None).unwrap();
+    assert!(!dir.path().join("masks").exists(), "nothing is made for nothing");
+    store.save_predicted(PAIR, lab::RIGHT, "seed 1", Some(&mask(1))).unwrap();
+    store.save_predicted(PAIR, lab::RIGHT, "seed 2", Some(&mask(2))).unwrap();
+    store.save(PAIR, lab::RIGHT, Some(&mask(3))).unwrap();
+    store.save_predicted(PAIR, lab::RIGHT, "seed 1", Some(&mask(4))).unwrap();
+    let mut found = store.load_predicted(PAIR, lab::RIGHT).unwrap();
+    found.sort_by(|a, b| a.0.cmp(&b.0));
+    assert_eq!(found, [("seed 1".to_owned(), mask(4)), ("seed 2".to_owned(), mask(2))]);
+    assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), Some(mask(3)));
+    assert_eq!(store.masks(), [(PAIR.to_owned(), lab::RIGHT)], "what is exported is measured");
+    assert!(store.load_predicted(PAIR, lab::LEFT).unwrap().is_empty());
+    store.save_predicted(PAIR, lab::RIGHT, "seed 2", None).unwrap();
+    assert_eq!(store.load_predicted(PAIR, lab::RIGHT).unwrap().len(), 1);
+    // What cannot be read is never replaced.
+    let file = std::fs::read_dir(store.folder())
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .find(|path| path.to_string_lossy().ends_with(".predicted.json"))
+        .unwrap();
+    for damage in ["{", "{}", r#"{"format": "touch2touch-predicted-masks", "version": 9}"#] {
+        std::fs::write(&file, damage).unwrap();
+        assert!(store.load_predicted(PAIR, lab::RIGHT).is_err());
+        assert!(store.save_predicted(PAIR, lab::RIGHT, "seed 3", Some(&mask(5))).is_err());
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), damage);
+    }
+}

@@ -153,7 +153,7 @@ fn a_case_is_saved_and_opened_elsewhere_to_the_same_picture_in_eight_actions() {
     assert_eq!((here.settings.workspace, &here.settings.layouts), (there.settings.workspace, &there.settings.layouts));
     let masks = |state: &State| {
         let labels = state.document.pair(state.pair_name()).unwrap();
-        labels.masks.entries().map(|(pad, hand)| (pad, hand.mask.clone())).collect::<Vec<_>>()
+        labels.masks.iter().map(|(place, hand)| (place.clone(), hand.mask.clone())).collect::<Vec<_>>()
     };
     assert!(!masks(here).is_empty() && masks(here) == masks(there));
     for source in ImprintSource::iter() {

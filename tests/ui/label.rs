@@ -1,9 +1,13 @@
 //! The labeling desk by mouse and keys.
 
-use eframe::egui::{Key, Modifiers};
-use touch2touch::app::command::{LabelsCommand, LibraryCommand, SettingsCommand};
+use eframe::egui::{Key, Modifiers, PointerButton, Pos2, Rect, pos2};
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::command::{LabelsCommand, LibraryCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
-use touch2touch::app::settings::Workspace;
+use touch2touch::app::settings::{MaskTool, Workspace};
+use touch2touch::domain::grid::Mask;
+use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::io::export_unet::check_folder;
 
 use super::rig::Rig;
@@ -16,6 +20,90 @@ impl Rig {
         let state = self.harness.state().state();
         state.results.mask_plans.get(&state.mask_plan_key().unwrap()).unwrap().lines()
     }
+
+    /// The mask of a finger that is in force on the measured imprint.
+    fn mask(&self, finger: PadId) -> Mask {
+        (**self.harness.state().state().mask_in_force(ImprintSource::Measured, finger).unwrap().mask).clone()
+    }
+
+    fn button(&mut self, at: Pos2, pressed: bool) {
+        let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+        self.harness.hover_at(at);
+        self.harness.event(eframe::egui::Event::PointerButton { pos: at, button, pressed, modifiers });
+        self.harness.step();
+    }
+
+    /// Presses at the first point, goes over the others and lets go at the last.
+    fn drag_over(&mut self, way: &[Pos2]) {
+        self.button(way[0], true);
+        for at in way {
+            self.harness.hover_at(*at);
+            self.harness.step();
+        }
+        self.button(way[way.len() - 1], false);
+        self.settle();
+    }
+}
+
+fn inside(rect: Rect, x: f32, y: f32) -> Pos2 {
+    pos2(rect.left() + rect.width() * x, rect.top() + rect.height() * y)
+}
+
+fn count(mask: &Mask) -> usize {
+    mask.as_slice().iter().filter(|v| **v).count()
+}
+
+#[test]
+fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(ViewCommand::ShowBothFingers(true));
+    let picture = |rig: &Rig, finger: &str| rig.harness.get_by_label(&format!("Measured {finger}")).rect();
+    let right = picture(&rig, "right");
+    // The first click on the other finger makes it the active one.
+    let left = picture(&rig, "left");
+    let before = rig.mask(lab::LEFT);
+    rig.drag_over(&[left.center(), inside(left, 0.3, 0.3)]);
+    assert_eq!(rig.mask(lab::LEFT), before);
+    assert_eq!(rig.harness.state().state().selection.finger, lab::LEFT);
+    rig.drag_over(&[left.center(), inside(left, 0.3, 0.3)]);
+    assert_ne!(rig.mask(lab::LEFT), before, "the second one paints");
+    rig.drag_over(&[right.center(), right.center()]);
+    // A lasso by its key, a rectangle, a polygon by clicks.
+    let empty = rig.mask(lab::RIGHT);
+    rig.harness.key_press(Key::L);
+    rig.harness.step();
+    assert_eq!(rig.harness.state().state().settings.mask.tool, MaskTool::Lasso);
+    rig.drag_over(&[
+        inside(right, 0.1, 0.1),
+        inside(right, 0.4, 0.1),
+        inside(right, 0.4, 0.5),
+        inside(right, 0.1, 0.5),
+    ]);
+    let lassoed = rig.mask(lab::RIGHT);
+    assert!(count(&lassoed) > count(&empty) + 500, "{} {}", count(&empty), count(&lassoed));
+    rig.harness.key_press(Key::P);
+    rig.harness.step();
+    let corners = [[0.6, 0.2], [0.9, 0.2], [0.9, 0.8]].map(|[x, y]| inside(right, x, y));
+    for at in corners {
+        rig.button(at, true);
+        rig.button(at, false);
+    }
+    rig.shoot("label-polygon");
+    rig.button(corners[0], true);
+    rig.button(corners[0], false);
+    rig.settle();
+    assert!(rig.harness.state().state().document.stroke.is_none(), "the first corner closes it");
+    let drawn = rig.mask(lab::RIGHT);
+    assert!(count(&drawn) > count(&lassoed) + 500);
+    for _ in 0..2 {
+        rig.harness.key_press_modifiers(Modifiers::CTRL, Key::Z);
+        rig.harness.step();
+        rig.settle();
+    }
+    assert_eq!(rig.mask(lab::RIGHT), empty);
+    rig.shoot("label-desk");
 }
 
 #[test]

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::super::keys::Revision;
+use super::super::keys::{ImprintSource, Revision};
 use crate::domain::grid::Mask;
-use crate::domain::rig::PadId;
+use crate::domain::label::Drawing;
 use crate::work::error::TaskError;
-pub use crate::work::labels::{HandMask, PairLabels, Review};
+pub use crate::work::labels::{HandMask, MaskPlace, PairLabels, Review};
 
 /// What happened when the stored labels of a pair were read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,14 +42,14 @@ pub struct Document {
 pub struct Stroke {
     /// The pair's name.
     pub pair: String,
-    /// The finger.
-    pub finger: PadId,
-    /// Whether it adds or removes.
-    pub value: bool,
-    /// Radius, image pixels.
-    pub radius_px: f32,
-    /// The last position, image pixels.
-    pub at: [f32; 2],
+    /// What it is drawn on.
+    pub place: MaskPlace,
+    /// The imprint it is drawn on.
+    pub source: ImprintSource,
+    /// What is drawn.
+    pub drawing: Drawing,
+    /// The pixels that may change; `None` = all.
+    pub(in crate::app) allowed: Option<Mask>,
     /// The hand mask before the stroke; `None` if there was none.
     pub(in crate::app) before: Option<HandMask>,
     /// The pixels before the stroke, as large as the imprint.
@@ -62,9 +62,9 @@ impl Document {
         self.labels.get(name)
     }
 
-    /// The corrected mask of one finger.
-    pub fn hand_mask(&self, name: &str, finger: PadId) -> Option<&HandMask> {
-        self.labels.get(name)?.masks[finger].as_ref()
+    /// The corrected mask of one imprint.
+    pub fn hand_mask(&self, name: &str, place: &MaskPlace) -> Option<&HandMask> {
+        self.labels.get(name)?.masks.get(place)
     }
 
     /// The review state of a pair.

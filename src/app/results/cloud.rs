@@ -102,7 +102,7 @@ impl State {
         if parts.is_empty() { Err(reason) } else { Ok(Some(CloudKey { parts })) }
     }
 
-    /// The cloud of imprints with the automatic masks; `Err` holds the masks that are missing for it, none while an
+    /// The cloud of imprints with the masks drawn on them, else the automatic ones; `Err` holds the masks that are missing for it, none while an
     /// imprint is.
     pub(crate) fn automatic_cloud(
         &self,
@@ -114,6 +114,10 @@ impl State {
             let (Ok(recipe), true) = (self.mask_recipe(finger), camera) else { continue };
             if self.imprint_of(imprint.clone()).ready().is_none() {
                 return Err(Vec::new());
+            }
+            if let Some(hand) = self.hand_mask_on(&imprint) {
+                parts[finger] = Some((imprint.clone(), Some(MaskVersion::Hand(hand.revision))));
+                continue;
             }
             let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
             if !self.results.masks.contains(&key) {

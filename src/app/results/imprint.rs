@@ -13,6 +13,7 @@ use crate::work::compare::Beside;
 use crate::work::ensemble::Ensemble;
 use crate::work::error::TaskError;
 use crate::work::imprint;
+use crate::work::labels::ImprintOf;
 
 /// A prediction in meters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -86,6 +87,15 @@ impl ImprintKey {
             Self::Measured(touch) | Self::Picture(touch) => *touch,
             Self::Predicted(recipe, _) => recipe.touch,
             Self::Mean(key) => key.touch,
+        }
+    }
+
+    /// What masks drawn on it are told by; `None` where nobody can have drawn on it.
+    pub fn of(&self) -> Option<ImprintOf> {
+        match self {
+            Self::Measured(_) => Some(ImprintOf::Measured),
+            Self::Predicted(recipe, shift) => Some(ImprintOf::predicted(&recipe.bundle, &recipe.config(), *shift)),
+            Self::Mean(_) | Self::Picture(_) => None,
         }
     }
 

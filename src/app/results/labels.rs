@@ -32,7 +32,7 @@ impl Computes for LabelsKey {
             return;
         }
         let mut labels = PairLabels::clone(labels);
-        for hand in labels.masks.iter_mut().flatten() {
+        for hand in labels.masks.values_mut() {
             hand.revision = doc.next_revision();
         }
         let review = labels.review;

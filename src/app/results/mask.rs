@@ -2,8 +2,11 @@
 
 use std::sync::Arc;
 
+use strum::IntoEnumIterator as _;
+
 use super::super::keys::{MaskRecipe, Revision};
-use super::super::labels::state::HandMask;
+use super::super::labels::state::{HandMask, MaskPlace};
+use super::super::pane::Pane;
 use super::super::tasks::state::Level;
 use super::Request;
 use super::imprint::ImprintKey;
@@ -42,8 +45,7 @@ impl MaskVersion {
                 state.results.masks.get(&key).map(|found| found.mask.clone())
             }
             Self::Hand(revision) => {
-                let touch = imprint.touch();
-                let hand = state.document.hand_mask(&state.library.entry(touch.pair.pair)?.name, touch.finger)?;
+                let hand = state.hand_mask_on(imprint)?;
                 (hand.revision == *revision).then(|| hand.mask.clone())
             }
         }
@@ -85,7 +87,7 @@ impl Computes for MaskKey {
         let tool = tool.and_then(|key| state.results.tools.get(&key).cloned());
         Some(Job::new(Lane::Compute, "Contact mask", move |_| {
             let tool = tool.as_deref().map(|tool| &tool.model);
-            let inputs = MaskInputs { sample: &sample, tool, labels: None };
+            let inputs = MaskInputs { sample: &sample, tool, labels: None, of: None };
             Ok(mask::without_model(&recipe, imprint.get()?, touch.finger, inputs)?.into())
         }))
     }
@@ -167,9 +169,28 @@ impl State {
         self.look_or(self.mask_key(source, finger).map(Some), || None).map(|found| &found.mask)
     }
 
-    /// The corrected mask of one finger, if it is there and as large as the imprint.
-    fn hand_mask_for(&self, source: ImprintSource, finger: PadId) -> Option<&HandMask> {
-        self.document.pair(self.pair_name())?.drawn(finger, self.imprint(source, finger).ready()?)
+    /// Where a mask that is drawn on one finger's imprint belongs; `None` while there is no such imprint.
+    pub fn mask_place(&self, source: ImprintSource, finger: PadId) -> Option<MaskPlace> {
+        Some(MaskPlace { pad: finger, of: self.imprint_key(source, finger).ok()?.of()? })
+    }
+
+    /// What can be drawn on of what is on screen.
+    pub fn mask_places(&self) -> Vec<MaskPlace> {
+        let places = |finger| ImprintSource::iter().filter_map(move |source| self.mask_place(source, finger));
+        self.fingers().into_iter().flat_map(places).collect()
+    }
+
+    /// The mask that a person drew on an imprint.
+    pub(crate) fn hand_mask_on(&self, imprint: &ImprintKey) -> Option<&HandMask> {
+        let touch = imprint.touch();
+        let name = &self.library.entry(touch.pair.pair)?.name;
+        self.document.hand_mask(name, &MaskPlace { pad: touch.finger, of: imprint.of()? })
+    }
+
+    /// The corrected mask of one finger's imprint, if it is there and as large.
+    pub fn hand_mask(&self, source: ImprintSource, finger: PadId) -> Option<&HandMask> {
+        let place = self.mask_place(source, finger)?;
+        self.document.pair(self.pair_name())?.drawn(&place, self.imprint(source, finger).ready()?)
     }
 
     /// The mask in force on one finger's imprint: the corrected one, else the automatic one.
@@ -181,7 +202,7 @@ impl State {
         source: ImprintSource,
         finger: PadId,
     ) -> Result<MaskInForce<'_>, Lookup<'_, Arc<Mask>>> {
-        if let Some(hand) = self.hand_mask_for(source, finger) {
+        if let Some(hand) = self.hand_mask(source, finger) {
             let label = if hand.base.is_empty() { "By hand".into() } else { format!("By hand, from {}", hand.base) };
             return Ok(MaskInForce { mask: &hand.mask, version: MaskVersion::Hand(hand.revision), label });
         }
@@ -194,6 +215,32 @@ impl State {
             (Lookup::Ready(_), Err(absent)) => Err(Lookup::Absent(absent)),
             (other, _) => Err(other),
         }
+    }
+
+    /// The mask of what lies near the CAD model, which the gate of the mask tools may need.
+    fn gate_key(&self, source: ImprintSource, finger: PadId) -> Option<MaskKey> {
+        let recipe = MaskRecipe::Cad(self.settings.mask.gate.cad_m?.into());
+        Some(MaskKey { imprint: self.imprint_key(source, finger).ok()?, recipe })
+    }
+
+    /// The pixels that a hand may change; `None` = all.
+    ///
+    /// # Errors
+    /// Why that is not known.
+    pub fn allowed(&self, source: ImprintSource, finger: PadId) -> Result<Option<Mask>, &'static str> {
+        let gate = self.settings.mask.gate;
+        if gate.is_open() {
+            return Ok(None);
+        }
+        let near = match self.gate_key(source, finger) {
+            Some(key) => {
+                let unknown = "what lies near the CAD model is not known: it takes a tool and its true pose";
+                Some(self.results.masks.get(&key).ok_or(unknown)?)
+            }
+            None => None,
+        };
+        let imprint = self.imprint(source, finger).ready().ok_or("the imprint is not there")?;
+        Ok(Some(gate.allowed(imprint, near.map(|near| &*near.mask))))
     }
 
     /// What an automatic mask that is there is made of, in words.
@@ -217,9 +264,19 @@ impl State {
 impl Wanted<'_> {
     pub(crate) fn mask(&mut self, source: ImprintSource, finger: PadId) {
         let state = self.state;
+        if let Some(key) = state.gate_key(source, finger).filter(|_| state.selection.panes.contains(&Pane::Masks)) {
+            let can = state.sample().ready().is_some_and(|sample| sample.grasp_from_object.is_some());
+            if can && state.imprint(source, finger).ready().is_some() && state.tool_name().is_ok() {
+                if state.tool().ready().is_none() {
+                    self.tool();
+                } else {
+                    self.ask(key);
+                }
+            }
+        }
         // Stored corrections first: they may make the automatic mask unnecessary.
         if !state.document.stored.contains_key(state.pair_name())
-            || state.hand_mask_for(source, finger).is_some()
+            || state.hand_mask(source, finger).is_some()
             || state.imprint(source, finger).ready().is_none()
         {
             return;

@@ -360,7 +360,7 @@ mod tests {
     use crate::domain::rig::lab;
     use crate::io::masks::MaskStore;
     use crate::work::export::{LeftOut, Which};
-    use crate::work::labels::{HandMask, Revision};
+    use crate::work::labels::{HandMask, MaskPlace, Revision};
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
@@ -373,7 +373,11 @@ mod tests {
     fn labels() -> PairLabels {
         let mask = Arc::new(Mask::from_fn(175, 140, |x, y| x > 20 && y < 9));
         PairLabels {
-            masks: [Some(HandMask { mask, revision: Revision(3), base: "Threshold 5.00 mm".into() }), None].into(),
+            masks: [(
+                MaskPlace::measured(lab::RIGHT),
+                HandMask { mask, revision: Revision(3), base: "Threshold 5.00 mm".into() },
+            )]
+            .into(),
             review: Review::InProgress,
             accepted: [
                 Some(PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
@@ -383,7 +387,9 @@ mod tests {
     }
 
     fn same(a: &PairLabels, b: &PairLabels) -> bool {
-        let masks = |l: &PairLabels| l.masks.clone().map(|m| m.map(|h| (h.mask, h.base)));
+        let masks = |l: &PairLabels| {
+            l.masks.iter().map(|(place, h)| (place.clone(), h.mask.clone(), h.base.clone())).collect::<Vec<_>>()
+        };
         masks(a) == masks(b) && a.review == b.review && a.accepted == b.accepted
     }
 

@@ -11,6 +11,7 @@ use strum::EnumIter;
 use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
+use crate::domain::label::{CleanKind, CleanUp, DrawTool, Gate};
 use crate::domain::postprocess::RefitShift;
 use crate::domain::units::clamp_or;
 use crate::infer::engine::EngineChoice;
@@ -25,6 +26,8 @@ pub const SETTINGS_VERSION: u32 = 1;
 pub const MAX_RECENT: usize = 12;
 /// Brush radii that can be chosen, pixels.
 pub const BRUSH_RADIUS_PX: std::ops::RangeInclusive<f32> = 0.5..=40.0;
+/// Sizes of clean-ups, millimeters.
+pub const CLEAN_MM: std::ops::RangeInclusive<f32> = 0.1..=20.0;
 /// Denoising steps that can be chosen.
 pub const STEPS: std::ops::RangeInclusive<u32> = 1..=1000;
 
@@ -355,6 +358,12 @@ pub struct MaskSettings {
     pub last_tool: MaskTool,
     /// Radius of brush and eraser, image pixels.
     pub radius_px: f32,
+    /// By how much the depth may differ that the wand takes, meters.
+    pub wand_m: f32,
+    /// Size of the clean-ups that have one, millimeters.
+    pub clean_mm: f32,
+    /// Where a hand may change a mask.
+    pub gate: Gate,
     /// What is in force where no mask was drawn by hand.
     #[serde(flatten)]
     pub choice: MaskChoice,
@@ -368,6 +377,9 @@ impl Default for MaskSettings {
             tool: MaskTool::Brush,
             last_tool: MaskTool::Eraser,
             radius_px: 4.0,
+            wand_m: 0.0005,
+            clean_mm: 1.0,
+            gate: Gate::default(),
             choice: MaskChoice::default(),
             bundle: None,
         }
@@ -375,11 +387,37 @@ impl Default for MaskSettings {
 }
 
 impl MaskSettings {
+    /// What the tool in hand draws with, and whether it adds; `None` where it draws nothing.
+    pub fn drawing(&self) -> Option<(DrawTool, bool)> {
+        let brush = DrawTool::Brush { radius_px: self.radius_px };
+        Some(match self.tool {
+            MaskTool::Brush => (brush, true),
+            MaskTool::Eraser => (brush, false),
+            MaskTool::Lasso => (DrawTool::Lasso, true),
+            MaskTool::Polygon => (DrawTool::Polygon, true),
+            MaskTool::Rectangle => (DrawTool::Rectangle, true),
+            MaskTool::Wand => (DrawTool::Wand { tolerance_m: self.wand_m }, true),
+            MaskTool::Pan => return None,
+        })
+    }
+
+    /// A clean-up of a kind with the size that is set.
+    pub fn clean_up(&self, kind: CleanKind) -> CleanUp {
+        CleanUp { kind, size_mm: self.clean_mm.into() }
+    }
+
     /// Numbers brought into range.
     #[must_use]
     pub fn validated(mut self) -> Self {
         let default = Self::default();
         self.radius_px = clamp_or(self.radius_px, *BRUSH_RADIUS_PX.start(), *BRUSH_RADIUS_PX.end(), default.radius_px);
+        self.wand_m = clamp_or(self.wand_m, 1e-5, 0.05, default.wand_m);
+        self.clean_mm = clamp_or(self.clean_mm, *CLEAN_MM.start(), *CLEAN_MM.end(), default.clean_mm);
+        self.gate.depth_m = self.gate.depth_m.map(|[lo, hi]| {
+            let [lo, hi] = [lo, hi].map(|m| clamp_or(m, -0.1, 0.1, 0.0));
+            [lo.min(hi), lo.max(hi)]
+        });
+        self.gate.cad_m = self.gate.cad_m.map(|m| clamp_or(m, 0.0, 0.05, default.choice.cad_distance_m));
         let (choice, default) = (&mut self.choice, default.choice);
         choice.threshold_m = clamp_or(choice.threshold_m, -0.1, 0.1, default.threshold_m);
         choice.top_percent = clamp_or(choice.top_percent, 0.0, 100.0, default.top_percent);
@@ -397,6 +435,14 @@ pub enum MaskTool {
     Brush,
     /// Removes.
     Eraser,
+    /// Adds what a drawn line encloses.
+    Lasso,
+    /// Adds what lines between clicks enclose.
+    Polygon,
+    /// Adds a rectangle.
+    Rectangle,
+    /// Adds what is connected and about as deep.
+    Wand,
     /// Moves the image.
     Pan,
 }
@@ -407,6 +453,10 @@ impl MaskTool {
         match self {
             Self::Brush => "Brush",
             Self::Eraser => "Eraser",
+            Self::Lasso => "Lasso",
+            Self::Polygon => "Polygon",
+            Self::Rectangle => "Rectangle",
+            Self::Wand => "Wand",
             Self::Pan => "Pan",
         }
     }

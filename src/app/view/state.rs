@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 use super::super::export::state::Output;
+use super::super::keys::ImprintSource;
 use super::super::pane::Pane;
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
@@ -16,6 +17,8 @@ pub struct Selection {
     pub pair: Option<PairId>,
     /// The active finger.
     pub finger: PadId,
+    /// The imprint whose mask clean-ups work on.
+    pub imprint: ImprintSource,
     /// Whether both fingers are shown, or only the active one.
     pub both_fingers: bool,
     /// The pixel under the pointer: the cross-hair of all images.

@@ -1,6 +1,7 @@
 //! What `label` is asked.
 
 use clap::Args;
+use strum::IntoEnumIterator as _;
 
 use super::super::args::{DatasetArgs, FingerArg, keyed};
 use super::super::contact_mask::MaskArgs;
@@ -8,8 +9,30 @@ use super::super::pose::parse_start;
 use super::super::predict::ModelArgs;
 use super::super::{Common, ToolArgs};
 use crate::domain::frames::PlanarPose;
+use crate::domain::label::{CleanKind, CleanUp, Drawing};
 use crate::domain::pose::Registration;
 use crate::work::labels::{ImprintSource, Review};
+
+fn parse_clean_up(text: &str) -> Result<CleanUp, String> {
+    let (kind, size) = text.split_once('=').map_or((text, None), |(kind, size)| (kind, Some(size)));
+    let kinds = || CleanKind::iter().map(CleanKind::key).collect::<Vec<_>>().join(", ");
+    let kind: CleanKind =
+        kind.parse().map_err(|_| format!("there is no clean-up \"{kind}\"; there are {}", kinds()))?;
+    let size_mm = match (kind.is_sized(), size) {
+        (false, None) => 0.0,
+        (false, Some(_)) => return Err(format!("{} has no size", kind.key())),
+        (true, None) => return Err(format!("{} takes a size in millimeters, such as {0}=1.5", kind.key())),
+        (true, Some(size)) => match size.parse() {
+            Ok(mm) if (0.0..=1e3).contains(&mm) => mm,
+            _ => return Err(format!("\"{size}\" is no size in millimeters (0 to 1000)")),
+        },
+    };
+    Ok(CleanUp { kind, size_mm })
+}
+
+fn parse_drawing(text: &str) -> Result<Drawing, String> {
+    serde_json::from_str(text).map_err(|err| err.to_string())
+}
 
 /// Arguments of `label`.
 #[derive(Debug, Args)]
@@ -34,19 +57,25 @@ pub(in super::super) struct LabelArgs {
     /// Make the mask of `--mask` the corrected one.
     #[arg(long, requires = "pair", conflicts_with = "remove_mask")]
     pub(super) adopt: bool,
-    /// Fill the holes of the mask.
-    #[arg(long, requires = "pair", conflicts_with = "remove_mask")]
-    pub(super) fill_holes: bool,
-    /// Keep only the largest connected part of the mask.
-    #[arg(long, requires = "pair", conflicts_with = "remove_mask")]
-    pub(super) largest_island: bool,
+    /// Take the mask of this imprint over to that of `--imprint`.
+    #[arg(long, value_name = "IMPRINT", requires = "pair", conflicts_with_all = ["adopt", "remove_mask"], value_parser = keyed::<ImprintSource>())]
+    pub(super) from: Option<ImprintSource>,
+    /// Clean the mask up: `fill_holes`, `largest_island`, `clear_border`, or with a size in millimeters `drop_small=MM`,
+    /// `open=MM`, `close=MM`, `smooth=MM`, `grow=MM`, `shrink=MM`. Several are done in turn.
+    #[arg(long, value_name = "WHAT[=MM]", requires = "pair", conflicts_with = "remove_mask", value_parser = parse_clean_up)]
+    pub(super) clean: Vec<CleanUp>,
+    /// Draw on the mask: `{"tool": "lasso", "add": true, "points": [[X, Y], ...]}` in image pixels; tools are `brush`
+    /// (`radius_px`), `lasso`, `polygon`, `rectangle` and `wand` (`tolerance_m`). Several are done in turn, before
+    /// clean-ups.
+    #[arg(long, value_name = "JSON", requires = "pair", conflicts_with = "remove_mask", value_parser = parse_drawing)]
+    pub(super) draw: Vec<Drawing>,
     /// Remove the corrected mask: the automatic source is in force again.
     #[arg(long, requires = "pair")]
     pub(super) remove_mask: bool,
     /// Whose mask is changed: the name of one, or `both`.
     #[arg(long, default_value = "both")]
     pub(super) finger: FingerArg,
-    /// The imprint that masks are made from.
+    /// The imprint whose mask is changed. A prediction is the one that `--bundle`, `--seed` and the like name.
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     pub(super) imprint: ImprintSource,
     /// The registration.

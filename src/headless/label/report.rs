@@ -6,17 +6,18 @@ use serde::Serialize;
 
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::rig::PadId;
 use crate::io::dataset::Dataset;
-use crate::work::labels::{HandMask, PairLabels};
+use crate::work::labels::{ImprintOf, PairLabels};
 
 /// What is stored of a pair.
 #[derive(Debug, Serialize)]
 pub(super) struct Stored {
     name: String,
     review: &'static str,
-    /// The fingers with a corrected mask, and how many pixels it has.
+    /// The fingers with a corrected mask on the measured imprint, and how many pixels it has.
     masks: Vec<(String, usize)>,
+    /// The same of masks on predictions, with what each prediction is.
+    predicted: Vec<(String, usize, String)>,
     /// From the measured, from the predicted imprint.
     accepted: [Option<AcceptedPose>; 2],
 }
@@ -24,17 +25,20 @@ pub(super) struct Stored {
 impl Stored {
     pub(super) fn new(name: &str, labels: &PairLabels, dataset: &Dataset) -> Self {
         let count = |mask: &Mask| mask.as_slice().iter().filter(|&&m| m).count();
-        let mask = |(pad, hand): (PadId, &HandMask)| (dataset.rig.pad_key(pad).to_string(), count(&hand.mask));
-        Self {
-            name: name.to_owned(),
-            review: labels.review.stored(),
-            masks: labels.masks.entries().map(mask).collect(),
-            accepted: labels.accepted,
+        let (mut masks, mut predicted) = (Vec::new(), Vec::new());
+        for (place, hand) in &labels.masks {
+            let (finger, pixels) = (dataset.rig.pad_key(place.pad).to_string(), count(&hand.mask));
+            match &place.of {
+                ImprintOf::Measured => masks.push((finger, pixels)),
+                ImprintOf::Predicted(what) => predicted.push((finger, pixels, what.to_string())),
+            }
         }
+        Self { name: name.to_owned(), review: labels.review.stored(), masks, predicted, accepted: labels.accepted }
     }
 
     pub(super) fn text(&self) -> String {
-        let masks: Vec<String> = self.masks.iter().map(|(pad, px)| format!("{pad} {px} px")).collect();
+        let mut masks: Vec<String> = self.masks.iter().map(|(pad, px)| format!("{pad} {px} px")).collect();
+        masks.extend(self.predicted.iter().map(|(pad, px, _)| format!("{pad} {px} px on a prediction")));
         let masks = if masks.is_empty() { "no corrected mask".to_owned() } else { masks.join(", ") };
         let mut text = format!("{}: {}; {masks}", self.name, self.review);
         for (of, accepted) in ["measured", "predicted"].iter().zip(self.accepted) {

@@ -20,7 +20,7 @@ use crate::io::dataset::{Dataset, read_in_meters};
 use crate::io::follow::Ready;
 use crate::work::compare;
 use crate::work::job::{Cancel, JobCx};
-use crate::work::labels::PairLabels;
+use crate::work::labels::{ImprintSource, PairLabels};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose;
 use crate::work::prediction::Prediction;
@@ -98,7 +98,8 @@ impl<'a> Worker<'a> {
         let imprints = self.predictor.in_meters(sample, &drawn)?;
         latency.generate = ms(step);
         let step = Instant::now();
-        let inputs = MaskInputs { sample, tool: None, labels: self.args.mask.drawn(labels) };
+        let of = self.predictor.of(ImprintSource::Predicted)?;
+        let inputs = MaskInputs { sample, tool: None, labels: self.args.mask.drawn(labels), of: Some(&of) };
         let contact = self.predictor.contact(&self.args.mask, imprints, inputs)?;
         latency.mask = ms(step);
         let step = Instant::now();

@@ -21,12 +21,12 @@ pub(super) fn recipe(
 ) -> anyhow::Result<Value> {
     let choice = args.mask.choice();
     let model = predictor.mask_model(&choice)?.map(|model| model.id);
-    let drawn: Vec<Option<String>> = args
+    let drawn: Vec<(String, String)> = args
         .mask
         .drawn(labels)
         .into_iter()
         .flat_map(|l| l.masks.iter())
-        .map(|m| Some(digest(&m.as_ref()?.mask)))
+        .map(|(place, hand)| (format!("{place:?}"), digest(&hand.mask)))
         .collect();
     let mask = json!({"choice": choice, "model": model.as_deref(), "drawn": drawn});
     let config = predictor.config()?;

@@ -51,7 +51,7 @@ pub(super) fn angles(
         for (touch, picture) in grasp.iter().zip(own) {
             imprints[touch.pad] = picture.map(|picture| touch.imprint(picture));
         }
-        let inputs = MaskInputs { sample: &sample, tool: Some(tool), labels: None };
+        let inputs = MaskInputs { sample: &sample, tool: Some(tool), labels: None, of: None };
         let found = models
             .contact(by, imprints, inputs)
             .and_then(|contact| contact.points(&sample))

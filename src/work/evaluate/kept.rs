@@ -243,9 +243,9 @@ fn key(dataset: &Dataset, id: PairId, tool: &str, labels: &Labeled, files: &File
         write!(text, "\n{}", files.digest(&file)?).ok()?;
     }
     let labels = labels.load(&entry.name).ok()?;
-    for (pad, hand) in labels.iter().flat_map(|labels| labels.masks.entries()) {
+    for (place, hand) in labels.iter().flat_map(|labels| &labels.masks) {
         let pixels: Vec<u8> = hand.mask.as_slice().iter().map(|pixel| u8::from(*pixel)).collect();
-        write!(text, "\n{} {:?} {}", pad.index(), hand.mask.size(), sha256(&pixels)).ok()?;
+        write!(text, "\n{place:?} {:?} {}", hand.mask.size(), sha256(&pixels)).ok()?;
     }
     Some(sha256(text.as_bytes())[..32].to_owned())
 }

@@ -22,6 +22,7 @@ use crate::work::bundles::{self, BundleInfo, BundleKind};
 use crate::work::error::TaskError;
 use crate::work::imprint;
 use crate::work::job::JobCx;
+use crate::work::labels::ImprintOf;
 use crate::work::mask::{MaskRecipe, MaskSource};
 use crate::work::models::{self, Wanted};
 use crate::work::prediction::Prediction;
@@ -235,6 +236,15 @@ impl Method {
             Self::Measured => "Measured (upper bound)",
             Self::Generator(method) => &method.name,
             Self::Stored => "Stored predictions (lab's VQ-VAE)",
+        }
+    }
+
+    /// What its imprints are, for masks that were drawn on them.
+    pub(super) fn of(&self, setup: &Setup) -> Option<ImprintOf> {
+        match self {
+            Self::Measured => Some(ImprintOf::Measured),
+            Self::Stored => None,
+            Self::Generator(method) => Some(ImprintOf::predicted(&method.bundle.id, &method.config, setup.shift)),
         }
     }
 

@@ -100,6 +100,7 @@ impl<'a> Tool<'a> {
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
             let upper = matches!(method, Method::Measured);
+            let of = method.of(setup);
             let cases: Vec<&Case> = cases.iter().filter(|case| !self.book.has(at, case.id)).collect();
             let Some(made) = method.make(&cases, setup, cx) else { return };
             let mut failed: BTreeSet<PairId> = BTreeSet::new();
@@ -123,14 +124,15 @@ impl<'a> Tool<'a> {
                     }
                     let imprint = made.imprints[f].as_ref().filter(|_| with_masks)?;
                     let tool = self.model.as_ref();
-                    let inputs = MaskInputs { sample: &case.sample, tool, labels: case.labels.as_ref() };
+                    let (labels, of) = (case.labels.as_ref(), of.as_ref());
+                    let inputs = MaskInputs { sample: &case.sample, tool, labels, of };
                     let found = guarded(|| by_models.contact_mask(by, imprint, f, inputs).map_err(|err| err.why));
                     let finger = || case.sample.rig.pad_key(f);
                     let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
                     let ContactMask { mask, basis } = found.ok()?;
                     let why = match basis {
                         MaskBasis::Source => return Some(mask),
-                        MaskBasis::Hand => "were drawn by hand, and are taken whatever the imprint",
+                        MaskBasis::Hand => "were drawn by hand",
                         MaskBasis::Flat => "are empty: the imprints are flat",
                         MaskBasis::Depth(_) => {
                             "are by depth: the mask model found no contact in imprints that have some"

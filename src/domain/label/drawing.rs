@@ -1,0 +1,233 @@
+//! [`Drawing`]: what a hand does on a mask, as a value. The studio previews it, a journal can store it, a verb can
+//! repeat it; here it becomes pixels.
+
+use glam::DVec2;
+use serde::{Deserialize, Serialize};
+
+use super::{Rect, paint_where, region};
+use crate::domain::grid::{DepthMap, Mask};
+
+/// A tool with its numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "tool", rename_all = "snake_case")]
+pub enum DrawTool {
+    /// Follows the pointer's way.
+    Brush {
+        /// Half its width, image pixels.
+        radius_px: f32,
+    },
+    /// What the pointer's way encloses, closed by a straight line.
+    Lasso,
+    /// What straight lines between clicks enclose.
+    Polygon,
+    /// Between the first and the last point.
+    Rectangle,
+    /// The connected pixels around the first point whose imprint is about as deep; dragging to the right takes more,
+    /// to the left less.
+    Wand {
+        /// By how much the depth may differ, meters.
+        tolerance_m: f32,
+    },
+}
+
+/// Pixels of dragging that double or halve the tolerance of the wand.
+const DOUBLES_PX: f32 = 24.0;
+
+/// What a hand does on a mask.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drawing {
+    /// With what.
+    #[serde(flatten)]
+    pub tool: DrawTool,
+    /// The pointer's way or the corners, image pixels: `(0, 0)` is the center of the first one.
+    pub points: Vec<[f32; 2]>,
+    /// Whether it adds to the contact or removes from it.
+    pub add: bool,
+}
+
+/// What a drawing falls on.
+#[derive(Clone, Copy, Debug)]
+pub struct Ground<'a> {
+    /// The imprint, meters; as large as the mask.
+    pub imprint: &'a DepthMap,
+    /// The pixels that may change; `None` = all.
+    pub allowed: Option<&'a Mask>,
+}
+
+impl Drawing {
+    /// A drawing that begins at a point.
+    pub fn begin(tool: DrawTool, at_px: [f32; 2], add: bool) -> Self {
+        // A corner that follows the pointer until it is set.
+        let points = if tool == DrawTool::Polygon { vec![at_px; 2] } else { vec![at_px] };
+        Self { tool, points, add }
+    }
+
+    /// Whether it is made of clicks, and not of one drag.
+    pub fn is_by_clicks(&self) -> bool {
+        self.tool == DrawTool::Polygon
+    }
+
+    /// The pointer moved. Points that are no numbers change nothing.
+    pub fn move_to(&mut self, at_px: [f32; 2]) {
+        if !at_px.iter().all(|v| v.is_finite()) {
+            return;
+        }
+        match self.tool {
+            DrawTool::Brush { .. } | DrawTool::Lasso => self.points.push(at_px),
+            DrawTool::Polygon => self.points.last_mut().into_iter().for_each(|last| *last = at_px),
+            DrawTool::Rectangle | DrawTool::Wand { .. } => {
+                self.points.truncate(1);
+                self.points.push(at_px);
+            }
+        }
+    }
+
+    /// A click sets the corner that followed the pointer, and the next one follows.
+    pub fn corner(&mut self, at_px: [f32; 2]) {
+        if self.is_by_clicks() && at_px.iter().all(|v| v.is_finite()) {
+            self.move_to(at_px);
+            self.points.push(at_px);
+        }
+    }
+
+    /// The wand's tolerance as it was dragged, meters.
+    pub fn tolerance_m(&self) -> Option<f32> {
+        let DrawTool::Wand { tolerance_m } = self.tool else { return None };
+        let [first, last] = [self.points.first()?, self.points.last()?];
+        Some(tolerance_m * ((last[0] - first[0]) / DOUBLES_PX).clamp(-6.0, 6.0).exp2())
+    }
+
+    /// Changes the pixels; returns the rectangle that holds all changes, `None` where there are none. Of a brush only
+    /// what comes after the first `from` points: 0 draws all of it.
+    pub fn apply(&self, mask: &mut Mask, ground: Ground<'_>, from: usize) -> Option<Rect> {
+        let allowed = |x, y| ground.allowed.is_none_or(|allowed| allowed.get(x, y) == Some(&true));
+        let finite = |p: &&[f32; 2]| p.iter().all(|v| v.is_finite());
+        let points: Vec<DVec2> =
+            self.points.iter().filter(finite).map(|p| DVec2::new(p[0].into(), p[1].into())).collect();
+        if let DrawTool::Brush { radius_px } = self.tool {
+            let mut changed: Option<Rect> = None;
+            let ways = points.windows(2).skip(from.saturating_sub(1)).map(|w| [w[0], w[1]]);
+            let first = points.first().filter(|_| from == 0).map(|&p| [p, p]);
+            for way in first.into_iter().chain(ways) {
+                let rect = paint_where(mask, way, radius_px.into(), self.add, allowed);
+                changed = match (changed, rect) {
+                    (Some(a), Some(b)) => Some(a.union(b)),
+                    (a, b) => a.or(b),
+                };
+            }
+            return changed;
+        }
+        let (first, last) = (*points.first()?, *points.last()?);
+        let region = match self.tool {
+            DrawTool::Rectangle => region::rectangle(mask.size(), first, last),
+            DrawTool::Wand { .. } => region::about_as_deep(ground.imprint, first, self.tolerance_m()?.into()),
+            _ => region::enclosed(mask.size(), &points),
+        };
+        let mut changed: Option<Rect> = None;
+        for y in 0..mask.height() {
+            for x in 0..mask.width() {
+                if region.get(x, y) == Some(&true) && mask[(x, y)] != self.add && allowed(x, y) {
+                    mask[(x, y)] = self.add;
+                    let pixel = Rect { x, y, width: 1, height: 1 };
+                    changed = Some(changed.map_or(pixel, |r| r.union(pixel)));
+                }
+            }
+        }
+        changed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn imprint() -> DepthMap {
+        // Two plateaus joined by a ramp, and a far one of the first's depth.
+        DepthMap::from_fn(40, 20, |x, _| match x {
+            0..10 => 0.005,
+            10..20 => 0.005 + 0.0001 * (x as f32 - 9.0),
+            20..30 => 0.012,
+            _ => 0.005,
+        })
+    }
+
+    fn drawn(tool: DrawTool, points: &[[f32; 2]], add: bool, mask: &mut Mask) -> Option<Rect> {
+        let imprint = imprint();
+        Drawing { tool, points: points.to_vec(), add }.apply(mask, Ground { imprint: &imprint, allowed: None }, 0)
+    }
+
+    fn count(mask: &Mask) -> usize {
+        mask.as_slice().iter().filter(|&&v| v).count()
+    }
+
+    #[test]
+    fn a_brush_drawn_piece_by_piece_is_the_brush_drawn_at_once() {
+        let imprint = imprint();
+        let ground = Ground { imprint: &imprint, allowed: None };
+        let mut drawing = Drawing::begin(DrawTool::Brush { radius_px: 2.5 }, [3.0, 3.0], true);
+        let mut pieces = Mask::filled(40, 20, false);
+        drawing.apply(&mut pieces, ground, 0);
+        for to in [[9.0, 12.0], [f32::NAN, 0.0], [30.0, 2.0], [38.0, 19.0]] {
+            let before = drawing.points.len();
+            drawing.move_to(to);
+            drawing.apply(&mut pieces, ground, before);
+        }
+        let mut once = Mask::filled(40, 20, false);
+        drawing.apply(&mut once, ground, 0);
+        assert_eq!(once, pieces);
+        assert!(count(&once) > 100);
+    }
+
+    #[test]
+    fn regions_add_and_remove() {
+        let mut mask = Mask::filled(40, 20, false);
+        let rect = drawn(DrawTool::Rectangle, &[[12.2, 15.0], [4.9, 5.0]], true, &mut mask).unwrap();
+        assert_eq!(rect, Rect { x: 5, y: 5, width: 8, height: 11 });
+        assert_eq!(count(&mask), 8 * 11);
+        let triangle = [[5.0, 5.0], [12.0, 5.0], [5.0, 15.0]];
+        drawn(DrawTool::Lasso, &triangle, false, &mut mask);
+        assert!(!mask[(6, 6)] && mask[(12, 15)]);
+        let before = count(&mask);
+        drawn(DrawTool::Polygon, &triangle, true, &mut mask);
+        assert!(count(&mask) > before);
+        assert_eq!(drawn(DrawTool::Lasso, &[[1.0, 1.0]], true, &mut mask), None, "nothing is enclosed");
+        assert_eq!(drawn(DrawTool::Rectangle, &[[f32::NAN, 1.0]], true, &mut mask), None);
+        assert_eq!(drawn(DrawTool::Rectangle, &[[-9e9, -9e9], [9e9, 9e9]], false, &mut mask).map(|r| r.width), Some(8));
+    }
+
+    #[test]
+    fn the_wand_stays_where_it_is_connected_and_widens_by_dragging() {
+        let wand = DrawTool::Wand { tolerance_m: 0.0003 };
+        let mut mask = Mask::filled(40, 20, false);
+        drawn(wand, &[[4.0, 4.0]], true, &mut mask);
+        assert_eq!(count(&mask), (10 + 3) * 20, "the plateau and .3 mm of the ramp, not what is as deep elsewhere");
+        let mut wider = Mask::filled(40, 20, false);
+        drawn(wand, &[[4.0, 4.0], [4.0 + DOUBLES_PX, 9.0]], true, &mut wider);
+        assert_eq!(count(&wider), (10 + 6) * 20, "twice the tolerance");
+        assert_eq!(drawn(wand, &[[-5.0, 4.0]], true, &mut mask), None, "outside");
+    }
+
+    #[test]
+    fn a_gate_holds_for_every_tool() {
+        let imprint = imprint();
+        let allowed = imprint.map(|&depth| depth > 0.01);
+        let ground = Ground { imprint: &imprint, allowed: Some(&allowed) };
+        for tool in [DrawTool::Brush { radius_px: 90.0 }, DrawTool::Rectangle, DrawTool::Wand { tolerance_m: 1.0 }] {
+            let mut mask = Mask::filled(40, 20, false);
+            Drawing { tool, points: vec![[0.0, 0.0], [39.0, 19.0]], add: true }.apply(&mut mask, ground, 0);
+            assert_eq!(mask, allowed, "{tool:?}");
+        }
+    }
+
+    #[test]
+    fn corners_follow_the_pointer_until_they_are_set_and_drawings_are_stored() {
+        let mut drawing = Drawing::begin(DrawTool::Polygon, [2.0, 2.0], true);
+        drawing.move_to([9.0, 2.0]);
+        drawing.corner([10.0, 2.0]);
+        drawing.move_to([10.0, 8.0]);
+        drawing.corner([f32::NAN, 0.0]);
+        assert_eq!(drawing.points, [[2.0, 2.0], [10.0, 2.0], [10.0, 8.0]]);
+        let text = serde_json::to_string(&drawing).unwrap();
+        assert_eq!(serde_json::from_str::<Drawing>(&text).unwrap(), drawing, "{text}");
+    }
+}
