@@ -21,7 +21,7 @@ use touch2touch::io::dataset::Dataset;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch::work::evaluate::{Evaluation, Report, Setup, evaluate, known};
 use touch2touch::work::job::{Cancel, JobCx};
-use touch2touch::work::labels::{HandMask, Labels, MaskPlace, PairLabels, Revision};
+use touch2touch::work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Revision};
 use touch2touch::work::mask::{MaskChoice, MaskSource};
 use touch2touch::work::models::Models;
 
@@ -165,12 +165,12 @@ fn what_was_changed_or_damaged_is_computed_again() {
     let drawn = HandMask { mask, revision: Revision(1), base: "Threshold".into() };
     let mut drawn_on = PairLabels::default();
     drawn_on.draw(&MaskPlace::measured(lab::RIGHT), Some(drawn));
-    labels.save(&name, &drawn_on).unwrap();
+    labels.save(&name, &drawn_on, &Deed::default()).unwrap();
     let (hand, fresh) = run(&data, &setup(), &cache);
     assert_eq!(fresh, 1);
     assert_ne!(hand.scores[0].grasps[0].angle_error_rad, cold.scores[0].grasps[0].angle_error_rad);
     assert_eq!(run(&data, &Setup { hand: false, ..setup() }, &cache).1, 0, "left out, as before it was drawn");
-    labels.save(&name, &PairLabels::default()).unwrap();
+    labels.save(&name, &PairLabels::default(), &Deed::default()).unwrap();
     assert_eq!(run(&data, &setup(), &cache).1, 0, "taken back");
     // A touch.
     let sample = sim::simulate(&catalog::tools()[0], sim::random_grasp(77), 1, &sim::SimConfig::default());

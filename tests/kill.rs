@@ -41,6 +41,7 @@ use touch2touch::work::bundles::BundleInfo;
 use touch2touch::work::error::TaskError;
 use touch2touch::work::export::{ExportChoice, Plan};
 use touch2touch::work::job::JobCx;
+use touch2touch::work::labels::Deed;
 use touch2touch::work::models::Wanted;
 use touch2touch::work::prediction::Prediction;
 
@@ -83,8 +84,8 @@ impl DataSource for Source {
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {
         self.live.load_labels(name)
     }
-    fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError> {
-        if self.saves { self.live.save_labels(name, labels) } else { Ok(()) }
+    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
+        if self.saves { self.live.save_labels(name, labels, deed) } else { Ok(()) }
     }
     fn plan_masks(&self, _: &BTreeMap<String, PairLabels>, _: ExportChoice) -> Result<Plan, TaskError> {
         Err(TaskError::new("Export masks", "it is not tried here"))

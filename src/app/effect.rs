@@ -19,6 +19,7 @@ use crate::work::case::CaseSetup;
 use crate::work::evaluate::{Evaluation, Setup};
 use crate::work::export::ExportChoice;
 use crate::work::figure::FigureSetup;
+use crate::work::labels::Deed;
 
 /// A pair whose labels are to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +32,8 @@ pub struct LabelsToSave {
     pub revision: Revision,
     /// What to write.
     pub labels: PairLabels,
+    /// What was done.
+    pub deed: Deed,
 }
 
 /// Work that leaves the state.

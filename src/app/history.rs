@@ -1,9 +1,14 @@
 //! Undo: reversible changes of the document, one entry per gesture, within a budget of bytes.
 
+use std::borrow::Cow;
+
+use strum::IntoEnumIterator as _;
+
 use super::keys::ImprintSource;
 use super::labels::state::{Document, HandMask, MaskPlace, Review};
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::Patch;
+use crate::work::labels::{Change, Past};
 
 /// One reversible change of the document.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,12 +107,34 @@ impl Edit {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gesture {
     /// What it did, e.g. `brush stroke`: shown when it is undone.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Its changes in the order they were made. All concern the same pair.
     pub edits: Vec<Edit>,
 }
 
 impl Gesture {
+    /// The way back of a change that was made before the labels of `pair` were read.
+    fn back(pair: &str, name: &Cow<'static, str>, change: &Change) -> Self {
+        let pair = || pair.to_owned();
+        let mut edits = Vec::new();
+        for (place, [before, after]) in &change.masks {
+            let place = place.clone();
+            let patch = match (before, after) {
+                (Some(a), Some(b)) if a.base == b.base => Patch::between(&b.mask, &a.mask),
+                _ => None,
+            };
+            edits.push(match patch {
+                Some(patch) => Edit::Patch { pair: pair(), place, patch },
+                None => Edit::HandMask { pair: pair(), place, mask: before.clone() },
+            });
+        }
+        edits.extend(change.review.map(|[before, _]| Edit::Review { pair: pair(), review: before }));
+        for (source, accepted) in ImprintSource::iter().zip(change.accepted) {
+            edits.extend(accepted.map(|[before, _]| Edit::Pose { pair: pair(), source, pose: before }));
+        }
+        Self { name: name.clone(), edits }
+    }
+
     /// The pair's name.
     pub fn pair(&self) -> &str {
         self.edits.first().map_or("", Edit::pair)
@@ -166,6 +193,23 @@ impl History {
         }
         self.undone.retain(|other| !other.overlaps(&gesture));
         self.done.push(gesture);
+        self.keep_budget();
+    }
+
+    /// Takes in what was done to a pair, and taken back, before its labels were read.
+    pub fn restore(&mut self, pair: &str, done: &[Past], undone: &[Past]) {
+        if self.done.iter().chain(&self.undone).any(|gesture| gesture.pair() == pair) {
+            return;
+        }
+        let back = |past: &Past| Gesture::back(pair, &past.name, &past.change);
+        let forth = |past: &Past| Gesture::back(pair, &past.name, &past.change.clone().inverse());
+        // Older than what was done in this run: the first to go where the budget ends.
+        self.done.splice(0..0, done.iter().map(back));
+        self.undone.splice(0..0, undone.iter().map(forth));
+        self.keep_budget();
+    }
+
+    fn keep_budget(&mut self) {
         let mut bytes: usize = self.done.iter().chain(&self.undone).map(Gesture::bytes).sum();
         while bytes > self.budget && self.done.len() > 1 {
             bytes -= self.done.remove(0).bytes();
@@ -248,7 +292,7 @@ mod tests {
     fn patch(doc: &mut Document, history: &mut History, pair: &str, finger: PadId, x: usize) {
         let mut edit = edit(pair, finger, x);
         edit.swap(doc);
-        history.record(Gesture { name: "stroke", edits: vec![edit] });
+        history.record(Gesture { name: "stroke".into(), edits: vec![edit] });
     }
 
     #[test]
@@ -287,7 +331,7 @@ mod tests {
         let predicted = MaskPlace { pad: lab::RIGHT, of: ImprintOf::Predicted("a prediction".into()) };
         let mut edit = Edit::HandMask { pair: "a".into(), place: predicted.clone(), mask: None };
         edit.swap(&mut doc);
-        history.record(Gesture { name: "stroke", edits: vec![edit] });
+        history.record(Gesture { name: "stroke".into(), edits: vec![edit] });
         assert!(history.next_undo("a", &[MaskPlace::measured(lab::RIGHT)]).is_none());
         assert!(history.undo(&mut doc, "a", &[predicted]).is_some());
         // A new stroke on the other finger does not take the redo of this one away; one on this finger does.

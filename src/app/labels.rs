@@ -2,8 +2,9 @@
 
 pub mod state;
 
-pub use state::{Document, HandMask, MaskPlace, PairLabels, Review, Stored, Stroke};
+pub use state::{Changed, Document, HandMask, MaskPlace, PairLabels, Review, Stored, Stroke};
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::effect::{Effect, LabelsToSave};
@@ -17,7 +18,7 @@ use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{CleanUp, DrawTool, Drawing, Ground, Patch};
 use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
-use crate::work::labels::taken_over;
+use crate::work::labels::{Act, Deed, taken_over};
 
 /// What can happen to the document.
 #[derive(Clone, Debug)]
@@ -72,7 +73,9 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         LabelsCommand::Corner(at_px) => corner(state, at_px),
         LabelsCommand::CleanUp(clean_up) => {
             let px_per_mm = state.rig().depth().map_or(f64::NAN, |sensor| sensor.px_per_m * 1e-3);
-            replace(state, clean_up.kind.name(), effects, |mask| clean_up.apply(mask, px_per_mm));
+            let how = serde_json::to_value(clean_up).ok();
+            let deed = Deed { how, ..Deed::named(clean_up.kind.name()) };
+            replace(state, deed, effects, |mask| clean_up.apply(mask, px_per_mm));
         }
         LabelsCommand::AdoptAutomatic => adopt_automatic(state, effects),
         LabelsCommand::TakeOver => take_over(state, effects),
@@ -162,7 +165,8 @@ fn begin_stroke(
     let labels = state.document.labels.entry(pair.clone()).or_default();
     let before = labels.put(&place, Some(HandMask { mask: pixels.clone(), revision, base }));
     let drawing = Drawing::begin(tool, at_px, adds != erase);
-    state.document.stroke = Some(Stroke { pair, place, source, drawing, allowed, before, pixels });
+    let angle = angle(state, source);
+    state.document.stroke = Some(Stroke { pair, place, source, drawing, allowed, angle, before, pixels });
     redraw(state, 0);
 }
 
@@ -229,7 +233,15 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
         (DrawTool::Rectangle, _) => "rectangle",
         (DrawTool::Wand { .. }, _) => "wand",
     };
-    record(state, &pair, name, edit, effects);
+    let how = serde_json::to_value(&stroke.drawing).ok();
+    record(state, &pair, Deed { how, ..Deed::named(name) }, edit, effects);
+    let (source, before) = (stroke.source, stroke.angle);
+    state.document.changed = Some(Changed { pair, source, name: name.into(), before });
+}
+
+/// The angle that is registered now, and its error.
+fn angle(state: &State, source: ImprintSource) -> Option<(f64, Option<f64>)> {
+    state.pose(source).shown().map(|pose| (pose.angle_rad, pose.error_rad))
 }
 
 fn cancel_stroke(state: &mut State) {
@@ -241,19 +253,20 @@ fn cancel_stroke(state: &mut State) {
 }
 
 /// Records a change that was made; `edit` is its inverse. The pair counts as begun, and is saved.
-fn record(state: &mut State, pair: &str, name: &'static str, edit: Edit, effects: &mut Vec<Effect>) {
+fn record(state: &mut State, pair: &str, deed: Deed, edit: Edit, effects: &mut Vec<Effect>) {
     let mut edits = vec![edit];
     if state.document.review(pair) == Review::Todo {
         let before = state.document.set_review(pair, Review::InProgress);
         edits.push(Edit::Review { pair: pair.to_owned(), review: before });
     }
-    state.history.record(Gesture { name, edits });
-    save_pair(state, pair, effects);
+    state.history.record(Gesture { name: deed.name.clone(), edits });
+    save_pair(state, pair, deed, effects);
 }
 
 /// Replaces the active finger's mask by `f` of the mask in force.
-fn replace(state: &mut State, what: &'static str, effects: &mut Vec<Effect>, f: impl FnOnce(&Mask) -> Mask) {
+fn replace(state: &mut State, deed: Deed, effects: &mut Vec<Effect>, f: impl FnOnce(&Mask) -> Mask) {
     end_stroke(state, effects);
+    let what: &str = &deed.name;
     if !check_editable(state, what) {
         return;
     }
@@ -267,12 +280,12 @@ fn replace(state: &mut State, what: &'static str, effects: &mut Vec<Effect>, f: 
     if mask == *pixels {
         return state.log.info(format!("{what}: nothing to change"));
     }
-    set_hand_mask(state, what, place, Some((Arc::new(mask), base)), effects);
+    set_hand_mask(state, deed, place, Some((Arc::new(mask), base)), effects);
 }
 
 fn set_hand_mask(
     state: &mut State,
-    name: &'static str,
+    deed: Deed,
     place: MaskPlace,
     mask: Option<(Arc<Mask>, String)>,
     effects: &mut Vec<Effect>,
@@ -280,9 +293,12 @@ fn set_hand_mask(
     let pair = state.pair_name().to_owned();
     let revision = state.document.next_revision();
     let mask = mask.map(|(mask, base)| HandMask { mask, revision, base });
+    let (source, name) = (place.of.source(), deed.name.clone());
+    let before = angle(state, source);
     let mut edit = Edit::HandMask { pair: pair.clone(), place, mask };
     edit.swap(&mut state.document);
-    record(state, &pair, name, edit, effects);
+    state.document.changed = Some(Changed { pair: pair.clone(), source, name, before });
+    record(state, &pair, deed, edit, effects);
 }
 
 fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
@@ -297,7 +313,7 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
     match (state.automatic_mask(source, finger), state.mask_recipe(finger)) {
         (Lookup::Ready(mask), Ok(recipe)) => {
             let adopted = (mask.clone(), state.automatic_label(source, finger, &recipe));
-            set_hand_mask(state, "automatic mask taken over", place, Some(adopted), effects);
+            set_hand_mask(state, Deed::named("automatic mask taken over"), place, Some(adopted), effects);
         }
         (Lookup::Failed(err), _) => {
             let err = err.clone();
@@ -314,7 +330,7 @@ fn reset(state: &mut State, effects: &mut Vec<Effect>) {
     let source = state.worked_on(finger);
     let Some(place) = state.mask_place(source, finger) else { return };
     if state.hand_mask(source, finger).is_some() && check_editable(state, "Remove the correction") {
-        set_hand_mask(state, "correction removed", place, None, effects);
+        set_hand_mask(state, Deed::named("correction removed"), place, None, effects);
     }
 }
 
@@ -336,7 +352,13 @@ fn take_over(state: &mut State, effects: &mut Vec<Effect>) {
     if Some(mask.size()) != size {
         return state.log.error(&TaskError::new(WHAT, "the imprints are not of one size"));
     }
-    set_hand_mask(state, "mask of the other imprint taken over", place, Some((mask, taken_over(from, &base))), effects);
+    set_hand_mask(
+        state,
+        Deed::named("mask of the other imprint taken over"),
+        place,
+        Some((mask, taken_over(from, &base))),
+        effects,
+    );
 }
 
 pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Effect>) {
@@ -347,8 +369,8 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
     }
     let before = state.document.set_review(&pair, review);
     let edit = Edit::Review { pair: pair.clone(), review: before };
-    state.history.record(Gesture { name: "review state", edits: vec![edit] });
-    save_pair(state, &pair, effects);
+    state.history.record(Gesture { name: "review state".into(), edits: vec![edit] });
+    save_pair(state, &pair, Deed::named("review state"), effects);
 }
 
 fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: &mut Vec<Effect>) {
@@ -375,8 +397,8 @@ pub(super) fn set_accepted(
     let pair = state.pair_name().to_owned();
     let mut edit = Edit::Pose { pair: pair.clone(), source, pose };
     edit.swap(&mut state.document);
-    state.history.record(Gesture { name, edits: vec![edit] });
-    save_pair(state, &pair, effects);
+    state.history.record(Gesture { name: name.into(), edits: vec![edit] });
+    save_pair(state, &pair, Deed::named(name), effects);
 }
 
 fn undo(state: &mut State, effects: &mut Vec<Effect>) {
@@ -384,8 +406,8 @@ fn undo(state: &mut State, effects: &mut Vec<Effect>) {
         return cancel_stroke(state);
     }
     let (pair, shown) = (state.pair_name().to_owned(), state.mask_places());
-    let name = state.history.undo(&mut state.document, &pair, &shown).map(|gesture| gesture.name);
-    travelled(state, "Undone", &pair, name, effects);
+    let name = state.history.undo(&mut state.document, &pair, &shown).map(|gesture| gesture.name.clone());
+    travelled(state, Act::Undo, &pair, name, effects);
 }
 
 fn redo(state: &mut State, effects: &mut Vec<Effect>) {
@@ -393,15 +415,16 @@ fn redo(state: &mut State, effects: &mut Vec<Effect>) {
         return;
     }
     let (pair, shown) = (state.pair_name().to_owned(), state.mask_places());
-    let name = state.history.redo(&mut state.document, &pair, &shown).map(|gesture| gesture.name);
-    travelled(state, "Done again", &pair, name, effects);
+    let name = state.history.redo(&mut state.document, &pair, &shown).map(|gesture| gesture.name.clone());
+    travelled(state, Act::Redo, &pair, name, effects);
 }
 
-fn travelled(state: &mut State, how: &str, pair: &str, name: Option<&'static str>, effects: &mut Vec<Effect>) {
+fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, str>>, effects: &mut Vec<Effect>) {
+    let how = if act == Act::Undo { "Undone" } else { "Done again" };
     match name {
         Some(name) => {
             state.log.info(format!("{how}: {name}"));
-            save_pair(state, pair, effects);
+            save_pair(state, pair, Deed { act, ..Deed::named(name) }, effects);
             state.reorder();
         }
         None => state.log.info(format!("{how}: nothing on screen to change")),
@@ -409,11 +432,11 @@ fn travelled(state: &mut State, how: &str, pair: &str, name: Option<&'static str
 }
 
 /// Writes the labels of a pair of the open data set.
-fn save_pair(state: &mut State, name: &str, effects: &mut Vec<Effect>) {
+fn save_pair(state: &mut State, name: &str, deed: Deed, effects: &mut Vec<Effect>) {
     let Some(open) = &state.library.open else { return };
     let revision = state.document.next_revision();
     let Some(labels) = state.document.labels.get(name) else { return };
-    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels: labels.clone() };
+    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels: labels.clone(), deed };
     effects.push(Effect::SaveLabels(open.source.clone(), Box::new(save)));
     state.document.unsaved.insert(name.to_owned());
     state.document.asked.insert(name.to_owned(), revision);
@@ -423,7 +446,7 @@ fn save_all(state: &mut State, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
     let unsaved: Vec<String> = state.document.unsaved.iter().cloned().collect();
     for name in unsaved {
-        save_pair(state, &name, effects);
+        save_pair(state, &name, Deed::named("saved again"), effects);
     }
     settings::save(state, effects);
     state.log.push(Level::Info, "Labels and preferences are being written", None, None);

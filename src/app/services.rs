@@ -31,6 +31,7 @@ use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{ExportChoice, Plan};
 use crate::work::job::JobCx;
+use crate::work::labels::{Deed, Past};
 use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
 
@@ -80,11 +81,16 @@ pub trait DataSource: Send + Sync {
     /// If there are some and they cannot be read: then they must not be written either.
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError>;
 
-    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones.
+    /// What was done to them before, and what was taken back of it, the oldest first.
+    fn past(&self, _name: &str, _labels: &PairLabels) -> (Vec<Past>, Vec<Past>) {
+        Default::default()
+    }
+
+    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones, and says what was done.
     ///
     /// # Errors
     /// If they cannot be written.
-    fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError>;
+    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError>;
 
     /// What an export of masks would write where. `changed` is newer than what is stored.
     ///

@@ -18,7 +18,7 @@ use crate::domain::pose::ToolModel;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::work::job::JobCx;
-use crate::work::labels::{HandMask, ImprintSource, Labels, MaskPlace, PairLabels, Revision, taken_over};
+use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, Revision, taken_over};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
 use crate::work::tool::load_tool;
@@ -39,7 +39,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
         let before = stored.clone();
         change(args, &dataset, id, &mut stored)?;
         if stored != before {
-            labels.save(&entry.name, &stored)?;
+            labels.save(&entry.name, &stored, &Deed::named("label"))?;
         }
         pairs.push(Stored::new(&entry.name, &stored, &dataset));
     } else {

@@ -2,12 +2,12 @@
 //!
 //! One folder per dataset, beside it (`touch2touch_masks`) if that can be written, else in the user's data folder.
 //! Per pair and finger one JSON file with the run-length coded mask of the measured imprint, and one with those of
-//! predictions; per pair one with the review state and accepted poses; and one append-only journal of strokes. Files are written beside their place, flushed and renamed, so a
+//! predictions; per pair one with the review state and accepted poses, and one append-only journal of what was done. Files are written beside their place, flushed and renamed, so a
 //! crash costs at most the stroke that was being saved.
 //!
 //! A file that cannot be understood blocks its pair: it is reported, and nothing overwrites it.
 
-use std::io::Write as _;
+use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use crate::domain::rig::{PadId, Rig};
 
 /// Name of the folder beside a dataset.
 pub const FOLDER: &str = "touch2touch_masks";
-const JOURNAL: &str = "journal.jsonl";
+const JOURNAL_SUFFIX: &str = ".journal.jsonl";
 const FORMAT: &str = "touch2touch-mask";
 const REVIEW_FORMAT: &str = "touch2touch-review";
 const VERSION: u32 = 1;
@@ -103,27 +103,6 @@ pub struct StoredReview {
     /// Accepted `grasp_from_object`, from the measured and from the predicted imprint.
     #[serde(default)]
     pub accepted: [Option<AcceptedPose>; 2],
-}
-
-/// One line of the journal.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct JournalEntry {
-    /// When, seconds since 1970 (UTC).
-    pub unix_s: u64,
-    /// Who.
-    pub person: String,
-    /// The pair's name.
-    pub pair: String,
-    /// `right` or `left`.
-    pub finger: String,
-    /// What was done, e.g. `brush`, `eraser`, `fill holes`, `undo`.
-    pub tool: String,
-    /// Brush radius in pixels, where there was one.
-    #[serde(default)]
-    pub radius_px: Option<f32>,
-    /// The pointer's way in image pixels, where there was one.
-    #[serde(default)]
-    pub points: Vec<[f32; 2]>,
 }
 
 /// Seconds since 1970, for [`StoredMask::saved_unix_s`]; 0 if the clock is set before that.
@@ -430,33 +409,44 @@ impl MaskStore {
         masks
     }
 
-    /// Appends a line to the journal.
-    ///
-    /// # Errors
-    /// [`StoreError::Io`].
-    pub fn append_journal(&self, entry: &JournalEntry) -> Result<(), StoreError> {
-        let file = self.folder.join(JOURNAL);
-        let io = |source| StoreError::Io { file: file.clone(), what: "write the journal", source };
-        std::fs::create_dir_all(&self.folder).map_err(io)?;
-        let mut line = serde_json::to_vec(entry).map_err(|err| io(err.into()))?;
-        line.push(b'\n');
-        let mut out = std::fs::OpenOptions::new().create(true).append(true).open(&file).map_err(io)?;
-        // One write, so that a crash can only cut the last line short.
-        out.write_all(&line).and_then(|()| out.sync_data()).map_err(io)
+    fn journal_file(&self, pair: &str) -> PathBuf {
+        self.folder.join(format!("{}{JOURNAL_SUFFIX}", names::label(pair)))
     }
 
-    /// Reads the journal; a last line cut short by a crash is left out, as are lines that cannot be understood.
+    /// Appends a line to the journal of a pair: who did what, before and after. Nothing is ever removed from it.
     ///
     /// # Errors
     /// [`StoreError::Io`].
-    pub fn journal(&self) -> Result<Vec<JournalEntry>, StoreError> {
-        let file = self.folder.join(JOURNAL);
-        let bytes = match files::read(&file, files::SMALL) {
-            Ok(bytes) => bytes,
-            Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(source) => return Err(StoreError::Io { file, what: "read the journal", source }),
-        };
-        Ok(bytes.split(|&b| b == b'\n').filter_map(|line| serde_json::from_slice(line).ok()).collect())
+    pub fn append_journal(&self, pair: &str, line: &impl Serialize) -> Result<(), StoreError> {
+        let file = self.journal_file(pair);
+        let io = |source| StoreError::Io { file: file.clone(), what: "write the journal", source };
+        std::fs::create_dir_all(&self.folder).map_err(io)?;
+        let mut bytes = serde_json::to_vec(line).map_err(|err| io(err.into()))?;
+        bytes.push(b'\n');
+        let mut out = std::fs::OpenOptions::new().create(true).append(true).read(true).open(&file).map_err(io)?;
+        // A line cut short by a crash is closed, so that this one stands by itself.
+        let length = out.metadata().map_err(io)?.len();
+        if length > 0 {
+            let mut last = [0];
+            out.seek(SeekFrom::End(-1)).and_then(|_| out.read_exact(&mut last)).map_err(io)?;
+            if last != *b"\n" {
+                bytes.insert(0, b'\n');
+            }
+        }
+        // One write, so that a crash can only cut this line short.
+        out.write_all(&bytes).and_then(|()| out.sync_data()).map_err(io)
+    }
+
+    /// The lines of the journal of a pair; empty if there is none.
+    ///
+    /// # Errors
+    /// [`StoreError::Io`].
+    pub fn journal(&self, pair: &str) -> Result<Vec<u8>, StoreError> {
+        let file = self.journal_file(pair);
+        match files::read(&file, files::SMALL) {
+            Err(err) if err.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
+            read => read.map_err(|source| StoreError::Io { file, what: "read the journal", source }),
+        }
     }
 
     fn folders(&self) -> impl Iterator<Item = &Path> {

@@ -13,6 +13,7 @@ use crate::app::labels::Review;
 use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use crate::app::state::Lookup;
 use crate::domain::rig::PadId;
+use crate::domain::units;
 
 /// Nothing is kept between frames.
 pub(super) type Memory = ();
@@ -274,8 +275,8 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         let (name, shown) = (cx.state.pair_name(), cx.state.mask_places());
-        let undo = cx.state.history.next_undo(name, &shown).map(|g| g.name);
-        let redo = cx.state.history.next_redo(name, &shown).map(|g| g.name);
+        let undo = cx.state.history.next_undo(name, &shown).map(|g| g.name.clone());
+        let redo = cx.state.history.next_redo(name, &shown).map(|g| g.name.clone());
         for (action, text, what) in [(Action::Undo, "Undo", undo), (Action::Redo, "Redo", redo)] {
             let response = cx.action_button(ui, action, text);
             if let Some(what) = what {
@@ -284,6 +285,30 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         save_state(cx, ui);
     });
+    effect(cx, ui);
+}
+
+/// What the last change of a mask did to the pose, as soon as that is registered again.
+fn effect(cx: &Cx<'_>, ui: &mut Ui) {
+    let Some(changed) = cx.state.document.changed.as_ref().filter(|c| c.pair == cx.state.pair_name()) else { return };
+    let deg = |rad: f64| units::text_deg(rad);
+    let (text, color) = match (cx.state.pose(changed.source), changed.before) {
+        (Lookup::Ready(pose), Some((before, error_before))) => {
+            let by = (pose.angle_rad - before).to_degrees();
+            let mut text = format!("{}: angle {by:+.2}°, {} to {}", changed.name, deg(before), deg(pose.angle_rad));
+            let mut color = cx.p.text;
+            if let (Some(from), Some(to)) = (error_before, pose.error_rad) {
+                text += &format!("; error {} to {}", deg(from), deg(to));
+                color = if to < from { cx.p.good } else { cx.p.caution };
+            }
+            (text, color)
+        }
+        (Lookup::Stale(_) | Lookup::Waiting, _) => (format!("{}: registering…", changed.name), cx.p.weak),
+        (Lookup::Failed(err), _) => (format!("{}: no pose: {}", changed.name, err.why), cx.p.caution),
+        (Lookup::Absent(_), _) | (Lookup::Ready(_), None) => return,
+    };
+    let label = egui::Label::new(RichText::new(text).size(SMALL).color(color)).wrap();
+    ui.add(label).on_hover_text("What the last change of the mask did to the registered angle");
 }
 
 /// `saved 12:03:11`, or what is not saved yet.

@@ -11,7 +11,7 @@ use super::bundles::{BundleInfo, BundleKind, FoundBundles};
 use super::error::TaskError;
 use super::imprint::{imprint_of, measured};
 use super::job::JobCx;
-use super::labels::{HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review};
+use super::labels::{Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review};
 use super::mask::{MaskChoice, MaskInputs};
 use super::models::{Masking, Models, Wanted};
 use super::pose::pose;
@@ -387,7 +387,7 @@ impl OpenedCase {
         if self.labels.is_empty() || !store.load(&self.case.pair)?.is_empty() {
             return Ok(());
         }
-        store.save(&self.case.pair, &self.labels)
+        store.save(&self.case.pair, &self.labels, &Deed::named("opened with a case"))
     }
 }
 

@@ -1,7 +1,11 @@
 //! [`Labels`]: what people said about the pairs of a data set (masks drawn by hand, review states, accepted poses), as
 //! it lies on the disk. The studio and every verb read and write it here.
 
-use std::collections::{BTreeMap, BTreeSet};
+mod journal;
+
+pub use journal::{Act, Change, Deed, Past};
+
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -340,26 +344,28 @@ impl Labels {
         Ok(labels)
     }
 
-    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones.
+    /// What was done to the labels of a pair before they were read, and what was taken back of it, the oldest first; as
+    /// far as the journal tells and it leads to `labels`.
+    pub fn past(&self, name: &str, labels: &PairLabels) -> (Vec<Past>, Vec<Past>) {
+        let Ok(store) = &*self.store else { return Default::default() };
+        // Without a journal there is nothing to take back, and that is all.
+        let bytes = store.journal(name).unwrap_or_default();
+        journal::fold(bytes.split(|&b| b == b'\n'), labels, store.rig())
+    }
+
+    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones, and says in the pair's
+    /// journal what was done.
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn save(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError> {
+    pub fn save(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
         let what = format!("Save the labels of {name}");
         let store = self.store(&what)?;
         let fail = |err: StoreError| store_error(&what, &err);
         let before = lock(&self.saved).get(name).cloned().unwrap_or_default();
-        let places: BTreeSet<&MaskPlace> = before.masks.keys().chain(labels.masks.keys()).collect();
-        for place in places {
-            let (old, new) = (before.masks.get(place), labels.masks.get(place));
-            let same = match (old, new) {
-                (Some(a), Some(b)) => a.mask == b.mask && a.base == b.base,
-                _ => false,
-            };
-            if same {
-                continue;
-            }
-            let stored = new.map(|hand| StoredMask {
+        let change = Change::between(&before, labels);
+        for (place, [_, new]) in &change.masks {
+            let stored = new.as_ref().map(|hand| StoredMask {
                 mask: (*hand.mask).clone(),
                 base: hand.base.clone(),
                 person: masks::person(),
@@ -376,6 +382,10 @@ impl Labels {
             store.save_review(name, &review).map_err(fail)?;
         }
         lock(&self.saved).insert(name.to_owned(), labels.clone());
+        if !change.is_empty() {
+            let line = journal::Line::new(deed, &change, store.rig(), masks::person(), masks::now_unix_s());
+            store.append_journal(name, &line).map_err(fail)?;
+        }
         Ok(())
     }
 }

@@ -32,6 +32,7 @@ use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::export::{ExportChoice, Plan};
 use touch2touch::work::job::JobCx;
+use touch2touch::work::labels::Deed;
 use touch2touch::work::models::Wanted;
 use touch2touch::work::prediction::Prediction;
 
@@ -160,7 +161,7 @@ impl DataSource for Source {
         Ok(self.labels.lock().unwrap().get(name).cloned().unwrap_or_default())
     }
 
-    fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError> {
+    fn save_labels(&self, name: &str, labels: &PairLabels, _: &Deed) -> Result<(), TaskError> {
         assert!(!self.damaged.lock().unwrap().contains(name), "a damaged file must not be written over");
         if self.full_disk.load(Ordering::Relaxed) {
             return Err(TaskError::new("Save the labels", "no space left"));

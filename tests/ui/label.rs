@@ -7,8 +7,11 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
 use touch2touch::app::settings::{MaskTool, Workspace};
 use touch2touch::domain::grid::Mask;
+use touch2touch::domain::label::CleanKind;
 use touch2touch::domain::rig::{PadId, lab};
+use touch2touch::io::dataset::Dataset;
 use touch2touch::io::export_unet::check_folder;
+use touch2touch::io::masks::MaskStore;
 
 use super::rig::Rig;
 
@@ -141,4 +144,49 @@ fn an_export_says_what_goes_where_before_it_writes() {
     let state = rig.harness.state().state();
     assert_eq!(state.log.entries.back().unwrap().place.as_deref(), Some(&*folder), "the note leads there");
     assert!(!state.export.asking_masks);
+}
+
+#[test]
+fn undo_and_redo_go_on_where_they_were_after_a_restart() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    let picture = |rig: &Rig| rig.harness.get_by_label("Measured right").rect();
+    let mut masks = vec![rig.mask(lab::RIGHT)];
+    for way in [[[0.2, 0.2], [0.4, 0.3]], [[0.6, 0.6], [0.8, 0.7]], [[0.5, 0.1], [0.9, 0.1]]] {
+        let rect = picture(&rig);
+        rig.drag_over(&way.map(|[x, y]| inside(rect, x, y)));
+        masks.push(rig.mask(lab::RIGHT));
+    }
+    rig.send(LabelsCommand::CleanUp(rig.harness.state().state().settings.mask.clean_up(CleanKind::Grow)));
+    masks.push(rig.mask(lab::RIGHT));
+    rig.send(LabelsCommand::Undo);
+    assert!(masks.windows(2).all(|pair| pair[0] != pair[1]));
+    rig.restart(SIZE);
+    assert_eq!(rig.mask(lab::RIGHT), masks[3]);
+    let names = |rig: &Rig| -> Vec<String> {
+        rig.harness.state().state().history.done().iter().map(|gesture| gesture.name.to_string()).collect()
+    };
+    assert_eq!(names(&rig), ["brush stroke"; 3]);
+    rig.send(LabelsCommand::Redo);
+    assert_eq!(rig.mask(lab::RIGHT), masks[4], "what was taken back before");
+    for mask in masks[..4].iter().rev() {
+        rig.send(LabelsCommand::Undo);
+        assert_eq!(rig.mask(lab::RIGHT), *mask);
+    }
+    assert_eq!(rig.harness.state().state().document.review(rig.harness.state().state().pair_name()), Review::Todo);
+    rig.restart(SIZE);
+    assert!(names(&rig).is_empty());
+    for mask in &masks[1..] {
+        rig.send(LabelsCommand::Redo);
+        assert_eq!(rig.mask(lab::RIGHT), *mask);
+    }
+    // Another program changes the mask: what led elsewhere cannot be taken back any more.
+    let dataset = Dataset::open(&rig.data).unwrap();
+    let name = rig.harness.state().state().pair_name().to_owned();
+    let store = MaskStore::for_dataset(&dataset).unwrap();
+    store.save(&name, lab::RIGHT, None).unwrap();
+    rig.restart(SIZE);
+    assert!(names(&rig).is_empty());
+    assert_eq!(rig.mask(lab::RIGHT), masks[0]);
 }

@@ -1,5 +1,6 @@
 //! The document: labels, review states, accepted poses. Small, reversible, saved by itself.
 
+use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -33,8 +34,23 @@ pub struct Document {
     pub(in crate::app) asked: BTreeMap<String, Revision>,
     /// The stroke being drawn.
     pub stroke: Option<Stroke>,
+    /// What the last change of a mask started from.
+    pub changed: Option<Changed>,
     /// The last revision given out.
     pub(in crate::app) last_revision: u64,
+}
+
+/// The last change of a mask, so that what it did to the pose can be said.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Changed {
+    /// The pair's name.
+    pub pair: String,
+    /// The imprint.
+    pub source: ImprintSource,
+    /// What was done.
+    pub name: Cow<'static, str>,
+    /// The angle before, and its error where the truth is known; radians.
+    pub before: Option<(f64, Option<f64>)>,
 }
 
 /// A stroke between pointer down and pointer up.
@@ -50,6 +66,8 @@ pub struct Stroke {
     pub drawing: Drawing,
     /// The pixels that may change; `None` = all.
     pub(in crate::app) allowed: Option<Mask>,
+    /// The angle before the stroke, as [`Changed::before`].
+    pub(in crate::app) angle: Option<(f64, Option<f64>)>,
     /// The hand mask before the stroke; `None` if there was none.
     pub(in crate::app) before: Option<HandMask>,
     /// The pixels before the stroke, as large as the imprint.

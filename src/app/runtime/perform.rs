@@ -116,7 +116,7 @@ impl Runtime {
                     id,
                     "Save the labels",
                     Box::new(move |_| {
-                        source.save_labels(&save.name, &save.labels)?;
+                        source.save_labels(&save.name, &save.labels, &save.deed)?;
                         Ok(Answer::LabelsSaved(save.name, save.revision))
                     }),
                 );

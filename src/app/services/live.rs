@@ -36,6 +36,7 @@ use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
 use crate::work::job::JobCx;
 use crate::work::labels::Labels;
+use crate::work::labels::{Deed, Past};
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
 use crate::work::tool::tool_file;
@@ -167,8 +168,12 @@ impl DataSource for LiveSource {
         self.labels.load(name)
     }
 
-    fn save_labels(&self, name: &str, labels: &PairLabels) -> Result<(), TaskError> {
-        self.labels.save(name, labels)
+    fn past(&self, name: &str, labels: &PairLabels) -> (Vec<Past>, Vec<Past>) {
+        self.labels.past(name, labels)
+    }
+
+    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
+        self.labels.save(name, labels, deed)
     }
 
     fn plan_masks(&self, changed: &BTreeMap<String, PairLabels>, choice: ExportChoice) -> Result<Plan, TaskError> {
@@ -401,11 +406,11 @@ mod tests {
         let source = open_source(&place).unwrap();
         let name = source.index().pairs[0].name.clone();
         assert!(source.load_labels(&name).unwrap().is_empty());
-        source.save_labels(&name, &labels()).unwrap();
+        source.save_labels(&name, &labels(), &Deed::default()).unwrap();
         let again = LiveServices::with_config_folder(None).open(&place).unwrap();
         assert_eq!(again.reviews[&name], Review::InProgress);
         assert!(same(&again.source.load_labels(&name).unwrap(), &labels()));
-        again.source.save_labels(&name, &PairLabels::default()).unwrap();
+        again.source.save_labels(&name, &PairLabels::default(), &Deed::default()).unwrap();
         assert!(open_source(&place).unwrap().load_labels(&name).unwrap().is_empty());
     }
 
@@ -416,13 +421,13 @@ mod tests {
         let place = Place::Path(folder.path().to_owned());
         let source = open_source(&place).unwrap();
         let name = source.index().pairs[0].name.clone();
-        source.save_labels(&name, &labels()).unwrap();
+        source.save_labels(&name, &labels(), &Deed::default()).unwrap();
         let folder = source.labels.folder().unwrap().to_owned();
         let file = MaskStore::in_folder(folder).mask_file(&name, lab::RIGHT);
         std::fs::write(&file, b"{ half a fi").unwrap();
         let again = open_source(&place).unwrap();
         assert!(again.load_labels(&name).unwrap_err().hint.is_some());
-        assert!(again.save_labels(&name, &labels()).is_err());
+        assert!(again.save_labels(&name, &labels(), &Deed::default()).is_err());
         assert_eq!(std::fs::read(&file).unwrap(), b"{ half a fi");
     }
 
