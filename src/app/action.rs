@@ -442,8 +442,8 @@ impl Action {
             Self::PinStep => inspect(state, |_| true, InspectCommand::Pin),
             Self::OwnStarts => when(state.inspect.start.is_some(), InspectCommand::Start(None)),
             Self::Correspondences => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines)),
-            Self::NextPoseEngine => next_of::<Registration>(&settings.pose_engine)
-                .and_then(|next| does(SettingsCommand::SetPoseEngine(next))),
+            Self::NextPoseEngine => next_of::<Registration>(&settings.pose_engine.by)
+                .and_then(|next| does(SettingsCommand::SetPoseEngine(next.into()))),
 
             Self::LockRange => {
                 does(SettingsCommand::SetRange(ColorRange { locked: !settings.range.locked, ..settings.range }))

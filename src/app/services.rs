@@ -175,7 +175,7 @@ pub trait Services: Send + Sync {
         Vec::new()
     }
 
-    /// Runs the mask model on an imprint in meters; the mask says what it is made of in the end. Called on the same lane as
+    /// Runs the mask model on an imprint in meters, as [`Models::mask`]; the mask says what it is made of in the end. Called on the same lane as
     /// [`Self::predict`].
     ///
     /// # Errors
@@ -185,6 +185,7 @@ pub trait Services: Send + Sync {
         bundle: &BundleInfo,
         runtime: EngineChoice,
         imprint: &DepthMap,
+        probability: Option<f32>,
     ) -> Result<ContactMask, TaskError>;
 
     /// The results table of a data set.

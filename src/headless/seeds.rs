@@ -13,7 +13,7 @@ use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
 use crate::domain::ensemble::{AngleFan, Spread, seeds};
 use crate::domain::grid::DepthMap;
-use crate::domain::pose::{Registration, ToolModel};
+use crate::domain::pose::{RegistrationChoice, ToolModel};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::domain::units::angle_error;
@@ -145,8 +145,8 @@ pub(super) struct PoseFan {
 
 impl PoseFan {
     /// Writes `STEM_ENGINE_fan.png`; nothing where the angles have no mean. `name` is the pair's.
-    pub(super) fn write(&self, stem: &Path, name: &str, engine: Registration) -> anyhow::Result<()> {
-        let file = names::with_ending(stem, &format!("_{}_fan.png", engine.key()));
+    pub(super) fn write(&self, stem: &Path, name: &str, engine: RegistrationChoice) -> anyhow::Result<()> {
+        let file = names::with_ending(stem, &format!("_{}_fan.png", engine.to_string().replace([':', '='], "_")));
         let Some(fan) = &self.fan else { return Ok(()) };
         if let Some(picture) = super::bench::fan::picture(name, fan, self.truth_rad)? {
             images::write_rgb8(&file, &picture)?;
@@ -160,7 +160,7 @@ pub(super) fn fan(
     predictor: &mut Predictor,
     inputs: MaskInputs<'_>,
     tool: &ToolModel,
-    engine: Registration,
+    engine: RegistrationChoice,
     args: &MaskArgs,
     count: u16,
 ) -> anyhow::Result<PoseFan> {

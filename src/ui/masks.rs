@@ -115,7 +115,8 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
             response
                 .on_hover_text("Largest distance to the CAD model at the true pose. Default 1.00; double-click resets");
         }
-        MaskSource::Auto | MaskSource::Unet | MaskSource::Truth => {}
+        MaskSource::Auto | MaskSource::Unet => probability(ui, &mut new.choice),
+        MaskSource::Truth => {}
     }
     if let Err(absent) = cx.state.mask_recipe(finger) {
         ui.label(RichText::new(absent.text()).size(SMALL).color(cx.p.caution));
@@ -137,6 +138,24 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
         );
         ui.add(label.truncate()).on_hover_text("The mask in force on the measured imprint of this finger");
     }
+}
+
+/// From which probability on the mask model's pixels are contact.
+fn probability(ui: &mut Ui, choice: &mut MaskChoice) {
+    /// Where somebody who chooses himself starts.
+    const START: f32 = 0.5;
+    ui.horizontal(|ui| {
+        let mut own = choice.probability.is_some();
+        let tip = "Choose the probability from which a pixel is contact; off, it is as the mask model's bundle says";
+        if ui.checkbox(&mut own, "probability").on_hover_text(tip).changed() {
+            choice.probability = own.then_some(START);
+        }
+        if let Some(least) = &mut choice.probability {
+            ui.spacing_mut().slider_width = (ui.available_width() - 60.0).max(40.0);
+            let slider = egui::Slider::new(least, 0.0..=1.0).fixed_decimals(2);
+            ui.add(slider).accessible_name("Probability").on_hover_text("Least probability of contact, 0 to 1");
+        }
+    });
 }
 
 fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {

@@ -19,7 +19,7 @@ use touch2touch::app::evaluate::ScoreChoice;
 use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{
-    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Request, Revision, ShiftMode, TouchKey,
+    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode, TouchKey,
 };
 use touch2touch::app::labels::{Document, Review};
 use touch2touch::app::library::{Place, Sort};
@@ -39,6 +39,7 @@ use touch2touch::domain::evaluation::Figure;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::hand::{HandAxis, HandPose};
+use touch2touch::domain::pose::Rejection;
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::statistics::ShiftStatistics;
@@ -181,6 +182,16 @@ fn mask() -> impl Strategy<Value = MaskSettings> {
         let choice = MaskChoice { source, top_percent: percent, ..MaskChoice::default() };
         MaskSettings { tool, radius_px, choice, ..MaskSettings::default() }
     })
+}
+
+fn registration() -> impl Strategy<Value = RegistrationChoice> {
+    let rejection = prop_oneof![
+        Just(Rejection::Own),
+        (1e-4..0.02).prop_map(|m| Rejection::gate(m).unwrap()),
+        (0.0..0.8).prop_map(|share| Rejection::trim(share).unwrap()),
+    ];
+    (any_of::<Registration>(), rejection)
+        .prop_map(|(by, rejection)| RegistrationChoice::new(by, rejection).unwrap_or_else(|_| by.into()))
 }
 
 fn form() -> impl Strategy<Value = FigureForm> {
@@ -400,7 +411,7 @@ draws! {
         1 SetMaskOutline(any::<bool>()),
         1 SetMaskOpacity(number()),
         1 SetFootprintVisible(any::<bool>()),
-        1 SetPoseEngine(any_of::<Registration>()),
+        1 SetPoseEngine(registration()),
         1 SetRuntime(any_of::<EngineChoice>()),
         1 SetCacheBudget(any::<u32>()),
         1 SetCamerasLinked(any::<bool>()),

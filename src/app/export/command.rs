@@ -60,7 +60,7 @@ impl State {
         let of_pair = |name: &str| Some(verb(name).option("--pair", self.entry()?.name.clone()));
         let finger = self.finger_name(self.selection.finger).into_owned();
         let side = pane.side().unwrap_or(self.inspect.source);
-        let engine = self.settings.pose_engine.key();
+        let engine = &self.settings.pose_engine;
         let posed = |words: Words, side: ImprintSource| {
             let words = self.mask_words(words.option("--imprint", side.key()).option("--engine", engine));
             if side == ImprintSource::Predicted { self.model_words(words) } else { words }
@@ -156,7 +156,10 @@ impl State {
             MaskSource::Threshold => words.option("--threshold-mm", choice.threshold_m * 1e3),
             MaskSource::TopPercent => words.option("--top-percent", choice.top_percent),
             MaskSource::Cad => words.option("--cad-mm", choice.cad_distance_m * 1e3),
-            MaskSource::Auto | MaskSource::Unet | MaskSource::Truth => words,
+            MaskSource::Auto | MaskSource::Unet => {
+                words.option_if(choice.probability.is_some(), "--probability", choice.probability.unwrap_or_default())
+            }
+            MaskSource::Truth => words,
         };
         match (&self.settings.mask.bundle, self.bundle(BundleKind::Mask)) {
             (Some(_), Ok(bundle)) => words.option("--mask-bundle", bundle.origin.path().display()),

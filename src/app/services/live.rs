@@ -262,8 +262,9 @@ impl Services for LiveServices {
         bundle: &BundleInfo,
         engine: EngineChoice,
         imprint: &DepthMap,
+        probability: Option<f32>,
     ) -> Result<ContactMask, TaskError> {
-        self.models.mask(bundle, engine, imprint)
+        self.models.mask(bundle, engine, imprint, probability)
     }
 
     fn make_case(&self, dataset: &Dataset, setup: &CaseSetup, file: &Path, cx: &JobCx) -> Result<(), TaskError> {

@@ -2,13 +2,13 @@
 
 use clap::Args;
 
-use super::super::args::{DatasetArgs, FingerArg, keyed};
+use super::super::args::{DatasetArgs, FingerArg, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::pose::parse_start;
 use super::super::predict::ModelArgs;
 use super::super::{Common, ToolArgs};
 use crate::domain::frames::PlanarPose;
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::work::labels::{ImprintSource, Review};
 
 /// Arguments of `label`.
@@ -50,8 +50,8 @@ pub(in super::super) struct LabelArgs {
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     pub(super) imprint: ImprintSource,
     /// The registration.
-    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
-    pub(super) engine: Registration,
+    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    pub(super) engine: RegistrationChoice,
     #[command(flatten)]
     pub(super) mask: MaskArgs,
     #[command(flatten)]
