@@ -32,6 +32,7 @@ use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::job::JobCx;
 use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
+use crate::work::sweep::{self, Sweep, SweepSetup};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
@@ -202,6 +203,14 @@ pub trait Services: Send + Sync {
     /// As [`evaluate::known`].
     fn known_scores(&self, dataset: &Dataset, setup: &Setup) -> Result<Vec<Scores>, TaskError> {
         evaluate::known(dataset, setup, &Models::new(None))
+    }
+
+    /// Turns a dial over pairs of a data set.
+    ///
+    /// # Errors
+    /// As [`sweep::sweep`].
+    fn sweep(&self, dataset: &Dataset, setup: &SweepSetup, cx: &JobCx) -> Result<Sweep, TaskError> {
+        sweep::sweep(dataset, setup, &Models::new(None), cx)
     }
 
     /// Fits a generator to pairs; the new bundle, where one is kept.

@@ -137,7 +137,8 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
             let usable = pair.and_then(|pair| {
                 let tool = tools.entry(pair.tool.clone());
                 let tool = tool.or_insert_with(|| load_tool(dataset, &pair.tool).map(|(tool, _)| tool));
-                let why = |err: &TaskError| Remark { name: pair.name.clone(), why: format!("{}: {}", err.what, err.why) };
+                let why =
+                    |err: &TaskError| Remark { name: pair.name.clone(), why: format!("{}: {}", err.what, err.why) };
                 tool.as_ref().map(drop).map_err(why).map(|()| pair)
             });
             match usable {
@@ -309,8 +310,10 @@ impl<'a> Job<'a> {
                 pair.sample.pads.entries().filter_map(move |(pad, touch)| Some((at, pad, touch.picture(input)?)))
             })
             .collect();
-        let wanted: Vec<Wanted<'_>> =
-            touches.iter().map(|(.., picture)| Wanted { difference: picture, seed: config.seed, size: [0, 0] }).collect();
+        let wanted: Vec<Wanted<'_>> = touches
+            .iter()
+            .map(|(.., picture)| Wanted { difference: picture, seed: config.seed, size: [0, 0] })
+            .collect();
         let run = |wanted: &[Wanted<'_>]| {
             let made = caught(|| self.models.predict(bundle, self.setup.engine, config, wanted, &self.cx.quiet()));
             made.unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message)))
@@ -368,7 +371,8 @@ impl<'a> Job<'a> {
                 None => {
                     let work = || self.outcome(pair, tool, turn, once.clone().unwrap_or_else(|| points(at)));
                     caught(work).unwrap_or_else(|message| {
-                        let why = format!("an internal error, which is a bug: {message}; please report it with this pair");
+                        let why =
+                            format!("an internal error, which is a bug: {message}; please report it with this pair");
                         Outcome::failed(pair.id, pair.name.clone(), why)
                     })
                 }

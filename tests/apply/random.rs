@@ -11,15 +11,17 @@ use proptest::strategy::Union;
 use strum::IntoEnumIterator;
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, Hover, InspectCommand,
-    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest,
-    ViewCommand, WorkbenchCommand,
+    AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
+    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
+    UiRequest, ViewCommand, WorkbenchCommand,
 };
+use touch2touch::app::dial::DialPairs;
 use touch2touch::app::evaluate::ScoreChoice;
 use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{
-    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode, TouchKey,
+    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode,
+    TouchKey,
 };
 use touch2touch::app::labels::{Document, Review};
 use touch2touch::app::library::{Place, Sort};
@@ -49,6 +51,7 @@ use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
 use touch2touch::work::subject::Subject;
+use touch2touch::work::sweep::{Dial, InForce, Setting, Sweep};
 
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;
@@ -192,6 +195,14 @@ fn registration() -> impl Strategy<Value = RegistrationChoice> {
     ];
     (any_of::<Registration>(), rejection)
         .prop_map(|(by, rejection)| RegistrationChoice::new(by, rejection).unwrap_or_else(|_| by.into()))
+}
+
+fn setting() -> impl Strategy<Value = Setting> {
+    let settings = any_of::<Dial>().prop_map(|dial| {
+        let (first, last, count) = dial.usual();
+        dial.spread(first, last, count).unwrap()
+    });
+    (settings, any::<usize>()).prop_map(|(settings, at)| settings[at % settings.len()])
 }
 
 fn form() -> impl Strategy<Value = FigureForm> {
@@ -379,6 +390,14 @@ draws! {
         1 All,
         1 Export(Just(PathBuf::from("table"))),
     }
+    dial: DialCommand {
+        1 Choose(any_of::<Dial>()),
+        1 Range([number(), number()].prop_map(|ends| ends.map(f64::from)), any::<usize>()),
+        1 Over(select(DialPairs::OFFERED.to_vec())),
+        1 Predictions(any::<bool>()),
+        2 Start,
+        2 Use(setting()),
+    }
     export: ExportCommand {
         1 Ask(any::<bool>()),
         1 SetForm(form()),
@@ -459,7 +478,24 @@ draws! {
         1 SettingsSaved,
         1 JobFailed(error()),
         1 Evaluated(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(evaluation()))),
+        1 Swept(ticket(), Just(()).prop_map(|()| Arc::new(swept()))),
         1 Adapted(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(adapted())), Just(None)),
+    }
+}
+
+fn swept() -> Sweep {
+    Sweep {
+        dataset: "elsewhere".into(),
+        dial: Dial::Gate,
+        unit: Dial::Gate.unit(),
+        at: None,
+        in_force: InForce::default(),
+        series: Vec::new(),
+        left_out: Vec::new(),
+        notes: Vec::new(),
+        pairs: 0,
+        complete: false,
+        seconds: 0.0,
     }
 }
 
@@ -495,6 +531,7 @@ fn command() -> impl Strategy<Value = Command> {
         (3, inspect().boxed()),
         (4, workbench().boxed()),
         (2, evaluate().boxed()),
+        (2, dial().boxed()),
         (1, export().boxed()),
         (1, adapt().boxed()),
         (8, settings().boxed()),
@@ -509,6 +546,7 @@ fn command() -> impl Strategy<Value = Command> {
             | Command::Inspect(_)
             | Command::Workbench(_)
             | Command::Evaluate(_)
+            | Command::Dial(_)
             | Command::Export(_)
             | Command::Adapt(_) => {}
             Command::Settings(_) | Command::Tasks(_) | Command::Answer(_) => {}

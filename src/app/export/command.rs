@@ -1,5 +1,6 @@
 //! The command that does in a shell what a pane shows: [`State::equivalent`].
 
+use super::super::dial::DialPairs;
 use super::super::keys::{ImprintSource, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use super::super::pane::{Kind, Pane};
@@ -10,6 +11,7 @@ use crate::infer::engine::EngineChoice;
 use crate::work::bundles::BundleKind;
 use crate::work::mask::MaskSource;
 use crate::work::subject::{Subject, Wish};
+use crate::work::sweep::Setting;
 
 /// The words of a command line.
 struct Words(Vec<String>);
@@ -115,6 +117,20 @@ impl State {
                 words = words.option_if(grasps.is_some(), "--grasps", grasps.unwrap_or(1));
                 let words = if self.table.published { words.word("--paper") } else { words };
                 self.mask_words(words.option("--engine", engine))
+            }
+            (Pane::Dial, _) => {
+                let dial = &self.dial;
+                let values = dial.dial.spread(dial.range[0], dial.range[1], dial.count).ok()?;
+                let values: Vec<String> = values.into_iter().map(Setting::key).collect();
+                let words = verb("sweep").option("--dial", dial.dial.key()).option("--values", values.join(","));
+                let words = match dial.pairs {
+                    DialPairs::All => words,
+                    DialPairs::Spread(count) => words.option("--pairs", count),
+                    // The verb does not know the list.
+                    DialPairs::Listed => return None,
+                };
+                let words = if dial.predictions { words } else { words.word("--measured-only") };
+                self.model_words(self.mask_words(words.option("--engine", engine)))
             }
             (Pane::Adapt, _) => {
                 let words = verb("adapt").option("--out", "fitted");

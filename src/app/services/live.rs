@@ -38,6 +38,7 @@ use crate::work::job::JobCx;
 use crate::work::labels::Labels;
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
+use crate::work::sweep::{self, Sweep, SweepSetup};
 use crate::work::tool::tool_file;
 
 /// Longer than a key that is held down leaves a pair on screen.
@@ -236,6 +237,10 @@ impl Services for LiveServices {
 
     fn known_scores(&self, dataset: &Dataset, setup: &Setup) -> Result<Vec<Scores>, TaskError> {
         evaluate::known(dataset, setup, &self.models)
+    }
+
+    fn sweep(&self, dataset: &Dataset, setup: &SweepSetup, cx: &JobCx) -> Result<Sweep, TaskError> {
+        sweep::sweep(dataset, setup, &self.models, cx)
     }
 
     fn adapt(

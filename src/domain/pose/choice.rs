@@ -280,7 +280,8 @@ mod tests {
         let tool = ToolModel::new(cross()).unwrap();
         let pose = PlanarPose { theta_rad: 0.2, y_m: 0.002, z_m: -0.001 };
         let yz = cross_contacts(600, pose, 2e-3, 5);
-        let points: Vec<_> = yz.iter().enumerate().map(|(i, p)| glam::DVec3::new((i % 7) as f64 * 1e-3, p.x, p.y)).collect();
+        let points: Vec<_> =
+            yz.iter().enumerate().map(|(i, p)| glam::DVec3::new((i % 7) as f64 * 1e-3, p.x, p.y)).collect();
         let (mut gates, mut trims) = (0, 0);
         for by in Registration::iter() {
             let own = register(&points, &tool, by, false).unwrap();

@@ -78,6 +78,25 @@ impl Dial {
         }
     }
 
+    /// The numbers that make sense, in the dial's unit.
+    pub fn limits(self) -> std::ops::RangeInclusive<f64> {
+        match self {
+            Self::Threshold => -100.0..=100.0,
+            Self::Probability => 0.0..=1.0,
+            Self::Trim => 0.0..=0.9,
+            Self::Gate => 0.01..=50.0,
+            Self::Shift => 0.0..=0.0,
+        }
+    }
+
+    /// By how much it is turned at once, in its unit.
+    pub fn step(self) -> f64 {
+        match self {
+            Self::Threshold | Self::Gate => 0.05,
+            Self::Probability | Self::Trim | Self::Shift => 0.01,
+        }
+    }
+
     /// A value from its number, in the dial's unit.
     ///
     /// # Errors
@@ -278,7 +297,13 @@ mod tests {
             let why = dial.parse(text).unwrap_err();
             assert!(why.contains(word), "{dial:?} {text}: {why}");
         }
-        assert!(Dial::Gate.parse("2").unwrap().put(InForce { registration: Registration::LabIcp.into(), ..InForce::default() }).is_err());
+        assert!(
+            Dial::Gate
+                .parse("2")
+                .unwrap()
+                .put(InForce { registration: Registration::LabIcp.into(), ..InForce::default() })
+                .is_err()
+        );
     }
 
     #[test]

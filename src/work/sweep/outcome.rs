@@ -161,12 +161,7 @@ pub struct Series {
 
 impl Series {
     /// From the outcomes of each pair: as in force, then with each value.
-    pub(super) fn new(
-        source: ImprintSource,
-        rows: Vec<Vec<Outcome>>,
-        setup: &SweepSetup,
-        at: Option<Setting>,
-    ) -> Self {
+    pub(super) fn new(source: ImprintSource, rows: Vec<Vec<Outcome>>, setup: &SweepSetup, at: Option<Setting>) -> Self {
         let mut columns: Vec<Vec<Outcome>> = vec![Vec::new(); setup.values.len() + 1];
         for row in rows {
             columns.iter_mut().zip(row).for_each(|(column, outcome)| column.push(outcome));
@@ -190,5 +185,84 @@ impl Series {
     /// Whether the truth of some pair is known.
     pub fn has_truth(&self) -> bool {
         self.base.summary.angle.is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::infer::engine::EngineChoice;
+    use crate::work::sweep::{Dial, InForce};
+
+    fn outcome(truth: bool, error_deg: Option<f64>, points: usize) -> Outcome {
+        let radians = error_deg.map(f64::to_radians);
+        Outcome {
+            truth,
+            angle_rad: radians,
+            error_rad: radians.filter(|_| truth),
+            rms_m: radians.map(|_| 2e-4),
+            points,
+            failure: error_deg.is_none().then(|| format!("{points} usable contact points are too few")),
+            ..Outcome::failed(PairId(points as u32), format!("p{points}"), String::new())
+        }
+    }
+
+    fn series(rows: Vec<Vec<Outcome>>) -> Series {
+        let setup = SweepSetup {
+            values: Dial::Threshold.spread(2.0, 4.0, 3).unwrap(),
+            pairs: Vec::new(),
+            in_force: InForce::default(),
+            mask_model: None,
+            generator: None,
+            hand: false,
+            engine: EngineChoice::default(),
+        };
+        let rows = rows.into_iter().map(|mut row| {
+            let base = row[0].angle_rad;
+            row.iter_mut().for_each(|one| one.set_change(base));
+            row
+        });
+        Series::new(ImprintSource::Measured, rows.collect(), &setup, Some(setup.values[1]))
+    }
+
+    #[test]
+    fn few_pairs_that_survive_do_not_make_a_value_the_best() {
+        let row = |errors: [Option<f64>; 4]| errors.map(|deg| outcome(true, deg, 7)).to_vec();
+        let found = series(vec![
+            row([Some(1.0), Some(2.0), Some(1.0), Some(0.1)]),
+            row([Some(1.0), Some(3.0), Some(4.0), None]),
+            row([Some(1.0), Some(9.0), Some(4.0), None]),
+        ]);
+        assert_eq!((found.best, found.has_truth()), (Some(1), true));
+        assert_eq!(found.points.iter().map(|p| p.in_force).collect::<Vec<_>>(), [false, true, false]);
+        let last = &found.points[2].summary;
+        assert_eq!(
+            (last.failed, last.angle.unwrap().failed, last.angle.unwrap().median_deg),
+            (2, 2, Some(0.1_f64.to_radians().to_degrees()))
+        );
+        assert!((last.angle.unwrap().success_5 - 100.0 / 3.0).abs() < 1e-9);
+        let json = serde_json::to_value(&found).unwrap();
+        assert_eq!((&json["points"][1]["value"], &json["base"]["value"]), (&3.0.into(), &serde_json::Value::Null));
+        assert!((json["points"][0]["cases"][2]["change_deg"].as_f64().unwrap() - 8.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn without_a_truth_there_is_no_best_but_residual_and_change() {
+        let row = |errors: [Option<f64>; 4]| errors.map(|deg| outcome(false, deg, 7)).to_vec();
+        let found = series(vec![row([Some(1.0), Some(2.0), Some(1.0), None]), row([None, Some(3.0), Some(4.0), None])]);
+        assert!(found.best.is_none() && !found.has_truth());
+        let first = &found.points[0].summary;
+        assert!(
+            (first.median_change_rad.unwrap().to_degrees() - 1.0).abs() < 1e-9,
+            "where nothing is in force there is no change"
+        );
+        assert_eq!((first.median_rms_m, first.angle), (Some(2e-4), None));
+        assert_eq!(
+            found.points[2].summary.failures,
+            [Failure { why: "7 usable contact points are too few".into(), count: 2 }]
+        );
+        // No pair at all is said as such, not as a number.
+        let none = series(Vec::new());
+        assert_eq!((none.points.len(), none.points[0].summary.median_points, none.best), (3, None, None));
     }
 }
