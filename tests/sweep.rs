@@ -117,7 +117,7 @@ fn an_absurd_threshold_shows() {
     assert!(better.success_5 > 80.0 && better.failed == 0, "{better:?}");
     // All of the membrane is no contact: the poses are worse, or there are none.
     assert!(worse.success_5 < better.success_5 - 20.0, "{worse:?} against {better:?}");
-    assert!(all.median_points.unwrap() > 4.0 * right.median_points.unwrap());
+    assert!(all.median_points.unwrap() > 1.5 * right.median_points.unwrap());
     // Nothing is pushed in by 50 mm.
     assert_eq!((none.failed, none.angle.unwrap().success_5, none.angle.unwrap().median_deg), (6, 0.0, None));
     assert_eq!(

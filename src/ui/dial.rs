@@ -44,13 +44,17 @@ fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
         (Some(_), _) => {
             ("The plots appear when all pairs are done".to_owned(), "Cancel keeps those done until then".to_owned())
         }
-        (None, Some(why)) => ("This dial cannot be turned now".to_owned(), why),
+        (None, Some(why)) => {
+            let rejects = matches!(cx.state.dial.dial, Dial::Trim | Dial::Gate);
+            let where_to = if rejects { ". The Metrics pane chooses the registration" } else { "" };
+            ("This dial cannot be turned now".to_owned(), format!("{why}{where_to}"))
+        }
         (None, None) => {
             let text = "Each value of the dial over the same pairs: one small plot for each, with a dot for every pair";
             ("Not turned yet".to_owned(), text.to_owned())
         }
     };
-    let action = Action::TurnDial.command(cx.state).map(|_| ("Turn the dial", Action::TurnDial.tooltip()));
+    let action = Action::TurnDial.command(cx.state).map(|_| ("Run", Action::TurnDial.tooltip()));
     if empty::show(ui, &what, &why, action) {
         cx.act(Action::TurnDial);
     }

@@ -102,6 +102,13 @@ struct Pair {
     labels: Option<PairLabels>,
 }
 
+impl Pair {
+    fn failed(&self, why: String) -> Outcome {
+        let truth = self.sample.grasp_from_object.is_some();
+        Outcome { truth, ..Outcome::failed(self.id, self.name.clone(), why) }
+    }
+}
+
 /// The imprints of a pair by one source under one shift, with the mask model's probabilities where they are needed.
 struct Felt {
     imprints: PerPad<DepthMap>,
@@ -114,6 +121,9 @@ struct Side {
     felt: Vec<Result<Felt, String>>,
 }
 
+/// The predictions of a pair, or why there are none.
+type Made = Result<PerPad<Prediction>, String>;
+
 /// Turns a dial over the pairs of `setup`. Predictions are taken from `models`, where they are kept too. Stops early when
 /// told to, with the pairs that were done.
 ///
@@ -125,7 +135,7 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
     let job = Job::new(dataset, setup, models, cx)?;
     let (mut left_out, mut tools) = (Vec::new(), BTreeMap::new());
     let mut rows: BTreeMap<ImprintSource, Vec<Vec<Outcome>>> = BTreeMap::new();
-    let (mut done, total) = (0, setup.pairs.len());
+    let (mut done, mut posed, total) = (0, 0, setup.pairs.len());
     for ids in setup.pairs.chunks(BATCH) {
         if cx.cancel.is_cancelled() {
             break;
@@ -160,8 +170,15 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
         if cx.cancel.is_cancelled() {
             break;
         }
-        for (source, row) in found.into_iter().flatten() {
-            rows.entry(source).or_default().push(row);
+        for (pair, found) in pairs.iter().zip(found) {
+            if found.is_empty() {
+                let why = "it has neither a measured imprint nor a picture to predict one from".to_owned();
+                left_out.push(Remark { name: pair.name.clone(), why });
+            }
+            posed += usize::from(!found.is_empty());
+            for (source, row) in found {
+                rows.entry(source).or_default().push(row);
+            }
         }
         done += ids.len();
         cx.progress(done as u64, total as u64, format!("{done} of {total} pairs"));
@@ -189,7 +206,7 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
         at: job.at,
         in_force: setup.in_force,
         series,
-        pairs: done - left_out.len(),
+        pairs: posed,
         left_out,
         notes,
         complete: done == total,
@@ -299,7 +316,7 @@ impl<'a> Job<'a> {
     }
 
     /// The predictions of each pair, or why there are none; `None` where there is nothing to start from.
-    fn predictions(&self, pairs: &[Pair]) -> Result<Vec<Option<Result<PerPad<Prediction>, String>>>, TaskError> {
+    fn predictions(&self, pairs: &[Pair]) -> Result<Vec<Option<Made>>, TaskError> {
         let Some((bundle, config)) = &self.setup.generator else { return Ok(Vec::new()) };
         let ends = bundle.ends(&self.dataset.rig).ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
         let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
@@ -328,7 +345,7 @@ impl<'a> Job<'a> {
             Err(err) if err.is_cancelled() => return Ok(Vec::new()),
             Err(_) => wanted.iter().map(one).collect(),
         };
-        let mut out: Vec<Option<Result<PerPad<Prediction>, String>>> = pairs.iter().map(|_| None).collect();
+        let mut out: Vec<Option<Made>> = pairs.iter().map(|_| None).collect();
         for ((at, pad, _), made) in touches.iter().zip(made) {
             let slot = out[*at].get_or_insert_with(|| Ok(PerPad::default()));
             match (made, slot) {
@@ -357,9 +374,12 @@ impl<'a> Job<'a> {
 
     /// The pose of a pair without the dial, and with each value.
     fn outcomes(&self, pair: &Pair, tool: &ToolModel, felt: &[Result<Felt, String>]) -> Vec<Outcome> {
+        let bug =
+            |message: String| format!("an internal error, which is a bug: {message}; please report it with this pair");
         let points = |at: usize| {
             let felt = felt.get(at).or(felt.first()).ok_or("there is no imprint")?;
-            self.points(pair, tool, felt.as_ref().map_err(Clone::clone)?, at)
+            let felt = felt.as_ref().map_err(Clone::clone)?;
+            caught(|| self.points(pair, tool, felt, at)).unwrap_or_else(|message| Err(bug(message)))
         };
         // A gate does not move a contact point.
         let once = matches!(self.dial, Dial::Gate | Dial::Trim).then(|| points(0));
@@ -369,12 +389,9 @@ impl<'a> Job<'a> {
             let outcome = match same {
                 Some(same) => all[same].clone(),
                 None => {
-                    let work = || self.outcome(pair, tool, turn, once.clone().unwrap_or_else(|| points(at)));
-                    caught(work).unwrap_or_else(|message| {
-                        let why =
-                            format!("an internal error, which is a bug: {message}; please report it with this pair");
-                        Outcome::failed(pair.id, pair.name.clone(), why)
-                    })
+                    let points = once.clone().unwrap_or_else(|| points(at));
+                    let found = caught(|| self.outcome(pair, tool, turn, points));
+                    found.unwrap_or_else(|message| pair.failed(bug(message)))
                 }
             };
             all.push(outcome);
@@ -415,7 +432,7 @@ impl<'a> Job<'a> {
         let truth = pair.sample.grasp_from_object;
         let (points, hand) = match points {
             Ok(found) => found,
-            Err(why) => return Outcome { truth: truth.is_some(), ..Outcome::failed(pair.id, pair.name.clone(), why) },
+            Err(why) => return pair.failed(why),
         };
         let found = pose(&points, tool, &*turn.registration.method(), Ask::default(), truth);
         let answer = found.as_ref().ok();

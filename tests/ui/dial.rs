@@ -55,7 +55,7 @@ fn a_dial_is_turned_a_dot_opens_its_pair_and_a_value_is_put_in_force() {
     let other = points.cases.iter().find(|case| case.pair != best.pair).unwrap().pair;
     rig.send(LibraryCommand::Select(other));
     for step in 0..60 {
-        let at = egui::pos2(plot.left() + 3.0 + 4.0 * step as f32, plot.top() + 67.0);
+        let at = egui::pos2(plot.left() + 3.0 + 3.0 * step as f32, plot.top() + 51.0);
         rig.harness.hover_at(at);
         rig.harness.step();
         rig.harness.drag_at(at);

@@ -16,9 +16,9 @@ const COLUMNS: usize = 24;
 /// Errors beyond this share the last column, degrees.
 const MOST_DEG: f64 = 30.0;
 /// Least width of a small plot with its frame, points.
-const CELL: f32 = 196.0;
+const CELL: f32 = 146.0;
 /// Height of a small plot without its texts, points.
-const HEIGHT: f32 = 74.0;
+const HEIGHT: f32 = 58.0;
 /// Between two of them, points.
 const GAP: f32 = 8.0;
 /// Largest radius of a dot, points.
@@ -26,7 +26,9 @@ const DOT: f32 = 3.0;
 /// How near the pointer has to come to a dot, points.
 const NEAR: f32 = 6.0;
 /// Height of the line plot, points.
-const LINE_HEIGHT: f32 = 96.0;
+const LINE_HEIGHT: f32 = 88.0;
+/// From this width on a small plot says how many contact points there are, points.
+const WIDE: f32 = 200.0;
 
 /// Where a pair stands, degrees: at its error, or without a truth at its change.
 fn place_deg(series: &Series, outcome: &Outcome) -> Option<f64> {
@@ -76,9 +78,13 @@ impl Axes {
     }
 }
 
-/// A value's name in the plots.
+/// A value's name in the plots: short.
 fn name(value: Option<Setting>) -> String {
-    value.map_or_else(|| "as set".to_owned(), Setting::label)
+    match value {
+        None => "as set".to_owned(),
+        Some(shift @ Setting::Shift(_)) => shift.key(),
+        Some(value) => value.label(),
+    }
 }
 
 fn small() -> FontId {
@@ -104,7 +110,7 @@ pub(super) fn multiples(cx: &mut Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Se
         ui.horizontal_top(|ui| {
             for (at, point) in row {
                 let best = at.is_some() && *at == series.best;
-                ui.allocate_ui(vec2(width, HEIGHT + 72.0), |ui| {
+                ui.allocate_ui(vec2(width, HEIGHT + 54.0), |ui| {
                     ui.vertical(|ui| cell(cx, ui, (found, series), point, best, (&axes, width)));
                 });
             }
@@ -127,14 +133,24 @@ fn cell(
         None => cx.state.in_force() == found.in_force,
     };
     ui.horizontal(|ui| {
+        ui.set_width(width);
         ui.label(RichText::new(name(point.value)).family(medium()).color(cx.p.strong));
         if dialed && point.value.is_some() {
             ui.label(RichText::new("in force").size(SMALL).color(cx.p.accent)).on_hover_text("What decides poses now");
         }
         if best {
-            let tip = "Most pairs within 5°, then within 10°, then the least median";
+            let tip = "The best of these values: most pairs within 5°, then within 10°, then the least median";
             ui.label(RichText::new("best").size(SMALL).color(cx.p.good)).on_hover_text(tip);
         }
+        let Some(value) = point.value.filter(|value| !dialed && value.put(cx.state.in_force()).is_ok()) else { return };
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let button = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).small());
+            let button = button.accessible_name(format!("Use {}", value.label()));
+            let tip = format!("Use this value: {} decides all poses from now on", value.label());
+            if button.on_hover_text(tip).clicked() {
+                cx.push(DialCommand::Use(value));
+            }
+        });
     });
     let stroke = match (best, dialed) {
         (_, true) => Stroke::new(1.5, cx.p.accent),
@@ -142,25 +158,20 @@ fn cell(
         (false, false) => Stroke::new(1.0, cx.p.line),
     };
     dots(cx, ui, series, point, axes, (width, stroke));
-    let (text, more) = in_sum(series, point);
+    let (text, more) = in_sum(series, point, width >= WIDE);
     ui.add(egui::Label::new(RichText::new(text).size(SMALL).color(cx.p.text)).truncate()).on_hover_text(more);
-    if let Some(value) = point.value {
-        let useful = !dialed && value.put(cx.state.in_force()).is_ok();
-        let button = ui.add_enabled(useful, egui::Button::new(RichText::new("Use this value").size(SMALL)));
-        let button = button.accessible_name(format!("Use {}", value.label()));
-        let tip = format!("Put {} in force, for all poses", value.label());
-        if button.on_hover_text(tip).on_disabled_hover_text("It is in force").clicked() {
-            cx.push(DialCommand::Use(value));
-        }
-    }
 }
 
 /// A line about all pairs of a value, and all there is to say.
-fn in_sum(series: &Series, point: &Point) -> (String, String) {
+fn in_sum(series: &Series, point: &Point, wide: bool) -> (String, String) {
     let s = &point.summary;
     let mut parts = Vec::new();
-    let mut more =
-        vec![format!("{}, {} imprints, {} pairs", name(point.value), series.source.key(), point.cases.len())];
+    let mut more = vec![format!(
+        "{}, {} imprints, {} pairs",
+        point.value.map_or(name(None), Setting::label),
+        series.source.key(),
+        point.cases.len()
+    )];
     if let Some(angle) = &s.angle {
         let median = angle.median_deg.map_or("no pose".to_owned(), |deg| format!("median {deg:.2}°"));
         parts.push(format!("{median}   ≤5° {:.0} %", angle.success_5));
@@ -181,7 +192,7 @@ fn in_sum(series: &Series, point: &Point) -> (String, String) {
     more.extend(change.map(|text| format!("median {text} against what was in force")));
     more.extend(rms.map(|text| format!("median {text}")));
     if let Some(points) = s.median_points {
-        parts.push(format!("{points:.0} pts"));
+        parts.extend(wide.then(|| format!("{points:.0} pts")));
         more.push(format!("median of {points:.0} contact points"));
     }
     for failure in &s.failures {
@@ -238,7 +249,7 @@ fn dots(cx: &mut Cx<'_>, ui: &mut Ui, series: &Series, point: &Point, axes: &Axe
             }
         }
     }
-    let (text, _) = in_sum(series, point);
+    let (text, _) = in_sum(series, point, true);
     let label = format!("Pairs at {}: {text}", name(point.value));
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
     let Some((_, center, case)) = near else { return };
@@ -265,30 +276,49 @@ fn said(case: &Outcome) -> String {
     lines.join("\n")
 }
 
-/// What is drawn over the values: a name, its unit, a color, the value of each point, and the top of its axis.
-type Track = (&'static str, &'static str, Color32, Vec<Option<f64>>, f64);
+/// What is drawn over the values.
+struct Track {
+    name: &'static str,
+    unit: &'static str,
+    color: Color32,
+    /// Of each point.
+    values: Vec<Option<f64>>,
+    /// Without the dial.
+    base: Option<f64>,
+    /// Top of its axis.
+    top: f64,
+}
+
+impl Track {
+    fn new(
+        series: &Series,
+        (name, unit, color): (&'static str, &'static str, Color32),
+        get: impl Fn(&Point) -> Option<f64>,
+    ) -> Self {
+        let (values, base) = (series.points.iter().map(&get).collect::<Vec<_>>(), get(&series.base));
+        let finite = values.iter().chain([&base]).flatten().copied().filter(|v| v.is_finite());
+        let top = finite.fold(0.0, f64::max).max(1e-9);
+        Self { name, unit, color, values, base, top }
+    }
+}
 
 /// Success and median over the value.
 pub(super) fn line(cx: &Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Series) {
     let p = cx.p;
     let side = side_color(p, series.source);
-    let of = |get: &dyn Fn(&Point) -> Option<f64>| series.points.iter().map(get).collect::<Vec<_>>();
-    let top = |values: &[Option<f64>]| {
-        values.iter().flatten().copied().filter(|v| v.is_finite()).fold(0.0, f64::max).max(1e-9)
-    };
-    let median = of(&|point| match &point.summary.angle {
+    let what = if series.has_truth() { "median error" } else { "median change" };
+    let median = |point: &Point| match &point.summary.angle {
         Some(angle) => angle.median_deg,
         None => point.summary.median_change_rad.map(f64::to_degrees),
-    });
-    let what = if series.has_truth() { "median error" } else { "median change" };
-    let mut tracks: Vec<Track> = vec![(what, "°", side, median.clone(), top(&median))];
-    if series.has_truth() {
-        let success = of(&|point| point.summary.angle.map(|angle| angle.success_5));
-        tracks.push(("within 5°", " %", p.good, success, 100.0));
+    };
+    let second = if series.has_truth() {
+        let success = |point: &Point| point.summary.angle.map(|angle| angle.success_5);
+        Track { top: 100.0, ..Track::new(series, ("within 5°", " %", p.good), success) }
     } else {
-        let rms = of(&|point| point.summary.median_rms_m.map(|m| m * 1e3));
-        tracks.push(("median residual", " mm", p.cad, rms.clone(), top(&rms)));
-    }
+        let rms = |point: &Point| point.summary.median_rms_m.map(|m| m * 1e3);
+        Track::new(series, ("median residual", " mm", p.cad), rms)
+    };
+    let tracks = [Track::new(series, (what, "°", side), median), second];
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width() - 12.0, LINE_HEIGHT), Sense::hover());
     let painter = ui.painter_at(rect);
     let plot = Rect::from_min_max(rect.min + vec2(52.0, 16.0), rect.max - vec2(52.0, 16.0));
@@ -304,10 +334,15 @@ pub(super) fn line(cx: &Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Series) {
             painter.vline(x(at), plot.y_range(), Stroke::new(1.5, p.accent));
         }
     }
-    for (i, (name, unit, color, values, top)) in tracks.iter().enumerate() {
-        let runs = values.split(Option::is_none);
+    let standing = series.points.iter().any(|point| point.in_force);
+    for (i, Track { name, unit, color, values, base, top }) in tracks.iter().enumerate() {
+        // Where the dial stands at none of the values, what is in force is a level of its own.
+        if let Some(base) = base.filter(|base| !standing && base.is_finite()) {
+            let ends = [plot.left(), plot.right()].map(|x| pos2(x, y(base, *top)));
+            painter.extend(Shape::dashed_line(&ends, Stroke::new(1.0, *color), 4.0, 4.0));
+        }
         let mut at = 0;
-        for run in runs {
+        for run in values.split(Option::is_none) {
             let points: Vec<Pos2> =
                 run.iter().flatten().enumerate().map(|(i, value)| pos2(x(at + i), y(*value, *top))).collect();
             for center in &points {
@@ -327,13 +362,12 @@ pub(super) fn line(cx: &Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Series) {
             let text = format!("{value:.*}{unit}", if value == 0.0 { 0 } else { digits });
             painter.text(pos2(edge, y(value, *top)), align, text, small(), *color);
         }
+        let dashed = if standing { "" } else { ", dashed: as set" };
         let corner = if i == 0 { pos2(plot.left(), rect.top()) } else { pos2(plot.right(), rect.top()) };
-        painter.text(corner, ends, format!("{name} of the pairs"), small(), *color);
+        painter.text(corner, ends, format!("{name}{dashed}"), small(), *color);
     }
-    if let Some(best) = series.best {
-        if let Some(value) = tracks[0].3[best] {
-            painter.circle_stroke(pos2(x(best), y(value, tracks[0].4)), 5.0, Stroke::new(1.5, p.good));
-        }
+    if let Some((best, value)) = series.best.and_then(|best| Some((best, tracks[0].values[best]?))) {
+        painter.circle_stroke(pos2(x(best), y(value, tracks[0].top)), 5.0, Stroke::new(1.5, p.good));
     }
     // As many names as there is room for.
     let every = (series.points.len() as f32 * 76.0 / plot.width().max(1.0)).ceil().max(1.0) as usize;
@@ -345,6 +379,6 @@ pub(super) fn line(cx: &Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Series) {
     let Some(pointer) = response.hover_pos() else { return };
     let near = (0..series.points.len()).min_by(|a, b| (x(*a) - pointer.x).abs().total_cmp(&(x(*b) - pointer.x).abs()));
     if let Some(point) = near.map(|at| &series.points[at]) {
-        response.on_hover_text_at_pointer(in_sum(series, point).1);
+        response.on_hover_text_at_pointer(in_sum(series, point, true).1);
     }
 }

@@ -70,7 +70,7 @@ impl Dial {
     /// Where somebody who never turned it starts: first, last and how many values.
     pub fn usual(self) -> (f64, f64, usize) {
         match self {
-            Self::Threshold => (2.0, 9.0, 8),
+            Self::Threshold => (3.0, 12.0, 10),
             Self::Probability => (0.1, 0.9, 9),
             Self::Trim => (0.0, 0.5, 6),
             Self::Gate => (0.5, 4.0, 8),
