@@ -4,7 +4,7 @@
 //! * [`command::Command`] is what can happen to it, by room; [`apply::apply`] is the only writer and is pure:
 //!   work and files come out as [`effect::Effect`]s.
 //! * A room is a feature ([`library`], [`follow`], [`view`], [`predict`], [`seeds`], [`labels`], [`inspect`],
-//!   [`workbench`], [`evaluate`], [`export`], [`adapt`], [`settings`], [`tasks`]): its file has its commands and what they do,
+//!   [`workbench`], [`evaluate`], [`export`], [`adapt`], [`dial`], [`settings`], [`tasks`]): its file has its commands and what they do,
 //!   `state.rs` in its folder what it keeps and how views find it.
 //! * [`results`] is the table of what is computed: each kind with its recipe, its job and its look-up in one file.
 //! * [`pane`] is the table of the panes: titles, places, which file of the window draws each and what it needs.
@@ -18,6 +18,7 @@ pub mod adapt;
 pub mod answers;
 pub mod apply;
 pub mod command;
+pub mod dial;
 pub mod effect;
 pub mod evaluate;
 pub mod export;

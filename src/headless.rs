@@ -29,6 +29,7 @@ mod report;
 mod seeds;
 mod simulate;
 mod stats;
+mod sweep;
 mod training_data;
 mod version;
 mod watch;
@@ -87,6 +88,8 @@ enum Verb {
     Pose(pose::PoseArgs),
     /// The paper's results table of a dataset: generators side by side, with the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
+    /// Turn a dial (mask threshold or probability, gate, trim, shift) over all pairs, and say what it does to every pose.
+    Sweep(Box<sweep::SweepArgs>),
     /// Draw pairs side by side for a paper: chosen pairs and panes as a grid with one range of colors, as PNG or SVG.
     Figure(Box<figure::FigureArgs>),
     /// Write a pair for other programs: its cloud (PLY), pose (JSON) and CAD model in the hand (STL).
@@ -242,6 +245,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
+        Some(Verb::Sweep(args)) => sweep::run(&args),
         Some(Verb::Figure(args)) => figure::run(&args),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Adapt(args)) => adapt::run(&args),

@@ -15,6 +15,7 @@ mod bars;
 mod basin;
 mod browser;
 mod cx;
+mod dial;
 mod dialogs;
 mod export;
 mod fuzzy;

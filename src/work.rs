@@ -8,7 +8,7 @@
 //! * [`imprint`], [`mask`], [`cloud`], [`pose`]: one step each. [`compare`], [`ledger`], [`layers`], [`ensemble`]: what
 //!   there is to know about their results.
 //! * [`figure`], [`pair_files`]: results as pictures for papers and as files for other programs.
-//! * [`evaluate`], [`statistics`], [`adapt`], [`export`], [`training_data`]: passes over a whole data set.
+//! * [`evaluate`], [`sweep`], [`statistics`], [`adapt`], [`export`], [`training_data`]: passes over a whole data set.
 //! * [`job`], [`error`]: how work is watched, stopped, and how it fails.
 
 pub mod adapt;
@@ -35,6 +35,7 @@ pub mod pose;
 pub mod prediction;
 pub mod statistics;
 pub mod subject;
+pub mod sweep;
 pub mod tool;
 pub mod training_data;
 mod usable;

@@ -9,8 +9,10 @@ use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{
-    Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand,
+    Command, DialCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand,
+    ViewCommand,
 };
+use touch2touch::app::dial::DialPairs;
 use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
@@ -29,6 +31,7 @@ use touch2touch::io::images;
 use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::labels::Labels;
 use touch2touch::work::subject::Subject;
+use touch2touch::work::sweep::Dial;
 
 use crate::support::run;
 
@@ -65,6 +68,7 @@ fn how(action: Action) -> How {
         A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
+        A::TurnDial => Verb(&["sweep", "demo", "--dial", "threshold", "--values", "3,4,5", "--pairs", "8"]),
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
         A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),
@@ -447,6 +451,47 @@ fn a_pair_in_files_is_the_same_in_both() {
             assert!(a.len() > 500 && a == b, "{}: {} and {} bytes", file.display(), a.len(), b.len());
         }
         assert!(said["mask"].as_str().unwrap().starts_with("hand"), "{said}");
+    }
+}
+
+#[test]
+fn a_dial_does_the_same_in_both() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let mut studio = Studio::open(Place::Path(folder), home.path());
+    let threshold = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
+    studio.send(SettingsCommand::SetMask(MaskSettings { choice: threshold, ..MaskSettings::default() }).into());
+    studio.send(DialCommand::Over(DialPairs::Spread(2)).into());
+    for (dial, range, count) in
+        [(Dial::Threshold, [4.0, 6.0], 3), (Dial::Gate, [0.6, 1.4], 3), (Dial::Shift, [0.0; 2], 1)]
+    {
+        studio.send(DialCommand::Choose(dial).into());
+        studio.send(DialCommand::Range(range, count).into());
+        let words = studio.state.equivalent_words(Pane::Dial, 0.004).unwrap();
+        studio.send(DialCommand::Start.into());
+        let found = studio.state.dial.result.clone().expect("the dial was turned");
+        let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
+        let mut said = json(&words, home.path());
+        let mut shown: Value = serde_json::from_str(&serde_json::to_string(&*found).unwrap()).unwrap();
+        assert!(shown["seconds"].take().is_number() && said["seconds"].take().is_number());
+        assert_eq!(found.series.len(), if dial == Dial::Shift { 1 } else { 2 });
+        assert!(found.complete && found.series.iter().all(|s| s.points.len() >= 3 && s.base.cases.len() == 2));
+        assert_eq!(shown, said, "{dial:?}");
+    }
+    // A value that is put in force is the one that the panes compute with, and that their commands say.
+    studio.send(DialCommand::Use(Dial::Gate.parse("0.6").unwrap()).into());
+    studio.send(DialCommand::Use(Dial::Threshold.parse("4").unwrap()).into());
+    studio.predict(0);
+    let words = studio.state.equivalent_words(Pane::Metrics, 0.004).unwrap();
+    assert!(
+        words.join(" ").contains("--engine distance_field:gate=0.6 --mask threshold --threshold-mm 4"),
+        "{words:?}"
+    );
+    let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
+    let report = json(&words, home.path());
+    for (case, source) in report["cases"].as_array().unwrap().iter().zip(ImprintSource::iter()) {
+        let shown = studio.state.pose(source).ready().unwrap();
+        assert_eq!(case["angle_deg"], number(shown.angle_rad.to_degrees()), "{source:?}");
     }
 }
 

@@ -133,7 +133,13 @@ impl Services for Files {
     ) -> Result<Vec<Prediction>, TaskError> {
         Err(TaskError::new("Generate", "there is no model"))
     }
-    fn mask_by_model(&self, _: &BundleInfo, _: EngineChoice, _: &DepthMap) -> Result<ContactMask, TaskError> {
+    fn mask_by_model(
+        &self,
+        _: &BundleInfo,
+        _: EngineChoice,
+        _: &DepthMap,
+        _: Option<f32>,
+    ) -> Result<ContactMask, TaskError> {
         Err(TaskError::new("Mask", "there is no model"))
     }
     fn load_settings(&self) -> (Settings, Option<TaskError>) {

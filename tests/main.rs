@@ -32,5 +32,7 @@ mod handed_on;
 mod kept_scores;
 #[cfg(feature = "onnx")]
 mod sensors;
+#[cfg(feature = "onnx")]
+mod sweep;
 #[cfg(feature = "ui-test")]
 mod ui;

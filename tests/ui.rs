@@ -12,6 +12,7 @@ mod adapt;
 mod chain;
 mod compare;
 mod daily;
+mod dial;
 mod export;
 mod follow;
 mod frames;

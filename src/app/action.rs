@@ -5,9 +5,9 @@ mod key;
 use strum::{EnumIter, IntoEnumIterator};
 
 use super::command::{
-    AdaptCommand, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand, LabelsCommand,
-    LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
-    WorkbenchCommand,
+    AdaptCommand, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
+    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest,
+    ViewCommand, WorkbenchCommand,
 };
 use super::export::state::Output;
 use super::inspect::state::Inspected;
@@ -128,6 +128,7 @@ actions! {
     UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [];
     EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [];
     PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [];
+    TurnDial, Generate, "Turn the dial", "Poses many pairs with every value of the chosen dial (mask threshold, probability, gate, trim, shift)", [];
     ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
     NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)];
@@ -266,6 +267,7 @@ impl Action {
             Self::Generate => "predict prediction run inference diffusion",
             Self::RunSeeds => "ensemble uncertainty spread repeat",
             Self::FitPairs => "adapt calibrate tune finetune train",
+            Self::TurnDial => "sweep threshold small multiples",
             Self::EvaluateDataset => "score metrics benchmark results table",
             Self::ExportTable => "csv markdown json save results latex",
             Self::CancelJobs => "stop abort interrupt",
@@ -357,6 +359,7 @@ impl Action {
 
             Self::Generate => when(state.can_generate().is_ok(), PredictCommand::Generate),
             Self::GenerateNewSeed => when(state.can_generate().is_ok(), PredictCommand::GenerateNewSeed),
+            Self::TurnDial => when(state.turning().is_none() && state.sweep_setup().is_ok(), DialCommand::Start),
             Self::FitPairs => {
                 let ready = state.can_adapt() && state.adapting().is_none();
                 when(ready, AdaptCommand::Start)
@@ -473,8 +476,8 @@ impl Action {
             Self::PinStep => inspect(state, |_| true, InspectCommand::Pin),
             Self::OwnStarts => when(state.inspect.start.is_some(), InspectCommand::Start(None)),
             Self::Correspondences => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines)),
-            Self::NextPoseEngine => next_of::<Registration>(&settings.pose_engine)
-                .and_then(|next| does(SettingsCommand::SetPoseEngine(next))),
+            Self::NextPoseEngine => next_of::<Registration>(&settings.pose_engine.by)
+                .and_then(|next| does(SettingsCommand::SetPoseEngine(next.into()))),
 
             Self::LockRange => {
                 does(SettingsCommand::SetRange(ColorRange { locked: !settings.range.locked, ..settings.range }))

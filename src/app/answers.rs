@@ -12,13 +12,14 @@ use super::services::{Followed, Opened};
 use super::settings::state::Settings;
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use super::{adapt, evaluate, export, follow, library, predict, settings, tasks, workbench};
+use super::{adapt, dial, evaluate, export, follow, library, predict, settings, tasks, workbench};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::adapt::Adapted;
 use crate::work::bundles::BundleInfo;
 use crate::work::error::{TaskError, TaskErrorKind};
 use crate::work::evaluate::Evaluation;
 use crate::work::job::Progress;
+use crate::work::sweep::Sweep;
 
 /// What the runtime answers.
 #[derive(Clone, Debug)]
@@ -61,6 +62,8 @@ pub enum Answer {
     JobFailed(TaskError),
     /// The results table is there.
     Evaluated(Ticket, Arc<Evaluation>),
+    /// The dial was turned.
+    Swept(Ticket, Arc<Sweep>),
     /// A generator was fitted, and is this bundle where one was written.
     Adapted(Ticket, Arc<Adapted>, Option<Box<BundleInfo>>),
 }
@@ -138,6 +141,10 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::Evaluated(ticket, evaluation) => {
             state.tasks.running.remove(&ticket);
             evaluate::arrived(state, ticket, evaluation);
+        }
+        Answer::Swept(ticket, sweep) => {
+            state.tasks.running.remove(&ticket);
+            dial::arrived(state, ticket, sweep);
         }
         Answer::Adapted(ticket, adapted, bundle) => {
             state.tasks.running.remove(&ticket);

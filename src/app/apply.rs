@@ -4,7 +4,7 @@ use super::command::Command;
 use super::effect::Effect;
 use super::state::State;
 use super::{
-    adapt, answers, evaluate, export, follow, inspect, labels, library, predict, seeds, settings, tasks, view,
+    adapt, answers, dial, evaluate, export, follow, inspect, labels, library, predict, seeds, settings, tasks, view,
     workbench,
 };
 
@@ -24,6 +24,7 @@ pub fn apply(state: &mut State, command: Command) -> Vec<Effect> {
         Command::Workbench(command) => workbench::step(state, command, &mut effects),
         Command::Evaluate(command) => evaluate::step(state, command, &mut effects),
         Command::Export(command) => export::step(state, command, &mut effects),
+        Command::Dial(command) => dial::step(state, command, &mut effects),
         Command::Adapt(command) => adapt::step(state, command, &mut effects),
         Command::Settings(command) => settings::step(state, command, &mut effects),
         Command::Tasks(command) => tasks::step(state, command, &mut effects),

@@ -2,6 +2,7 @@
 
 pub use super::adapt::AdaptCommand;
 pub use super::answers::Answer;
+pub use super::dial::DialCommand;
 pub use super::evaluate::EvaluateCommand;
 pub use super::export::ExportCommand;
 pub use super::follow::FollowCommand;
@@ -51,6 +52,8 @@ commands! {
     Workbench(WorkbenchCommand),
     /// To the results table.
     Evaluate(EvaluateCommand),
+    /// To the dial.
+    Dial(DialCommand),
     /// To figures and other things that are taken away.
     Export(ExportCommand),
     /// The fit to one's own pairs.

@@ -20,6 +20,7 @@ use crate::work::evaluate::{Evaluation, Setup};
 use crate::work::export::ExportChoice;
 use crate::work::figure::FigureSetup;
 use crate::work::labels::Deed;
+use crate::work::sweep::SweepSetup;
 
 /// A pair whose labels are to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,6 +105,15 @@ pub enum Effect {
         /// By what, and how.
         setup: Box<Setup>,
     },
+    /// Turn a dial over the open data set.
+    Sweep {
+        /// The job.
+        ticket: Ticket,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// Which one, and how.
+        setup: Box<SweepSetup>,
+    },
     /// Fit a generator to pairs, where the program keeps models.
     Adapt {
         /// The job.
@@ -176,6 +186,7 @@ impl std::fmt::Debug for Effect {
             Self::SaveSettings(_) => write!(f, "SaveSettings"),
             Self::ExportMasks { folder, .. } => write!(f, "ExportMasks({})", folder.display()),
             Self::Evaluate { ticket, .. } => write!(f, "Evaluate({ticket:?})"),
+            Self::Sweep { ticket, .. } => write!(f, "Sweep({ticket:?})"),
             Self::Adapt { ticket, .. } => write!(f, "Adapt({ticket:?})"),
             Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),
             Self::Figure { setup, file, .. } => write!(f, "Figure({:?}, {})", setup.pairs, file.display()),

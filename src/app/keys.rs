@@ -17,7 +17,7 @@ pub use super::results::pose::PoseKey;
 pub use super::results::prediction::PredictionKey;
 pub use super::results::run::RunKey;
 pub use super::results::versus::{ApartKey, VersusKey};
-pub use crate::domain::pose::Registration;
+pub use crate::domain::pose::{Registration, RegistrationChoice};
 
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;

@@ -9,6 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::adapt::AdaptState;
+use super::dial::DialState;
 use super::effect::Effect;
 use super::evaluate::state::ScoreChoice;
 use super::keys::DatasetSeq;
@@ -234,6 +235,7 @@ pub(super) fn show(
     state.table.scores = Arc::default();
     state.table.running = None;
     state.library.brush = None;
+    state.dial = DialState { running: None, result: None, ..state.dial.clone() };
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.history.clear();
     state.tasks.failed.clear();

@@ -34,6 +34,7 @@ use crate::work::job::JobCx;
 use crate::work::labels::{Deed, Past};
 use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
+use crate::work::sweep::{self, Sweep, SweepSetup};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
@@ -189,7 +190,7 @@ pub trait Services: Send + Sync {
         Vec::new()
     }
 
-    /// Runs the mask model on an imprint in meters; the mask says what it is made of in the end. Called on the same lane as
+    /// Runs the mask model on an imprint in meters, as [`Models::mask`]; the mask says what it is made of in the end. Called on the same lane as
     /// [`Self::predict`].
     ///
     /// # Errors
@@ -199,6 +200,7 @@ pub trait Services: Send + Sync {
         bundle: &BundleInfo,
         runtime: EngineChoice,
         imprint: &DepthMap,
+        probability: Option<f32>,
     ) -> Result<ContactMask, TaskError>;
 
     /// The results table of a data set.
@@ -215,6 +217,14 @@ pub trait Services: Send + Sync {
     /// As [`evaluate::known`].
     fn known_scores(&self, dataset: &Dataset, setup: &Setup) -> Result<Vec<Scores>, TaskError> {
         evaluate::known(dataset, setup, &Models::new(None))
+    }
+
+    /// Turns a dial over pairs of a data set.
+    ///
+    /// # Errors
+    /// As [`sweep::sweep`].
+    fn sweep(&self, dataset: &Dataset, setup: &SweepSetup, cx: &JobCx) -> Result<Sweep, TaskError> {
+        sweep::sweep(dataset, setup, &Models::new(None), cx)
     }
 
     /// Fits a generator to pairs; the new bundle, where one is kept.

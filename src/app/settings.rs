@@ -10,7 +10,7 @@ pub use state::{
 };
 
 use super::effect::Effect;
-use super::keys::{ImprintSource, Registration, ShiftMode};
+use super::keys::{ImprintSource, RegistrationChoice, ShiftMode};
 use super::state::State;
 use crate::infer::engine::EngineChoice;
 
@@ -50,7 +50,7 @@ pub enum SettingsCommand {
     /// Whether the GelSlim's window is drawn.
     SetFootprintVisible(bool),
     /// The registration.
-    SetPoseEngine(Registration),
+    SetPoseEngine(RegistrationChoice),
     /// The model runtime.
     SetRuntime(EngineChoice),
     /// What kept predictions may take on the disk, MiB.

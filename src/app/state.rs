@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::adapt::state::AdaptState;
+use super::dial::state::DialState;
 use super::evaluate::state::TableState;
 use super::export::state::ExportState;
 use super::history::History;
@@ -40,6 +41,8 @@ pub struct State {
     pub table: TableState,
     /// What is chosen of the next figure.
     pub export: ExportState,
+    /// The dial that is turned over pairs.
+    pub dial: DialState,
     /// The fit to the open pairs.
     pub adapt: AdaptState,
     /// What the 3D panes do and show besides.

@@ -8,7 +8,7 @@ use super::align::TraceStep;
 use super::align::basin::{Basin, BasinConfig, basin};
 use super::align::correspond::{Matches, ModelPoints, Surface, correspondences};
 use super::mesh::sampling::spread;
-use super::pose::{Registration, ToolModel, register_from};
+use super::pose::{Registration, RegistrationChoice, ToolModel, register_from};
 
 /// Contact points per run of a basin map with the distance field: more move its ends by less than a line is wide.
 const MAP_POINTS: usize = 512;
@@ -21,12 +21,13 @@ const MAP_POINTS_COSTLY: usize = 96;
 pub fn basin_map(
     points: &[DVec3],
     tool: &ToolModel,
-    engine: Registration,
+    engine: impl Into<RegistrationChoice>,
     config: &BasinConfig,
     cancelled: impl Fn() -> bool + Sync,
 ) -> Option<Basin> {
+    let engine = engine.into();
     let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
-    let most = if uses_field(engine) { MAP_POINTS } else { MAP_POINTS_COSTLY };
+    let most = if uses_field(engine.by) { MAP_POINTS } else { MAP_POINTS_COSTLY };
     let thinned: Vec<DVec3> = spread(finite.len(), most).into_iter().map(|i| finite[i]).collect();
     basin(config, points.len(), |start| register_from(&thinned, tool, engine, start, false), cancelled)
 }

@@ -3,12 +3,13 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::align::{
-    AlignConfig, AlignError, AlignReport, Ask, Directions, IcpConfig, LabIcpConfig, RefineConfig, Register, Scene, icp,
-};
+use super::align::{AlignError, AlignReport, Ask, Directions, Register, Scene, icp};
 use super::frames::PlanarPose;
 
+mod choice;
+
 pub use super::tool::{ToolError, ToolModel};
+pub use choice::{RegistrationChoice, Rejection};
 
 /// Which registration answers.
 #[derive(
@@ -104,18 +105,7 @@ impl Registration {
 
     /// The registration with the settings that the product uses.
     pub fn method(self) -> Box<dyn Register> {
-        match self {
-            Self::DistanceField => Box::new(AlignConfig::default()),
-            Self::Certified => Box::new(AlignConfig::certified()),
-            Self::LabIcp => Box::new(LabIcpConfig::default()),
-            Self::PlanarPointToPoint => Box::new(IcpConfig::planar_point_to_point()),
-            Self::PlanarPointToPlane => Box::new(IcpConfig::planar_point_to_plane()),
-            Self::PlanarGicp => Box::new(IcpConfig::planar_gicp()),
-            Self::PointToPoint => Box::new(IcpConfig::point_to_point()),
-            Self::PointToPlane => Box::new(IcpConfig::point_to_plane()),
-            Self::Gicp => Box::new(IcpConfig::gicp()),
-            Self::Refined => Box::new(RefineConfig::default()),
-        }
+        RegistrationChoice::from(self).method()
     }
 }
 
@@ -127,10 +117,10 @@ impl Registration {
 pub fn register(
     points: &[DVec3],
     tool: &ToolModel,
-    engine: Registration,
+    engine: impl Into<RegistrationChoice>,
     record: bool,
 ) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.method(), points, tool, Ask { starts: None, record })
+    register_with(&*engine.into().method(), points, tool, Ask { starts: None, record })
 }
 
 /// The same from one start, `grasp_from_object`, instead of the engine's own.
@@ -140,11 +130,11 @@ pub fn register(
 pub fn register_from(
     points: &[DVec3],
     tool: &ToolModel,
-    engine: Registration,
+    engine: impl Into<RegistrationChoice>,
     start: PlanarPose,
     record: bool,
 ) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.method(), points, tool, Ask { starts: Some(&[start]), record })
+    register_with(&*engine.into().method(), points, tool, Ask { starts: Some(&[start]), record })
 }
 
 /// The same with a registration of other settings.

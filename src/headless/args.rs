@@ -6,11 +6,12 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::Args;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 use strum::IntoEnumIterator;
 
 use super::Common;
+use crate::domain::pose::{Registration, RegistrationChoice};
 use crate::domain::rig::{PadId, Rig};
 use crate::io::atomic;
 use crate::io::dataset::{Dataset, ToolScale};
@@ -101,6 +102,28 @@ where
 {
     // The parser has compared the key with the list.
     PossibleValuesParser::new(T::iter().map(Into::into)).map(|key| key.parse().unwrap_or_default())
+}
+
+/// Reads a registration, and lists them in the help.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RegistrationParser;
+
+impl TypedValueParser for RegistrationParser {
+    type Value = RegistrationChoice;
+
+    fn parse_ref(
+        &self,
+        cmd: &clap::Command,
+        arg: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<RegistrationChoice, clap::Error> {
+        let read: fn(&str) -> Result<RegistrationChoice, String> = str::parse;
+        read.parse_ref(cmd, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(Registration::iter().map(|e| PossibleValue::new(e.key()).help(e.description()))))
+    }
 }
 
 /// How much of a dataset is taken.

@@ -5,7 +5,7 @@ use std::time::Instant;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use super::args::{DatasetArgs, JsonArgs, keyed};
+use super::args::{DatasetArgs, JsonArgs, RegistrationParser, keyed};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
@@ -14,7 +14,7 @@ use crate::domain::align::basin::{Basin, Plane};
 use crate::domain::align::{Ask, Run};
 use crate::domain::findings::Finding;
 use crate::domain::frames::PlanarPose;
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::domain::units::{angle_error, fixed, mm, wrap_angle};
 use crate::work;
 use crate::work::job::JobCx;
@@ -39,8 +39,8 @@ pub(super) struct BasinArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration.
-    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
-    engine: Registration,
+    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    engine: RegistrationChoice,
     #[command(flatten)]
     json: JsonArgs,
     #[command(flatten)]
@@ -70,7 +70,7 @@ impl From<PlaneArg> for Plane {
 #[derive(Debug, Serialize)]
 struct Report {
     pair: String,
-    engine: &'static str,
+    engine: String,
     imprint: &'static str,
     mask: String,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -113,7 +113,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let basin = work::pose::basin(&points, &tool, args.engine, args.plane.into(), &output.job())?;
     let report = Report {
         pair: entry.name.clone(),
-        engine: args.engine.key(),
+        engine: args.engine.to_string(),
         imprint: args.imprint.key(),
         mask: contact.made_of(),
         mask_notes: contact.notes(&sample.rig),

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::args::{DatasetArgs, keyed};
+use super::args::{DatasetArgs, RegistrationParser};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::work::bundles;
 use crate::work::case::{CaseSetup, check, make, open};
 use crate::work::labels::Labels;
@@ -39,8 +39,8 @@ pub(super) struct MakeArgs {
     #[arg(long)]
     measured_only: bool,
     /// The registration.
-    #[arg(long, value_name = "ENGINE", default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
-    engine: Registration,
+    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    engine: RegistrationChoice,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, JsonArgs, keyed};
+use super::args::{DatasetArgs, JsonArgs, RegistrationParser};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::ledger::write_colored;
 use super::notes::Notes;
@@ -17,7 +17,7 @@ use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::findings::Finding;
 use crate::domain::grid::DepthMap;
 use crate::domain::hand::PoseDifference;
-use crate::domain::pose::{Registration, ToolModel};
+use crate::domain::pose::{RegistrationChoice, ToolModel};
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::{PadId, PerPad, Text};
 use crate::domain::sample::Sample;
@@ -62,8 +62,8 @@ pub(super) struct CompareArgs {
     #[command(flatten)]
     tool: ToolArgs,
     /// The registration.
-    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
-    engine: Registration,
+    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    engine: RegistrationChoice,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]

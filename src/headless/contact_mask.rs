@@ -19,6 +19,9 @@ pub(super) struct MaskArgs {
     /// Imprint depth from which a pixel counts as contact, for `--mask threshold`.
     #[arg(long, value_name = "MM", default_value_t = MaskChoice::default().threshold_m * 1e3, value_parser = finite, allow_hyphen_values = true)]
     threshold_mm: f32,
+    /// Probability of contact from which a pixel counts, 0 to 1, for the mask model (default: the bundle's own).
+    #[arg(long, value_name = "P", value_parser = probability)]
+    probability: Option<f32>,
     /// Share of the deepest pixels, for `--mask top_percent`.
     #[arg(long, value_name = "PERCENT", default_value_t = MaskChoice::default().top_percent, value_parser = finite)]
     top_percent: f32,
@@ -40,12 +43,17 @@ fn finite(text: &str) -> Result<f32, String> {
     text.parse().ok().filter(|number: &f32| number.is_finite()).ok_or_else(|| "a number is needed".to_owned())
 }
 
+fn probability(text: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|p| (0.0..=1.0).contains(p)).ok_or_else(|| "a probability of 0 to 1 is needed".to_owned())
+}
+
 impl MaskArgs {
     /// The choice in meters.
     pub(super) fn choice(&self) -> MaskChoice {
         MaskChoice {
             source: self.mask,
             threshold_m: self.threshold_mm / 1e3,
+            probability: self.probability,
             top_percent: self.top_percent,
             cad_distance_m: self.cad_mm / 1e3,
         }

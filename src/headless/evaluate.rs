@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 
-use super::args::{DatasetArgs, at_least_one, keyed};
+use super::args::{DatasetArgs, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
 use super::predict::{RuntimeArg, ShiftArg};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Row, paper_rows};
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::infer::bundle::{Bundle, Found, Origin, find_all};
 use crate::io::atomic;
 use crate::work::evaluate::{Evaluation, Report, Setup, evaluate, export, rows};
@@ -34,8 +34,8 @@ pub(super) struct EvaluateArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
-    engine: Registration,
+    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    engine: RegistrationChoice,
     /// Whose images are compared. Angles always come from the contact of both fingers.
     #[arg(long, value_enum, default_value_t = Fingers::Both)]
     fingers: Fingers,

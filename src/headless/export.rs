@@ -7,14 +7,14 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
-use super::args::{DatasetArgs, keyed};
+use super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::align::Ask;
 use crate::domain::findings::Finding;
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::work::cloud::clouds;
 use crate::work::job::JobCx;
 use crate::work::labels::{ImprintSource, Labels};
@@ -42,8 +42,8 @@ pub(super) struct ExportArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The registration.
-    #[arg(long, value_name = "ENGINE", default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
-    engine: Registration,
+    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    engine: RegistrationChoice,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -63,7 +63,7 @@ fn parse_file() -> impl TypedValueParser<Value = PairFile> {
 struct Report {
     pair: String,
     imprint: &'static str,
-    engine: &'static str,
+    engine: String,
     mask: String,
     files: Vec<PathBuf>,
     /// What is odd about the files of the pair.
@@ -130,7 +130,7 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
     let report = Report {
         pair: entry.name.clone(),
         imprint: args.imprint.key(),
-        engine: args.engine.key(),
+        engine: args.engine.to_string(),
         mask,
         files,
         notes: notes.into_list(&output),

@@ -17,14 +17,14 @@ use crate::domain::align::Ask;
 use crate::domain::ambiguity::ambiguity;
 use crate::domain::dataset::PairId;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::pose::{Registration, ToolModel};
+use crate::domain::pose::{RegistrationChoice, ToolModel};
 use crate::work::job::JobCx;
 use crate::work::labels::{ImprintSource, Labels};
 use crate::work::mask::MaskInputs;
 use crate::work::pose::{PoseResult, pose};
 use crate::work::tool::load_tool;
 
-pub(super) use args::{Engines, PoseArgs, parse_engines, parse_start};
+pub(super) use args::{Engines, EnginesParser, PoseArgs, parse_start};
 use args::{Imprints, registration};
 use report::{Accepted, Case, Report, summary, text};
 
@@ -147,7 +147,7 @@ fn pose_cases(
         sample.rig.pads().map(left_open).collect()
     });
     let several = predicted && args.ensemble.seeds > 1;
-    let one = |&engine: &Registration| {
+    let one = |&engine: &RegistrationChoice| {
         let fan = several
             .then(|| seeds::fan(predictor, inputs, tool, engine, &args.mask, args.ensemble.seeds))
             .transpose()?;
@@ -161,7 +161,7 @@ fn pose_cases(
         let place = answer.map(PoseResult::object_from_grasp);
         Ok(Case {
             name: name.to_owned(),
-            engine: engine.key(),
+            engine: engine.to_string(),
             imprint: imprint.key(),
             mask: contact.made_of(),
             mask_notes: contact.notes(&sample.rig),

@@ -196,7 +196,7 @@ impl Predictor {
         let (config, bundle) = (self.config()?, self.bundle()?.clone());
         let made = self.models.warm_up(&bundle, self.engine(), &config)?;
         if let Some(model) = self.mask_model(choice)? {
-            self.models.mask(&model, self.engine(), &imprint::imprint(&made, self.shift(), [0, 0])?)?;
+            self.models.mask(&model, self.engine(), &imprint::imprint(&made, self.shift(), [0, 0])?, None)?;
         }
         Ok(())
     }

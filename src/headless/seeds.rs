@@ -14,7 +14,7 @@ use crate::domain::contact::MaskBasis;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::ensemble::{AngleFan, Spread, seeds};
 use crate::domain::grid::DepthMap;
-use crate::domain::pose::{Registration, ToolModel};
+use crate::domain::pose::{RegistrationChoice, ToolModel};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::domain::units::angle_error;
@@ -147,8 +147,8 @@ pub(super) struct PoseFan {
 
 impl PoseFan {
     /// Writes `STEM_ENGINE_fan.png`; nothing where the angles have no mean. `name` is the pair's.
-    pub(super) fn write(&self, stem: &Path, name: &str, engine: Registration) -> anyhow::Result<()> {
-        let file = names::with_ending(stem, &format!("_{}_fan.png", engine.key()));
+    pub(super) fn write(&self, stem: &Path, name: &str, engine: RegistrationChoice) -> anyhow::Result<()> {
+        let file = names::with_ending(stem, &format!("_{}_fan.png", engine.to_string().replace([':', '='], "_")));
         let Some(fan) = &self.fan else { return Ok(()) };
         if let Some(picture) = super::bench::fan::picture(name, fan, self.truth_rad)? {
             images::write_rgb8(&file, &picture)?;
@@ -162,7 +162,7 @@ pub(super) fn fan(
     predictor: &mut Predictor,
     inputs: MaskInputs<'_>,
     tool: &ToolModel,
-    engine: Registration,
+    engine: RegistrationChoice,
     args: &MaskArgs,
     count: u16,
 ) -> anyhow::Result<PoseFan> {

@@ -19,7 +19,7 @@ use super::args::DatasetArgs;
 use super::contact_mask::{MaskArgs, labels_of};
 use super::guard::{Bug, guarded};
 use super::output::says;
-use super::pose::{Engines, parse_engines};
+use super::pose::{Engines, EnginesParser};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult, report};
 use crate::domain::dataset::{PairId, Problem};
@@ -57,7 +57,7 @@ pub(super) struct WatchArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration.
-    #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = parse_engines())]
+    #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = EnginesParser)]
     engine: Engines,
     /// What is written beside NAME.t2t.json: imprints in meters and masks as .npz or .pt, 16-bit pictures (0.001 mm
     /// steps from -20 mm) as .png.

@@ -68,12 +68,13 @@ impl MaskModel {
     }
 
     /// The contact mask of an imprint (meters, raw orientation), at the imprint's size, and what it is made of in the end
-    /// ([`settled_model`]).
+    /// ([`settled_model`]): pixels of at least the given probability, or of the bundle's own.
     ///
     /// # Errors
     /// See [`MaskError`].
-    pub fn contact(&mut self, imprint: &DepthMap) -> Result<ContactMask, MaskError> {
-        Ok(settled_model(imprint, self.predict(imprint)?))
+    pub fn contact(&mut self, imprint: &DepthMap, probability: Option<f32>) -> Result<ContactMask, MaskError> {
+        let least = probability.unwrap_or(self.least_probability());
+        Ok(contact_of(&self.probability(imprint)?, imprint, least))
     }
 
     /// What the model itself says, at the imprint's size.
@@ -83,9 +84,13 @@ impl MaskModel {
     /// # Errors
     /// See [`MaskError`].
     pub fn predict(&mut self, imprint: &DepthMap) -> Result<Mask, MaskError> {
-        let threshold = self.spec.output.threshold as f32;
-        let mask = self.probability(imprint)?.map(|&p| p >= threshold);
-        Ok(nearest_mask(&mask, imprint.width(), imprint.height()))
+        let least = self.least_probability();
+        Ok(at_least(&self.probability(imprint)?, imprint, least))
+    }
+
+    /// The probability from which a pixel counts as contact, as the bundle says.
+    pub fn least_probability(&self) -> f32 {
+        self.spec.output.threshold as f32
     }
 
     /// The probability of contact of each pixel, at the graph's size and in the raw orientation.
@@ -110,6 +115,16 @@ impl MaskModel {
         });
         Ok(if self.spec.input.rotation_deg == 180 { probability.rotated_180() } else { probability })
     }
+}
+
+/// The pixels of an imprint whose probability of contact is at least so much.
+fn at_least(probability: &Grid<f32>, imprint: &DepthMap, least: f32) -> Mask {
+    nearest_mask(&probability.map(|&p| p >= least), imprint.width(), imprint.height())
+}
+
+/// The contact mask of an imprint from its map of [`MaskModel::probability`].
+pub fn contact_of(probability: &Grid<f32>, imprint: &DepthMap, least: f32) -> ContactMask {
+    settled_model(imprint, at_least(probability, imprint, least))
 }
 
 /// The imprint as the graph wants it, `[1, 1, height, width]`.

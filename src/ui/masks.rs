@@ -188,7 +188,8 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
             response
                 .on_hover_text("Largest distance to the CAD model at the true pose. Default 1.00; double-click resets");
         }
-        MaskSource::Auto | MaskSource::Unet | MaskSource::Truth => {}
+        MaskSource::Auto | MaskSource::Unet => probability(ui, &mut new.choice),
+        MaskSource::Truth => {}
     }
     if let Err(absent) = cx.state.mask_recipe(finger) {
         ui.label(RichText::new(absent.text()).size(SMALL).color(cx.p.caution));
@@ -218,6 +219,24 @@ fn in_force(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, finger: PadId) {
     let text = format!("{}, {}: {text}", cx.state.finger_name(finger), source.key());
     let label = egui::Label::new(RichText::new(&text).size(SMALL).color(color)).truncate();
     ui.add(label).on_hover_text(format!("The mask in force. {text}"));
+}
+
+/// From which probability on the mask model's pixels are contact.
+fn probability(ui: &mut Ui, choice: &mut MaskChoice) {
+    /// Where somebody who chooses himself starts.
+    const START: f32 = 0.5;
+    ui.horizontal(|ui| {
+        let mut own = choice.probability.is_some();
+        let tip = "Choose the probability from which a pixel is contact; off, it is as the mask model's bundle says";
+        if ui.checkbox(&mut own, "probability").on_hover_text(tip).changed() {
+            choice.probability = own.then_some(START);
+        }
+        if let Some(least) = &mut choice.probability {
+            ui.spacing_mut().slider_width = (ui.available_width() - 60.0).max(40.0);
+            let slider = egui::Slider::new(least, 0.0..=1.0).fixed_decimals(2);
+            ui.add(slider).accessible_name("Probability").on_hover_text("Least probability of contact, 0 to 1");
+        }
+    });
 }
 
 fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {

@@ -63,12 +63,12 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                 eframe::egui::ComboBox::from_id_salt("engine").width(150.0).truncate().selected_text(engine.label());
             let response = combo.show_ui(ui, |ui| {
                 for e in Registration::iter() {
-                    if ui.selectable_label(e == engine, e.label()).on_hover_text(e.description()).clicked() {
-                        cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e)));
+                    if ui.selectable_label(e == engine.by, e.label()).on_hover_text(e.description()).clicked() {
+                        cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e.into())));
                     }
                 }
             });
-            response.response.accessible_name("Registration").on_hover_text(engine.description());
+            response.response.accessible_name("Registration").on_hover_text(engine.by.description());
         });
     });
     for source in [ImprintSource::Measured, ImprintSource::Predicted] {

@@ -133,12 +133,12 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     let combo = ComboBox::from_id_salt("time machine engine").width(168.0).selected_text(engine.label());
     let combo = combo.show_ui(ui, |ui| {
         for e in Registration::iter() {
-            if ui.selectable_label(e == engine, e.label()).on_hover_text(e.description()).clicked() {
-                cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e)));
+            if ui.selectable_label(e == engine.by, e.label()).on_hover_text(e.description()).clicked() {
+                cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e.into())));
             }
         }
     });
-    combo.response.accessible_name("Registration of the steps").on_hover_text(engine.description());
+    combo.response.accessible_name("Registration of the steps").on_hover_text(engine.by.description());
     ui.add_space(4.0);
     match inspect.start.map(PoseBits::get) {
         Some(start) => {

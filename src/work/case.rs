@@ -23,7 +23,7 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{decode_runs, encode_runs};
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
@@ -61,7 +61,7 @@ pub struct CaseRecipe {
     /// The mask model, where there is one.
     pub mask_model: Option<CaseModel>,
     /// The registration.
-    pub engine: Registration,
+    pub engine: RegistrationChoice,
     /// What runs the models.
     pub runtime: EngineChoice,
 }
@@ -259,7 +259,7 @@ pub struct CaseSetup {
     /// Where masks come from that nobody drew, and the mask model.
     pub mask: (MaskChoice, Option<BundleInfo>),
     /// The registration.
-    pub engine: Registration,
+    pub engine: RegistrationChoice,
     /// What runs the models.
     pub runtime: EngineChoice,
     /// What a person said about the pair.
@@ -468,7 +468,7 @@ mod tests {
             generator: None,
             shift: ShiftMode::default(),
             mask: (MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() }, None),
-            engine: Registration::default(),
+            engine: RegistrationChoice::default(),
             runtime: EngineChoice::Rten,
             labels,
             view: Some(serde_json::json!({ "camera": "here" })),

@@ -17,7 +17,7 @@ use crate::domain::dataset::PairId;
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Group, Row, Scores};
 use crate::domain::findings::{Finding, Findings};
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::sample::Scale;
 use crate::infer::bundle::Origin;
@@ -49,7 +49,7 @@ pub struct Setup {
     /// Whether a mask drawn by hand is taken where there is one, for every method alike.
     pub hand: bool,
     /// The registration.
-    pub engine: Registration,
+    pub engine: RegistrationChoice,
     /// How decoder outputs become meters.
     pub shift: ShiftMode,
     /// Sampling steps instead of each bundle's own; not for bundles that draw in one step.
@@ -79,7 +79,7 @@ impl Default for Setup {
             classifier: None,
             mask: MaskChoice::default(),
             hand: true,
-            engine: Registration::default(),
+            engine: RegistrationChoice::default(),
             shift: ShiftMode::default(),
             steps: None,
             seed: None,

@@ -96,6 +96,8 @@ pub struct MaskChoice {
     pub source: MaskSource,
     /// Depth of the threshold source, meters.
     pub threshold_m: f32,
+    /// Probability from which a pixel is contact for the mask model, 0..1; `None` takes the bundle's own.
+    pub probability: Option<f32>,
     /// Share of the deepest pixels of the top-percent source, percent.
     pub top_percent: f32,
     /// Distance to the CAD surface of the CAD source, meters.
@@ -108,6 +110,7 @@ impl Default for MaskChoice {
             source: MaskSource::default(),
             // The middle of the thresholds that the lab used for its tools (0.0048 to 0.0053 m).
             threshold_m: 0.005,
+            probability: None,
             top_percent: 15.0,
             cad_distance_m: LAB_CAD_DISTANCE_M as f32,
         }
@@ -118,9 +121,10 @@ impl MaskChoice {
     /// The recipe, `model` being the mask model's identity; `None` if it takes a model and there is none.
     pub fn recipe(&self, model: Option<&Arc<str>>) -> Option<MaskRecipe> {
         let threshold = MaskRecipe::Threshold(self.threshold_m.into());
+        let unet = |model: &Arc<str>| MaskRecipe::Unet(model.clone(), self.probability.map(Bits::from));
         Some(match self.source {
-            MaskSource::Auto => model.cloned().map_or(threshold, MaskRecipe::Unet),
-            MaskSource::Unet => MaskRecipe::Unet(model?.clone()),
+            MaskSource::Auto => model.map_or(threshold, unet),
+            MaskSource::Unet => unet(model?),
             MaskSource::Threshold => threshold,
             MaskSource::TopPercent => MaskRecipe::TopPercent(self.top_percent.into()),
             MaskSource::Cad => MaskRecipe::Cad(self.cad_distance_m.into()),
@@ -138,8 +142,8 @@ pub enum MaskRecipe {
     TopPercent(Bits),
     /// Within a distance (meters) of the CAD model at the true pose.
     Cad(Bits),
-    /// A mask model, by its bundle's identity.
-    Unet(Arc<str>),
+    /// A mask model, by its bundle's identity, with the least probability of contact where it is not the bundle's own.
+    Unet(Arc<str>, Option<Bits>),
     /// The simulator's truth.
     Truth,
 }
@@ -151,7 +155,8 @@ impl MaskRecipe {
             Self::Threshold(m) => format!("Threshold {}", units::text_mm(f64::from(m.get()))),
             Self::TopPercent(percent) => format!("Top {:.1} %", percent.get()),
             Self::Cad(m) => format!("CAD within {}", units::text_mm(f64::from(m.get()))),
-            Self::Unet(_) => format!("UNet {model}"),
+            Self::Unet(_, None) => format!("UNet {model}"),
+            Self::Unet(_, Some(least)) => format!("UNet {model}, probability {}", least.get()),
             Self::Truth => "Simulator truth".into(),
         }
     }
@@ -162,7 +167,7 @@ impl MaskRecipe {
             Self::Threshold(_) => MaskSource::Threshold,
             Self::TopPercent(_) => MaskSource::TopPercent,
             Self::Cad(_) => MaskSource::Cad,
-            Self::Unet(_) => MaskSource::Unet,
+            Self::Unet(..) => MaskSource::Unet,
             Self::Truth => MaskSource::Truth,
         }
     }
@@ -208,7 +213,7 @@ pub fn contact_mask(
         return Ok(ContactMask { mask: (*hand.mask).clone(), basis: MaskBasis::Hand });
     }
     match recipe {
-        MaskRecipe::Unet(_) => unet(imprint),
+        MaskRecipe::Unet(..) => unet(imprint),
         _ => without_model(recipe, imprint, pad, inputs),
     }
 }
@@ -243,7 +248,7 @@ pub fn without_model(
                 .ok_or_else(|| TaskError::new(WHAT, "only simulated data knows the true contact"))?;
             truth.contact.clone()
         }
-        MaskRecipe::Unet(_) => return Err(TaskError::new(WHAT, "the mask model is needed")),
+        MaskRecipe::Unet(..) => return Err(TaskError::new(WHAT, "the mask model is needed")),
     };
     Ok(contact::settled(imprint, mask))
 }
@@ -307,7 +312,10 @@ mod tests {
     #[test]
     fn auto_is_the_model_or_else_the_threshold_and_a_drawn_mask_wins_over_all() {
         let (choice, id) = (MaskChoice::default(), Arc::from("id"));
-        assert_eq!(choice.recipe(Some(&id)), Some(MaskRecipe::Unet(id.clone())));
+        assert_eq!(choice.recipe(Some(&id)), Some(MaskRecipe::Unet(id.clone(), None)));
+        let own = MaskChoice { probability: Some(0.3), ..choice };
+        assert_eq!(own.recipe(Some(&id)), Some(MaskRecipe::Unet(id.clone(), Some(0.3.into()))));
+        assert_eq!(own.recipe(None), choice.recipe(None));
         assert_eq!(choice.recipe(None), Some(MaskRecipe::Threshold(0.005.into())));
         assert_eq!(MaskChoice { source: MaskSource::Unet, ..choice }.recipe(None), None);
         let imprint = DepthMap::from_fn(175, 140, |x, _| if x < 60 { 0.008 } else { 0.0 });

@@ -16,13 +16,13 @@ use super::prediction::{Chains, Prediction};
 use crate::domain::contact::ContactMask;
 use crate::domain::diffusion::{GenerateConfig, Progress};
 use crate::domain::fit::Fitted;
-use crate::domain::grid::{DepthMap, RgbGrid};
+use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::{ColorChain, RawPrediction, ShiftMode};
 use crate::domain::rig::{PadId, PerPad};
 use crate::infer::bundle::GeneratorSpec;
 use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
-use crate::infer::mask::MaskModel;
+use crate::infer::mask::{MaskError, MaskModel};
 use crate::infer::recipe::{Recipe, input_digest};
 use crate::infer::sheets::Sheets;
 use crate::infer::store::Store;
@@ -314,7 +314,8 @@ impl Models {
         kept
     }
 
-    /// What the mask model says of an imprint in meters, and what the mask is made of in the end.
+    /// What the mask model says of an imprint in meters, and what the mask is made of in the end. A pixel of at least
+    /// `probability` is contact; `None` for the bundle's own.
     ///
     /// # Errors
     /// If the model cannot be loaded or run.
@@ -323,11 +324,45 @@ impl Models {
         bundle: &BundleInfo,
         engine: EngineChoice,
         imprint: &DepthMap,
+        probability: Option<f32>,
     ) -> Result<ContactMask, TaskError> {
+        self.with_mask_model(bundle, engine, |model| model.contact(imprint, probability))
+    }
+
+    /// The mask model's probability of contact at each pixel of its own grid, and from which on it calls that contact.
+    ///
+    /// # Errors
+    /// As [`Self::mask`].
+    pub fn probability(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        imprint: &DepthMap,
+    ) -> Result<(Grid<f32>, f32), TaskError> {
+        self.with_mask_model(bundle, engine, |model| Ok((model.probability(imprint)?, model.least_probability())))
+    }
+
+    /// From which probability on a mask model's bundle calls a pixel contact.
+    ///
+    /// # Errors
+    /// If the bundle cannot be opened, or is of another kind.
+    pub fn least_probability(&self, bundle: &BundleInfo) -> Result<f32, TaskError> {
+        let what = format!("Open {}", bundle.name);
+        let opened = bundle.open(&what)?;
+        let spec = opened.mask_unet().ok_or_else(|| TaskError::new(&what, "it is no mask model"))?;
+        Ok(spec.output.threshold as f32)
+    }
+
+    fn with_mask_model<T>(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        ask: impl FnOnce(&mut MaskModel) -> Result<T, MaskError>,
+    ) -> Result<T, TaskError> {
         let what = format!("Mask with {}", bundle.name);
         let mut loaded = lock(&self.mask_model);
         let model = ready(&mut loaded, (bundle.id.clone(), engine), || open_mask_model(bundle, engine))?;
-        model.contact(imprint).map_err(|err| TaskError::from_error(&what, &err))
+        ask(model).map_err(|err| TaskError::from_error(&what, &err))
     }
 
     /// The contact mask of one pad's imprint: the one drawn by hand, else as the choice says.
@@ -342,7 +377,7 @@ impl Models {
         inputs: MaskInputs<'_>,
     ) -> Result<ContactMask, TaskError> {
         let unet = |imprint: &DepthMap| match by.model {
-            Some(model) => self.mask(model, by.engine, imprint),
+            Some(model) => self.mask(model, by.engine, imprint, by.choice.probability),
             None => Err(no_mask_model()),
         };
         mask::contact_mask(&by.recipe()?, imprint, pad, inputs, unet)

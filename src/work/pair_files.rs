@@ -12,7 +12,7 @@ use super::pose::PoseResult;
 use crate::domain::deviation;
 use crate::domain::frames::PlanarPose;
 use crate::domain::mesh::TriMesh;
-use crate::domain::pose::{Registration, ToolModel};
+use crate::domain::pose::{RegistrationChoice, ToolModel};
 use crate::domain::rig::Rig;
 use crate::domain::units::{angle_error, mm};
 use crate::io::names::{OUTPUT_MARK, output};
@@ -63,7 +63,7 @@ pub struct PairParts<'a> {
     /// What their contact masks are made of.
     pub mask: &'a str,
     /// The registration.
-    pub engine: Registration,
+    pub engine: RegistrationChoice,
     /// Its answer; `None` where there is none.
     pub pose: Option<&'a PoseResult>,
     /// The true pose, `grasp_from_object`, where it is known.
@@ -80,7 +80,7 @@ struct PoseFile<'a> {
     pair: &'a str,
     imprint: &'static str,
     tool: Option<&'a str>,
-    engine: &'static str,
+    engine: String,
     mask: &'a str,
     convention: &'static str,
     grasp_from_object: Matrix,
@@ -167,7 +167,7 @@ fn comments(parts: &PairParts<'_>) -> Vec<String> {
     let fingers: Vec<String> =
         parts.rig.pads().map(|pad| format!("{} = {}", pad.index(), parts.rig.pad_key(pad))).collect();
     let distance = match (parts.pose, parts.tool) {
-        (Some(_), Some((tool, _))) => format!("signed, to {tool} as registered by {}", parts.engine.key()),
+        (Some(_), Some((tool, _))) => format!("signed, to {tool} as registered by {}", parts.engine),
         _ => "NaN, without a pose".to_owned(),
     };
     vec![
@@ -210,7 +210,7 @@ fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<Str
         pair: parts.name,
         imprint: parts.source.key(),
         tool: parts.tool.map(|(name, _)| name),
-        engine: parts.engine.key(),
+        engine: parts.engine.to_string(),
         mask: parts.mask,
         convention: CONVENTION,
         grasp_from_object: matrix(found),
@@ -245,7 +245,7 @@ mod tests {
         let of = sample.rig.pads().map(|pad| Some((imprints[pad].as_ref()?, masks[pad].as_ref()))).collect();
         let clouds = clouds(&sample, &of).unwrap();
         let tool = ToolModel::new(spec.mesh()).unwrap();
-        let (engine, truth) = (Registration::default(), sample.grasp_from_object);
+        let (engine, truth) = (RegistrationChoice::default(), sample.grasp_from_object);
         let found = pose(&clouds.contact_points(), &tool, &*engine.method(), Ask::default(), truth).unwrap();
         let parts = PairParts {
             name: "a/b",

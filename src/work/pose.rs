@@ -10,7 +10,7 @@ use crate::domain::align::basin::{Basin, BasinConfig, Plane};
 use crate::domain::align::{AlignReport, Ask, PointFit, Register, TraceStep};
 use crate::domain::frames::PlanarPose;
 use crate::domain::inspect::basin_map;
-use crate::domain::pose::{Registration, ToolModel, register_with};
+use crate::domain::pose::{RegistrationChoice, ToolModel, register_with};
 use crate::domain::units;
 
 /// A registered pose.
@@ -89,7 +89,7 @@ pub fn pose(
 pub fn basin(
     points: &[DVec3],
     tool: &ToolModel,
-    engine: Registration,
+    engine: RegistrationChoice,
     plane: Plane,
     cx: &JobCx,
 ) -> Result<Basin, TaskError> {

@@ -297,7 +297,13 @@ impl Services for Double {
             .collect()
     }
 
-    fn mask_by_model(&self, _: &BundleInfo, _: EngineChoice, imprint: &DepthMap) -> Result<ContactMask, TaskError> {
+    fn mask_by_model(
+        &self,
+        _: &BundleInfo,
+        _: EngineChoice,
+        imprint: &DepthMap,
+        _: Option<f32>,
+    ) -> Result<ContactMask, TaskError> {
         let blind = self.blind.load(Ordering::Relaxed);
         Ok(settled_model(imprint, imprint.map(|v| !blind && *v > 0.006)))
     }

@@ -12,15 +12,17 @@ use proptest::strategy::Union;
 use strum::IntoEnumIterator;
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, Hover, InspectCommand,
-    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest,
-    ViewCommand, WorkbenchCommand,
+    AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
+    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
+    UiRequest, ViewCommand, WorkbenchCommand,
 };
+use touch2touch::app::dial::DialPairs;
 use touch2touch::app::evaluate::ScoreChoice;
 use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{
-    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Request, Revision, ShiftMode, TouchKey,
+    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode,
+    TouchKey,
 };
 use touch2touch::app::labels::{Document, MaskPlace, Review};
 use touch2touch::app::library::{Place, Sort};
@@ -41,6 +43,7 @@ use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::hand::{HandAxis, HandPose};
 use touch2touch::domain::label::{CleanKind, CleanUp};
+use touch2touch::domain::pose::Rejection;
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::statistics::ShiftStatistics;
@@ -51,6 +54,7 @@ use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
 use touch2touch::work::subject::Subject;
+use touch2touch::work::sweep::{Dial, InForce, Setting, Sweep};
 
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;
@@ -184,6 +188,24 @@ fn mask() -> impl Strategy<Value = MaskSettings> {
         let choice = MaskChoice { source, top_percent: percent, ..MaskChoice::default() };
         MaskSettings { tool, radius_px, choice, ..MaskSettings::default() }
     })
+}
+
+fn registration() -> impl Strategy<Value = RegistrationChoice> {
+    let rejection = prop_oneof![
+        Just(Rejection::Own),
+        (1e-4..0.02).prop_map(|m| Rejection::gate(m).unwrap()),
+        (0.0..0.8).prop_map(|share| Rejection::trim(share).unwrap()),
+    ];
+    (any_of::<Registration>(), rejection)
+        .prop_map(|(by, rejection)| RegistrationChoice::new(by, rejection).unwrap_or_else(|_| by.into()))
+}
+
+fn setting() -> impl Strategy<Value = Setting> {
+    let settings = any_of::<Dial>().prop_map(|dial| {
+        let (first, last, count) = dial.usual();
+        dial.spread(first, last, count).unwrap()
+    });
+    (settings, any::<usize>()).prop_map(|(settings, at)| settings[at % settings.len()])
 }
 
 fn form() -> impl Strategy<Value = FigureForm> {
@@ -378,6 +400,14 @@ draws! {
         1 All,
         1 Export(Just(PathBuf::from("table"))),
     }
+    dial: DialCommand {
+        1 Choose(any_of::<Dial>()),
+        1 Range([number(), number()].prop_map(|ends| ends.map(f64::from)), any::<usize>()),
+        1 Over(select(DialPairs::OFFERED.to_vec())),
+        1 Predictions(any::<bool>()),
+        2 Start,
+        2 Use(setting()),
+    }
     export: ExportCommand {
         1 Ask(any::<bool>()),
         1 SetForm(form()),
@@ -412,7 +442,7 @@ draws! {
         1 SetMaskOutline(any::<bool>()),
         1 SetMaskOpacity(number()),
         1 SetFootprintVisible(any::<bool>()),
-        1 SetPoseEngine(any_of::<Registration>()),
+        1 SetPoseEngine(registration()),
         1 SetRuntime(any_of::<EngineChoice>()),
         1 SetCacheBudget(any::<u32>()),
         1 SetCamerasLinked(any::<bool>()),
@@ -460,7 +490,24 @@ draws! {
         1 SettingsSaved,
         1 JobFailed(error()),
         1 Evaluated(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(evaluation()))),
+        1 Swept(ticket(), Just(()).prop_map(|()| Arc::new(swept()))),
         1 Adapted(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(adapted())), Just(None)),
+    }
+}
+
+fn swept() -> Sweep {
+    Sweep {
+        dataset: "elsewhere".into(),
+        dial: Dial::Gate,
+        unit: Dial::Gate.unit(),
+        at: None,
+        in_force: InForce::default(),
+        series: Vec::new(),
+        left_out: Vec::new(),
+        notes: Vec::new(),
+        pairs: 0,
+        complete: false,
+        seconds: 0.0,
     }
 }
 
@@ -496,6 +543,7 @@ fn command() -> impl Strategy<Value = Command> {
         (3, inspect().boxed()),
         (4, workbench().boxed()),
         (2, evaluate().boxed()),
+        (2, dial().boxed()),
         (1, export().boxed()),
         (1, adapt().boxed()),
         (8, settings().boxed()),
@@ -510,6 +558,7 @@ fn command() -> impl Strategy<Value = Command> {
             | Command::Inspect(_)
             | Command::Workbench(_)
             | Command::Evaluate(_)
+            | Command::Dial(_)
             | Command::Export(_)
             | Command::Adapt(_) => {}
             Command::Settings(_) | Command::Tasks(_) | Command::Answer(_) => {}

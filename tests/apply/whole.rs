@@ -48,11 +48,11 @@ fn the_pose_follows_the_mask() {
     let after = bench.state.pose(MEASURED).ready().unwrap();
     assert!(after.num_points < pose.num_points);
     // The other registration is another result; the first one is still there.
-    bench.send(SettingsCommand::SetPoseEngine(Registration::LabIcp));
+    bench.send(SettingsCommand::SetPoseEngine(Registration::LabIcp.into()));
     bench.settle();
     let lab = bench.state.pose(MEASURED).ready().unwrap();
     assert!(lab.error_rad.is_some() && lab.report.iterations > 1);
-    bench.send(SettingsCommand::SetPoseEngine(Registration::DistanceField));
+    bench.send(SettingsCommand::SetPoseEngine(Registration::DistanceField.into()));
     assert!(bench.state.pose(MEASURED).ready().is_some());
     // Accepting it is a change of the document like any other.
     let accept = Action::AcceptMeasuredPose.command(&bench.state).unwrap();

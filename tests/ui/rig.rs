@@ -165,8 +165,9 @@ impl Services for QuickGenerator {
         bundle: &BundleInfo,
         runtime: EngineChoice,
         imprint: &DepthMap,
+        probability: Option<f32>,
     ) -> Result<ContactMask, TaskError> {
-        self.live.mask_by_model(bundle, runtime, imprint)
+        self.live.mask_by_model(bundle, runtime, imprint, probability)
     }
 
     fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {

@@ -1,5 +1,6 @@
 //! The command that does in a shell what a pane shows: [`State::equivalent`].
 
+use super::super::dial::DialPairs;
 use super::super::keys::{ImprintSource, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use super::super::pane::{Kind, Pane};
@@ -10,6 +11,7 @@ use crate::infer::engine::EngineChoice;
 use crate::work::bundles::BundleKind;
 use crate::work::mask::MaskSource;
 use crate::work::subject::{Subject, Wish};
+use crate::work::sweep::Setting;
 
 /// The words of a command line.
 struct Words(Vec<String>);
@@ -60,7 +62,7 @@ impl State {
         let of_pair = |name: &str| Some(verb(name).option("--pair", self.entry()?.name.clone()));
         let finger = self.finger_name(self.selection.finger).into_owned();
         let side = pane.side().unwrap_or(self.inspect.source);
-        let engine = self.settings.pose_engine.key();
+        let engine = &self.settings.pose_engine;
         let posed = |words: Words, side: ImprintSource| {
             let words = self.mask_words(words.option("--imprint", side.key()).option("--engine", engine));
             if side == ImprintSource::Predicted { self.model_words(words) } else { words }
@@ -116,6 +118,20 @@ impl State {
                 let words = if self.table.published { words.word("--paper") } else { words };
                 self.mask_words(words.option("--engine", engine))
             }
+            (Pane::Dial, _) => {
+                let dial = &self.dial;
+                let values = dial.dial.spread(dial.range[0], dial.range[1], dial.count).ok()?;
+                let values: Vec<String> = values.into_iter().map(Setting::key).collect();
+                let words = verb("sweep").option("--dial", dial.dial.key()).option("--values", values.join(","));
+                let words = match dial.pairs {
+                    DialPairs::All => words,
+                    DialPairs::Spread(count) => words.option("--pairs", count),
+                    // The verb does not know the list.
+                    DialPairs::Listed => return None,
+                };
+                let words = if dial.predictions { words } else { words.word("--measured-only") };
+                self.model_words(self.mask_words(words.option("--engine", engine)))
+            }
             (Pane::Adapt, _) => {
                 let words = verb("adapt").option("--out", "fitted");
                 let words = words.option_if(self.adapt.tune, "--tune", self.adapt.steps);
@@ -156,7 +172,10 @@ impl State {
             MaskSource::Threshold => words.option("--threshold-mm", choice.threshold_m * 1e3),
             MaskSource::TopPercent => words.option("--top-percent", choice.top_percent),
             MaskSource::Cad => words.option("--cad-mm", choice.cad_distance_m * 1e3),
-            MaskSource::Auto | MaskSource::Unet | MaskSource::Truth => words,
+            MaskSource::Auto | MaskSource::Unet => {
+                words.option_if(choice.probability.is_some(), "--probability", choice.probability.unwrap_or_default())
+            }
+            MaskSource::Truth => words,
         };
         match (&self.settings.mask.bundle, self.bundle(BundleKind::Mask)) {
             (Some(_), Ok(bundle)) => words.option("--mask-bundle", bundle.origin.path().display()),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
-use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, Registration};
+use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, RegistrationChoice};
 use super::super::pane::{Kind, Pane};
 use super::super::settings::state::{ColorMap as MapChoice, Settings};
 use super::super::state::State;
@@ -158,7 +158,7 @@ pub struct PairExport {
     rig: Arc<Rig>,
     clouds: Arc<Clouds>,
     mask: String,
-    engine: Registration,
+    engine: RegistrationChoice,
     pose: Option<Arc<PoseResult>>,
     truth: Option<PlanarPose>,
     tool: Option<Arc<NamedTool>>,

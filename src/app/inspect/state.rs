@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::keys::{ImprintSource, PairKey, PoseBits, Registration};
+use super::super::keys::{ImprintSource, PairKey, PoseBits, RegistrationChoice};
 use super::super::pane::Need;
 pub use super::super::results::inspection::Inspection;
 use super::super::state::State;
@@ -81,7 +81,7 @@ pub struct Pin {
     /// The imprint.
     pub source: ImprintSource,
     /// The registration.
-    pub engine: Registration,
+    pub engine: RegistrationChoice,
     /// The start it belongs to.
     pub run: usize,
     /// Its position in the run.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::keys::Registration;
+use super::super::keys::RegistrationChoice;
 use super::pose::Registered;
 use super::run::RunKey;
 use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, Wanted};
@@ -55,7 +55,7 @@ pub struct Inspection {
 
 impl Inspection {
     /// From a recorded registration, the contact points it was offered, and what they were compared with.
-    pub fn new(result: Arc<PoseResult>, points: Vec<DVec3>, tool: &ToolModel, engine: Registration) -> Self {
+    pub fn new(result: Arc<PoseResult>, points: Vec<DVec3>, tool: &ToolModel, engine: RegistrationChoice) -> Self {
         let report = &result.report;
         let mut runs: Vec<Vec<usize>> = vec![Vec::new(); report.runs.len()];
         for (i, step) in report.trace.iter().enumerate() {
@@ -64,7 +64,7 @@ impl Inspection {
             }
             runs[step.run].push(i);
         }
-        Self { result, points, counterparts: Counterparts::new(tool, engine), runs }
+        Self { result, points, counterparts: Counterparts::new(tool, engine.by), runs }
     }
 
     /// The registration's report with its trace.

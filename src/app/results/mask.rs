@@ -12,6 +12,7 @@ use super::Request;
 use super::imprint::ImprintKey;
 use super::tool::ToolKey;
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
+use crate::domain::bits::Bits;
 use crate::domain::contact::{ContactMask, MaskBasis};
 use crate::domain::grid::Mask;
 use crate::domain::rig::PadId;
@@ -74,11 +75,11 @@ impl Computes for MaskKey {
         let imprint = self.imprint.find(state)?;
         let touch = self.imprint.touch();
         let sample = state.results.samples.get(&touch.pair)?.clone();
-        if let MaskRecipe::Unet(id) = &self.recipe {
-            let (services, runtime) = (services.clone(), state.settings.runtime);
+        if let MaskRecipe::Unet(id, least) = &self.recipe {
+            let (services, runtime, least) = (services.clone(), state.settings.runtime, least.map(Bits::get));
             let bundle = state.library.bundle(id)?.clone();
             return Some(Job::new(Lane::Models, "Contact mask by the mask model", move |_| {
-                Ok(services.mask_by_model(&bundle, runtime, imprint.get()?)?.into())
+                Ok(services.mask_by_model(&bundle, runtime, imprint.get()?, least)?.into())
             }));
         }
         let recipe = self.recipe.clone();
@@ -151,7 +152,7 @@ impl State {
                     return Err(Absent::NotSimulated);
                 }
             }
-            MaskRecipe::Threshold(_) | MaskRecipe::TopPercent(_) | MaskRecipe::Unet(_) => {}
+            MaskRecipe::Threshold(_) | MaskRecipe::TopPercent(_) | MaskRecipe::Unet(..) => {}
         }
         Ok(recipe)
     }
@@ -254,7 +255,7 @@ impl State {
     /// An automatic source in words, with its number.
     pub fn mask_label(&self, recipe: &MaskRecipe) -> String {
         let model = match recipe {
-            MaskRecipe::Unet(id) => self.library.bundle(id).map_or("", |bundle| &bundle.name),
+            MaskRecipe::Unet(id, _) => self.library.bundle(id).map_or("", |bundle| &bundle.name),
             _ => "",
         };
         recipe.label(model)

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::keys::Registration;
+use super::super::keys::RegistrationChoice;
 use super::super::workbench::state::PoseOf;
 use super::cloud::CloudKey;
 use super::tool::ToolKey;
@@ -22,7 +22,7 @@ pub struct PoseKey {
     /// The tool.
     pub tool: Arc<str>,
     /// The registration.
-    pub engine: Registration,
+    pub engine: RegistrationChoice,
 }
 
 /// What is registered: the inputs of every job about a pose.

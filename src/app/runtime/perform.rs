@@ -144,6 +144,16 @@ impl Runtime {
                 });
                 self.task(Lane::Batch, ticket, "Evaluate".into(), body);
             }
+            Effect::Sweep { ticket, source, setup } => {
+                let services = self.services.clone();
+                let body = Box::new(move |cx: &JobCx| {
+                    let dataset = source.as_dataset().ok_or_else(|| {
+                        TaskError::new("Dial", "this kind of source cannot be read outside the studio")
+                    })?;
+                    Ok(Answer::Swept(ticket, Arc::new(services.sweep(dataset, &setup, cx)?)))
+                });
+                self.task(Lane::Batch, ticket, "Dial".into(), body);
+            }
             Effect::Adapt { ticket, source, setup } => {
                 let services = self.services.clone();
                 let body = Box::new(move |cx: &JobCx| {

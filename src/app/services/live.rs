@@ -39,6 +39,7 @@ use crate::work::labels::Labels;
 use crate::work::labels::{Deed, Past};
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
+use crate::work::sweep::{self, Sweep, SweepSetup};
 use crate::work::tool::tool_file;
 
 /// Longer than a key that is held down leaves a pair on screen.
@@ -248,6 +249,10 @@ impl Services for LiveServices {
         evaluate::known(dataset, setup, &self.models)
     }
 
+    fn sweep(&self, dataset: &Dataset, setup: &SweepSetup, cx: &JobCx) -> Result<Sweep, TaskError> {
+        sweep::sweep(dataset, setup, &self.models, cx)
+    }
+
     fn adapt(
         &self,
         dataset: &Dataset,
@@ -272,8 +277,9 @@ impl Services for LiveServices {
         bundle: &BundleInfo,
         engine: EngineChoice,
         imprint: &DepthMap,
+        probability: Option<f32>,
     ) -> Result<ContactMask, TaskError> {
-        self.models.mask(bundle, engine, imprint)
+        self.models.mask(bundle, engine, imprint, probability)
     }
 
     fn make_case(&self, dataset: &Dataset, setup: &CaseSetup, file: &Path, cx: &JobCx) -> Result<(), TaskError> {

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
+use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
 use crate::domain::label::{CleanKind, CleanUp, DrawTool, Gate};
@@ -58,7 +58,7 @@ pub struct Settings {
     /// The mask tools.
     pub mask: MaskSettings,
     /// The registration.
-    pub pose_engine: Registration,
+    pub pose_engine: RegistrationChoice,
     /// The runtime that runs models.
     pub runtime: EngineChoice,
     /// What the predictions kept on the disk may take, MiB; 0 keeps none.
@@ -121,7 +121,7 @@ impl Default for Settings {
             refit: None,
             generate: GenerateSettings::default(),
             mask: MaskSettings::default(),
-            pose_engine: Registration::default(),
+            pose_engine: RegistrationChoice::default(),
             runtime: EngineChoice::default(),
             cache_mib: 512,
             cameras_linked: true,
@@ -420,6 +420,7 @@ impl MaskSettings {
         self.gate.cad_m = self.gate.cad_m.map(|m| clamp_or(m, 0.0, 0.05, default.choice.cad_distance_m));
         let (choice, default) = (&mut self.choice, default.choice);
         choice.threshold_m = clamp_or(choice.threshold_m, -0.1, 0.1, default.threshold_m);
+        choice.probability = choice.probability.filter(|p| (0.0..=1.0).contains(p));
         choice.top_percent = clamp_or(choice.top_percent, 0.0, 100.0, default.top_percent);
         choice.cad_distance_m = clamp_or(choice.cad_distance_m, 0.0, 0.05, default.cad_distance_m);
         self

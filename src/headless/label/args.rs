@@ -3,14 +3,14 @@
 use clap::Args;
 use strum::IntoEnumIterator as _;
 
-use super::super::args::{DatasetArgs, FingerArg, keyed};
+use super::super::args::{DatasetArgs, FingerArg, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::pose::parse_start;
 use super::super::predict::ModelArgs;
 use super::super::{Common, ToolArgs};
 use crate::domain::frames::PlanarPose;
 use crate::domain::label::{CleanKind, CleanUp, Drawing};
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::work::labels::{ImprintSource, Review};
 
 fn parse_clean_up(text: &str) -> Result<CleanUp, String> {
@@ -79,8 +79,8 @@ pub(in super::super) struct LabelArgs {
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     pub(super) imprint: ImprintSource,
     /// The registration.
-    #[arg(long, default_value = Registration::default().key(), value_parser = keyed::<Registration>())]
-    pub(super) engine: Registration,
+    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    pub(super) engine: RegistrationChoice,
     #[command(flatten)]
     pub(super) mask: MaskArgs,
     #[command(flatten)]

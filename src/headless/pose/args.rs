@@ -1,17 +1,17 @@
 //! The arguments of `pose`.
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, TypedValueParser};
 use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
 
-use super::super::args::{DatasetArgs, LimitArgs};
+use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser};
 use super::super::contact_mask::MaskArgs;
 use super::super::predict::ModelArgs;
 use super::super::seeds::{FanArgs, SeedArgs};
 use super::super::{Common, ToolArgs};
 use crate::domain::align::{LabIcpConfig, PaperTrap, Register, lab_starts};
 use crate::domain::frames::PlanarPose;
-use crate::domain::pose::Registration;
+use crate::domain::pose::{Registration, RegistrationChoice};
 
 /// Arguments of `pose`.
 #[derive(Debug, Args)]
@@ -25,8 +25,9 @@ pub(in crate::headless) struct PoseArgs {
     pub(super) mask: MaskArgs,
     #[command(flatten)]
     pub(super) tool: ToolArgs,
-    /// The registration: the key of one, `default`, `lab` (the paper's), or `all`, one after the other.
-    #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = parse_engines())]
+    /// The registration: the key of one, `default`, `lab` (the paper's), or `all`, one after the other. A key may be
+    /// followed by what is left out: `:gate=MM` (contacts farther from the model) or `:trim=SHARE` (the farthest).
+    #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = EnginesParser)]
     pub(super) engine: Engines,
     /// Start here instead of where the registration would: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as
     /// `10,0,-2`. Repeat for several.
@@ -68,24 +69,37 @@ pub(super) enum Imprints {
 
 /// The registrations to run, in this order.
 #[derive(Debug, Clone)]
-pub(in crate::headless) struct Engines(pub(in crate::headless) Vec<Registration>);
+pub(in crate::headless) struct Engines(pub(in crate::headless) Vec<RegistrationChoice>);
 
-/// Reads the key of a registration, or one of the short names; lists them all in the help.
-pub(in crate::headless) fn parse_engines() -> impl TypedValueParser<Value = Engines> {
-    let mut names = vec![
-        PossibleValue::new("default").help("The same as distance_field"),
-        PossibleValue::new("lab").help("The same as lab_icp"),
-        PossibleValue::new("all").help("All of the following, one after the other"),
-    ];
-    names.extend(Registration::iter().map(|e| PossibleValue::new(e.key()).help(e.description())));
-    PossibleValuesParser::new(names).map(|name| {
-        Engines(match name.as_str() {
-            "default" => vec![Registration::default()],
-            "lab" => vec![Registration::LabIcp],
-            "all" => Registration::iter().collect(),
-            key => key.parse().into_iter().collect(),
-        })
-    })
+/// Reads a registration, or one of the short names; lists them all in the help.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::headless) struct EnginesParser;
+
+impl TypedValueParser for EnginesParser {
+    type Value = Engines;
+
+    fn parse_ref(
+        &self,
+        cmd: &clap::Command,
+        arg: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<Engines, clap::Error> {
+        Ok(Engines(match value.to_str() {
+            Some("default") => vec![RegistrationChoice::default()],
+            Some("lab") => vec![Registration::LabIcp.into()],
+            Some("all") => Registration::iter().map(Into::into).collect(),
+            _ => vec![RegistrationParser.parse_ref(cmd, arg, value)?],
+        }))
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let names = [
+            PossibleValue::new("default").help("The same as distance_field"),
+            PossibleValue::new("lab").help("The same as lab_icp"),
+            PossibleValue::new("all").help("All of the following, one after the other"),
+        ];
+        Some(Box::new(names.into_iter().chain(RegistrationParser.possible_values()?)))
+    }
 }
 
 pub(in crate::headless) fn parse_start(text: &str) -> Result<PlanarPose, String> {
@@ -105,8 +119,8 @@ pub(super) fn parse_trap(text: &str) -> Result<PaperTrap, String> {
 }
 
 /// The registration as the arguments want it.
-pub(super) fn registration(args: &PoseArgs, engine: Registration) -> Box<dyn Register> {
-    if engine != Registration::LabIcp {
+pub(super) fn registration(args: &PoseArgs, engine: RegistrationChoice) -> Box<dyn Register> {
+    if engine.by != Registration::LabIcp {
         return engine.method();
     }
     let mut config = LabIcpConfig { traps: args.paper_traps.clone(), ..LabIcpConfig::default() };

@@ -10,14 +10,14 @@ use crate::domain::ambiguity::Ambiguity;
 use crate::domain::findings::Finding;
 use crate::domain::hand::{AcceptedPose, HandPose};
 use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::domain::rig::PerPad;
 use crate::domain::units::angle_error;
 
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Case {
     pub(super) name: String,
-    pub(super) engine: &'static str,
+    pub(super) engine: String,
     pub(super) imprint: &'static str,
     /// What the masks are made of: the source's key, `hand` where one was drawn, `depth` where the mask model found nothing,
     /// `flat` where the imprint is flat; of both fingers (right, left) where they differ.
@@ -107,20 +107,20 @@ pub(super) fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> AngleMetrics
     AngleMetrics { angles: AngleSummary::from_errors(&errors), median_ms }
 }
 
-pub(super) fn summary(cases: &[Case], first_imprint: &str, first_engine: Registration) -> Summary {
+pub(super) fn summary(cases: &[Case], first_imprint: &str, first_engine: RegistrationChoice) -> Summary {
     let of = |engine: &str, imprint: &str| figures(cases.iter().filter(|c| c.engine == engine && c.imprint == imprint));
     let mut engines = BTreeMap::new();
     for case in cases {
         let key = format!("{}/{}", case.engine, case.imprint);
         if !engines.contains_key(&key) {
-            let figures = of(case.engine, case.imprint);
+            let figures = of(&case.engine, case.imprint);
             if case.imprint == first_imprint {
-                engines.insert(case.engine.to_owned(), figures.clone());
+                engines.insert(case.engine.clone(), figures.clone());
             }
             engines.insert(key, figures);
         }
     }
-    Summary { first: of(first_engine.key(), first_imprint), engines }
+    Summary { first: of(&first_engine.to_string(), first_imprint), engines }
 }
 
 pub(super) fn text(report: &Report) -> String {

@@ -13,7 +13,7 @@ use super::done::{Done, PoseMetrics, figures};
 use super::summary::Latency;
 use super::{Source, WatchArgs, recipe, write};
 use crate::domain::align::Ask;
-use crate::domain::pose::{Registration, ToolModel};
+use crate::domain::pose::{RegistrationChoice, ToolModel};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::io::dataset::{Dataset, read_in_meters};
@@ -30,7 +30,7 @@ use crate::work::tool::{load_tool, named_tool};
 pub(super) struct Worker<'a> {
     args: &'a WatchArgs,
     predictor: Predictor,
-    engine: Registration,
+    engine: RegistrationChoice,
     tools: BTreeMap<String, ToolModel>,
     stop: Cancel,
     /// Seconds that loading and the first run took.

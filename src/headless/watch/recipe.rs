@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::super::predict::Predictor;
 use super::WatchArgs;
 use crate::domain::grid::Mask;
-use crate::domain::pose::Registration;
+use crate::domain::pose::RegistrationChoice;
 use crate::infer::engine::resolve;
 use crate::work::labels::PairLabels;
 
@@ -15,7 +15,7 @@ use crate::work::labels::PairLabels;
 pub(super) fn recipe(
     args: &WatchArgs,
     predictor: &mut Predictor,
-    registration: Registration,
+    registration: RegistrationChoice,
     tool: Option<&str>,
     labels: &PairLabels,
 ) -> anyhow::Result<Value> {

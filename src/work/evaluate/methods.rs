@@ -208,8 +208,9 @@ impl Models {
         let recipe = setup.mask.recipe(self.mask_bundle.as_ref().map(|bundle| &bundle.id));
         notes.push(match recipe {
             None => "no mask model: no angle".into(),
-            Some(MaskRecipe::Unet(_)) => {
-                "contact masks of the mask model, for measured and predicted imprints alike".into()
+            Some(MaskRecipe::Unet(_, least)) => {
+                let from = least.map_or(String::new(), |p| format!(" from probability {} on", p.get()));
+                format!("contact masks of the mask model{from}, for measured and predicted imprints alike")
             }
             Some(MaskRecipe::Cad(_)) => {
                 "contact masks of the CAD model at the true pose: the truth leaks into every angle".into()

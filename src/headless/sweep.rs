@@ -1,0 +1,143 @@
+//! `touch2touch sweep`: what a threshold, a probability, a gate, a trim or a shift does to every pose of a data set.
+
+use clap::Args;
+
+use super::args::{DatasetArgs, RegistrationParser, at_least_one, keyed};
+use super::contact_mask::MaskArgs;
+use super::predict::{ModelArgs, Predictor};
+use super::{Common, Output, ToolArgs, VerbResult};
+use crate::domain::dataset::PairId;
+use crate::domain::pose::RegistrationChoice;
+use crate::work::mask::{MaskChoice, MaskSource};
+use crate::work::sweep::{Dial, InForce, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep};
+
+/// Arguments of `sweep`.
+#[derive(Debug, Args)]
+pub(super) struct SweepArgs {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// What is turned: `threshold` (imprint depth of contact, mm), `probability` (of the mask model, 0 to 1), `gate`
+    /// (distance beyond which the registration leaves a contact out, mm), `trim` (share of the contacts that it leaves
+    /// out, 0 to 0.9) or `shift` (exact, unfitted, paper, raw).
+    #[arg(long, value_parser = keyed::<Dial>())]
+    dial: Dial,
+    /// What it is turned to, separated by commas (default: a usual range).
+    #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
+    values: Vec<String>,
+    /// Take only this many pairs, spread evenly over the dataset.
+    #[arg(long, visible_alias = "limit", value_name = "N", value_parser = at_least_one::<usize>)]
+    pairs: Option<usize>,
+    /// Leave the predictions out: measured imprints only.
+    #[arg(long)]
+    measured_only: bool,
+    /// The registration. Its key may be followed by what it leaves out, as with `pose`.
+    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    engine: RegistrationChoice,
+    #[command(flatten)]
+    mask: MaskArgs,
+    #[command(flatten)]
+    tool: ToolArgs,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(args: &SweepArgs) -> VerbResult {
+    let values = values(args).map_err(anyhow::Error::msg)?;
+    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let positions = super::spread(dataset.index.pairs.len(), args.pairs);
+    let output = Output::new(args.common, "turning the dial", positions.len());
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let choice = args.mask.choice();
+    let generator = if args.measured_only { None } else { Some((predictor.bundle()?.clone(), predictor.config()?)) };
+    // The dial may ask for the mask model where the choice does not.
+    let source = if args.dial == Dial::Probability { MaskSource::Unet } else { choice.source };
+    let setup = SweepSetup {
+        values,
+        pairs: positions.into_iter().map(|at| PairId(at as u32)).collect(),
+        mask_model: predictor.mask_model(&MaskChoice { source, ..choice })?,
+        in_force: InForce { mask: choice, registration: args.engine, shift: predictor.shift() },
+        generator,
+        hand: !args.mask.no_hand,
+        engine: predictor.engine(),
+    };
+    let found = sweep(&dataset, &setup, predictor.models(), &output.job())?;
+    for remark in &found.left_out {
+        output.note(&format!("left out: {}: {}", remark.name, remark.why));
+    }
+    let complete = found.complete && found.left_out.is_empty();
+    output.finish(&found, || text(&found))?;
+    Ok(complete)
+}
+
+/// What the dial is turned to.
+fn values(args: &SweepArgs) -> Result<Vec<Setting>, String> {
+    if args.values.is_empty() {
+        let (first, last, count) = args.dial.usual();
+        return args.dial.spread(first, last, count);
+    }
+    if args.values.len() > MOST_VALUES {
+        return Err(format!("{} values are too many: at most {MOST_VALUES}", args.values.len()));
+    }
+    let parse = |text: &String| args.dial.parse(text).map_err(|why| format!("--values: {why}"));
+    args.values.iter().map(parse).collect()
+}
+
+fn text(found: &Sweep) -> String {
+    let mut text = format!("{}: {}, {} pairs\n", found.dataset, found.dial.name().to_lowercase(), found.pairs);
+    for series in &found.series {
+        text += &format!("\n{}\n", table(found.dial, series));
+    }
+    for note in &found.notes {
+        text += &format!("- {note}\n");
+    }
+    text += "- * where the dial stands; \"as set\" is without turning it; change and residual are medians\n";
+    text + &format!("- {:.1} s in all{}", found.seconds, if found.complete { "" } else { "; stopped early" })
+}
+
+fn table(dial: Dial, series: &Series) -> String {
+    let unit = if dial.unit().is_empty() { String::new() } else { format!(" {}", dial.unit()) };
+    let mut text = format!(
+        "{:<22} {:>7} {:>8} {:>7} {:>7} {:>9} {:>9} {:>7} {:>8}\n",
+        format!("{} imprints,{unit}", series.source.key()).trim_end_matches(','),
+        "mean °",
+        "median °",
+        "<=5° %",
+        "<=10° %",
+        "change °",
+        "rms mm",
+        "points",
+        "no pose"
+    );
+    for (at, point) in std::iter::once(&series.base).chain(&series.points).enumerate() {
+        text += &line(point, at > 0 && series.best == Some(at - 1));
+    }
+    for point in &series.points {
+        for failure in &point.summary.failures {
+            let value = point.value.map(Setting::label).unwrap_or_default();
+            text += &format!("  {value}: {} without a pose: {}\n", failure.count, failure.why);
+        }
+    }
+    text
+}
+
+fn line(point: &Point, best: bool) -> String {
+    let s = &point.summary;
+    let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
+    let angle = |get: fn(&crate::domain::metrics::AngleSummary) -> Option<f64>| s.angle.as_ref().and_then(get);
+    let name = point.value.map_or("as set".to_owned(), Setting::key);
+    let mark = if point.value.is_some() && point.in_force { " *" } else { "" };
+    let name = format!("{name}{mark}{}", if best { " best" } else { "" });
+    format!(
+        "{name:<22} {:>7} {:>8} {:>7} {:>7} {:>9} {:>9} {:>7} {:>8}\n",
+        number(angle(|a| a.mean_deg), 2),
+        number(angle(|a| a.median_deg), 2),
+        number(angle(|a| Some(a.success_5)), 1),
+        number(angle(|a| Some(a.success_10)), 1),
+        number(s.median_change_rad.map(f64::to_degrees), 2),
+        number(s.median_rms_m.map(|m| m * 1e3), 3),
+        number(s.median_points, 0),
+        s.failed
+    )
+}
