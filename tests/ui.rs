@@ -22,4 +22,5 @@ mod palette;
 mod results;
 mod scene;
 mod seeds;
+mod shortcuts;
 mod workbench;

@@ -14,6 +14,7 @@ use super::widget::colorbar;
 use super::widget::empty;
 use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, shows_squares};
 use super::widget::texture::{Histogram, Memo, depth_image, picture_image};
+use crate::app::action::Action;
 use crate::app::command::{Hover, Pane, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::results::Preview;
@@ -214,14 +215,14 @@ pub(super) fn failed(cx: &mut Cx<'_>, ui: &mut Ui, err: &TaskError) {
         Some(hint) => format!("{}\n{hint}", err.why),
         None => err.why.clone(),
     };
-    if empty::show(ui, &format!("{} failed", err.what), &why, Some(("Try again", "Computes it again (Ctrl+R)"))) {
+    let again = cx.keys().behind("Computes it again", Action::RunPose);
+    if empty::show(ui, &format!("{} failed", err.what), &why, Some(("Try again", &again))) {
         cx.push(TasksCommand::Retry);
     }
 }
 
 /// What is missing, and the action that brings it.
 pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
-    use crate::app::action::Action;
     // A prediction on its way shows how far it is, where it will appear.
     if absent == Absent::NoPrediction
         && let Some((_, task)) = cx.state.tasks.any_generating()
@@ -251,10 +252,7 @@ pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
         Absent::NoGenerator => ("Put a model bundle into assets/models, or choose one in Settings.", what),
         _ => ("", what),
     };
-    let text = button.map(|a: Action| match a.shortcut() {
-        Some(shortcut) => (format!("{} ({shortcut})", a.name()), a),
-        None => (a.name().to_owned(), a),
-    });
+    let text = button.map(|a: Action| (cx.keys().behind(a.name(), a), a));
     let shown = text.as_ref().map(|(text, a)| (text.as_str(), a.tooltip()));
     if empty::show(ui, what, why, shown)
         && let Some((_, action)) = text

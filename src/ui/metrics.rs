@@ -121,8 +121,8 @@ fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: HandPose) 
         text += &format!(" (error {})", units::text_deg(PoseDifference::between(hand.planar, truth).angle_rad));
     }
     ui.label(RichText::new(text).size(SMALL).color(cx.p.good));
-    let withdraw =
-        ui.small_button("Withdraw").on_hover_text("The registered pose counts again (Ctrl+Z brings it back)");
+    let tip = cx.keys().fill("The registered pose counts again ([[undo]] brings it back)");
+    let withdraw = ui.small_button("Withdraw").on_hover_text(tip);
     if withdraw.accessible_name(format!("Withdraw the pose by hand, {}", source.name().to_lowercase())).clicked() {
         cx.push(LabelsCommand::AcceptPose(source, false));
     }

@@ -137,7 +137,7 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
     let (name, kind, enabled) = match entry {
         Entry::Action(action) => {
-            let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
+            let keys = cx.keys().text(*action);
             (action.name(), keys, action.command(cx.state).is_some())
         }
         Entry::Pair(_, name) => (name.as_str(), "sample".to_owned(), true),

@@ -57,7 +57,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         cx.out.push(Command::Settings(SettingsCommand::SetFootprintVisible(footprint)));
     }
     let mut mask = settings.mask_visible;
-    if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(Action::MaskVisible.help()).changed() {
+    if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(cx.keys().help(Action::MaskVisible)).changed() {
         cx.out.push(Command::Settings(SettingsCommand::SetMaskVisible(mask)));
     }
     let mut linked = settings.cameras_linked;

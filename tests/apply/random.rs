@@ -9,6 +9,7 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::Union;
 use strum::IntoEnumIterator;
+use touch2touch::app::action::{Action, Key, Shortcut};
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
     AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, Hover, InspectCommand,
@@ -183,6 +184,10 @@ fn mask() -> impl Strategy<Value = MaskSettings> {
     })
 }
 
+fn shortcut() -> impl Strategy<Value = Shortcut> {
+    (any_of::<Key>(), any::<[bool; 3]>()).prop_map(|(key, [ctrl, shift, alt])| Shortcut { ctrl, shift, alt, key })
+}
+
 fn form() -> impl Strategy<Value = FigureForm> {
     let panes = proptest::collection::vec(any_of::<FigurePane>(), 0..9);
     (proptest::option::of(any::<usize>()), panes, any::<u8>(), number())
@@ -249,6 +254,9 @@ macro_rules! draws {
         ($a, $b, $c, $d)
             .prop_map(|(finger, source, at_px, erase)| $command::BeginStroke { finger, source, at_px, erase })
             .boxed()
+    };
+    (one $command:ident BindKey $a:expr, $b:expr, $c:expr) => {
+        ($a, $b, $c).prop_map(|(action, place, shortcut)| $command::BindKey { action, place, shortcut }).boxed()
     };
     (one $command:ident Go $a:expr, $b:expr) => { ($a, $b).prop_map(|(run, at)| $command::Go { run, at }).boxed() };
     (one $command:ident $variant:ident $a:expr) => { $a.prop_map($command::$variant).boxed() };
@@ -408,6 +416,8 @@ draws! {
         1 SetVersus(versus()),
         1 SetWorkspace(any_of::<Workspace>()),
         1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
+        1 BindKey(any_of::<Action>(), 0usize..4, proptest::option::of(shortcut())),
+        1 ResetKeys(proptest::option::of(any_of::<Action>())),
         1 DismissHint,
         1 Remember(Just(Last { pair: "nowhere".into(), finger: 7, ..Last::default() })),
         1 ResetSettings,
@@ -587,5 +597,9 @@ proptest! {
         let mut bench = Bench::open_simulated();
         bench.send(LibraryCommand::Select(SIMULATED));
         carry_out(&mut bench, commands)?;
+        let keys = &bench.state.settings.keys;
+        for action in Action::iter() {
+            prop_assert!(keys.all(action).into_iter().all(|key| keys.holder(key) == Some(action)), "{:?}", action);
+        }
     }
 }

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
+use super::super::action::Bindings;
 use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
@@ -82,6 +83,8 @@ pub struct Settings {
     pub layouts: std::collections::BTreeMap<String, String>,
     /// The workspace in front.
     pub workspace: Workspace,
+    /// The keys of actions.
+    pub keys: Bindings,
     /// Folders with further model bundles.
     pub bundle_folders: Vec<PathBuf>,
     /// What was on screen when the window was closed.
@@ -132,6 +135,7 @@ impl Default for Settings {
             recent: Vec::new(),
             layouts: std::collections::BTreeMap::new(),
             workspace: Workspace::Inspect,
+            keys: Bindings::default(),
             bundle_folders: Vec::new(),
             last: Last::default(),
         }
