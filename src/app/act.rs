@@ -52,21 +52,22 @@ impl Action {
             Self::Save => does(LabelsCommand::Save),
             Self::Figure => when(state.can_draw(), ExportCommand::Ask(!state.export.asking)),
             Self::SaveCase => when(state.can_draw(), ExportCommand::Place(Output::Case)),
+            Self::OwnPreferences => when(state.own.is_some(), ExportCommand::OwnPreferences),
             Self::ExportMeasured => export(state, ImprintSource::Measured),
             Self::ExportPredicted => export(state, ImprintSource::Predicted),
             Self::ExportMasks => when(open, ViewCommand::Ui(UiRequest::PickExportFolder)),
 
-            Self::PreviousSample => when(listed, LibraryCommand::Step(-1)),
-            Self::NextSample => when(listed, LibraryCommand::Step(1)),
+            Self::PreviousPair => when(listed, LibraryCommand::Step(-1)),
+            Self::NextPair => when(listed, LibraryCommand::Step(1)),
             Self::TenBack => when(listed, LibraryCommand::Step(-10)),
             Self::TenForward => when(listed, LibraryCommand::Step(10)),
-            Self::FirstSample => when(listed, LibraryCommand::First),
-            Self::LastSample => when(listed, LibraryCommand::Last),
+            Self::FirstPair => when(listed, LibraryCommand::First),
+            Self::LastPair => when(listed, LibraryCommand::Last),
             Self::NextUnfinished => when(listed, LibraryCommand::NextUnfinished),
             Self::NextWorst => when(listed && state.table.by().is_some(), LibraryCommand::NextWorst),
             Self::OtherFinger => does(ViewCommand::SelectFinger(state.other_finger())),
             Self::BothFingers => does(ViewCommand::ShowBothFingers(!state.selection.both_fingers)),
-            Self::FindSample => {
+            Self::FindPair => {
                 when(state.selection.panes.contains(&Pane::Browser), ViewCommand::Ui(UiRequest::FocusFilter))
             }
 
@@ -250,7 +251,7 @@ impl Absent {
     pub fn action(self) -> Option<Action> {
         match self {
             Self::NothingOpen => Some(Action::OpenDemo),
-            Self::NothingSelected => Some(Action::FirstSample),
+            Self::NothingSelected => Some(Action::FirstPair),
             Self::NoPrediction => Some(Action::Generate),
             _ => None,
         }
@@ -320,7 +321,7 @@ mod tests {
     #[test]
     fn nothing_open_grays_out_what_needs_data() {
         let state = State::default();
-        for action in [Action::Generate, Action::NextSample, Action::Undo, Action::FillHoles, Action::Reload] {
+        for action in [Action::Generate, Action::NextPair, Action::Undo, Action::FillHoles, Action::Reload] {
             assert!(action.command(&state).is_none(), "{action:?}");
         }
         for action in [Action::OpenFolder, Action::OpenDemo, Action::Palette, Action::SwitchTheme, Action::Brush] {

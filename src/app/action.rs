@@ -92,21 +92,22 @@ actions! {
     Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)];
     Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)];
     SaveCase, File, "Save case…", "Writes this pair with all that its results depend on into one file, which opens to the same picture elsewhere", [];
+    OwnPreferences, File, "Back to my preferences", "Gives your own preferences back, while the case stays open", [];
     ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [];
     ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [];
     ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
 
-    PreviousSample, Navigate, "Previous sample", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)];
-    NextSample, Navigate, "Next sample", "Shows the next pair of the list", [plain(K::D), plain(K::PageDown)];
+    PreviousPair, Navigate, "Previous pair", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)];
+    NextPair, Navigate, "Next pair", "Shows the next pair of the list", [plain(K::D), plain(K::PageDown)];
     TenBack, Navigate, "10 back", "Moves 10 pairs back in the list", [shift(K::A)];
     TenForward, Navigate, "10 forward", "Moves 10 pairs forward in the list", [shift(K::D)];
-    FirstSample, Navigate, "First sample", "Shows the first pair of the list", [plain(K::Home)];
-    LastSample, Navigate, "Last sample", "Shows the last pair of the list", [plain(K::End)];
+    FirstPair, Navigate, "First pair", "Shows the first pair of the list", [plain(K::Home)];
+    LastPair, Navigate, "Last pair", "Shows the last pair of the list", [plain(K::End)];
     NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift(K::N)];
     NextWorst, Navigate, "Next worst", "Shows the pair that is worst by the chosen score, then the next worse one", [plain(K::N)];
     OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)];
     BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)];
-    FindSample, Navigate, "Filter samples", "Moves the keyboard to the filter of the list", [ctrl(K::F)];
+    FindPair, Navigate, "Filter pairs", "Moves the keyboard to the filter of the list", [ctrl(K::F)];
 
     Generate, Generate, "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", [ctrl(K::G)];
     GenerateNewSeed, Generate, "Generate with a new seed", "Draws another seed, then generates", [ctrl_shift(K::G)];
@@ -119,7 +120,7 @@ actions! {
     ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
     NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)];
-    Refit, Generate, "Refit on this dataset", "Computes shift statistics of this data set's predictions and measurements, and uses them", [];
+    Refit, Generate, "Refit on this data set", "Computes shift statistics of this data set's predictions and measurements, and uses them", [];
 
     Brush, Mask, "Brush", "Adds to the mask while the button is down", [plain(K::Num1), plain(K::B)];
     Eraser, Mask, "Eraser", "Removes from the mask while the button is down", [plain(K::Num2), plain(K::E)];
@@ -227,7 +228,7 @@ impl Action {
             Self::ExportMasks => "unet training labels npy save",
             Self::NextWorst => "bad largest error outlier failure hardest",
             Self::NextUnfinished => "todo open unlabeled remaining",
-            Self::FindSample => "search list find",
+            Self::FindPair => "search list find samples",
             Self::Generate => "predict prediction run inference diffusion",
             Self::RunSeeds => "ensemble uncertainty spread repeat",
             Self::FitPairs => "adapt calibrate tune finetune train",

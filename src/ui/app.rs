@@ -177,6 +177,11 @@ impl StudioApp {
         self.panes.memories.scene.on_screen(source, p.into())
     }
 
+    /// Where each pane was drawn last. For tests.
+    pub fn places(&self) -> BTreeMap<Pane, egui::Rect> {
+        self.panes.places.clone()
+    }
+
     /// The panes of the workspace in front are arranged validly. For tests.
     pub fn layout_is_valid(&self) -> bool {
         self.trees.iter().all(|(workspace, tree)| layout::is_valid(tree, *workspace))

@@ -34,7 +34,9 @@ pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
                 edited = view_menu(cx, ui, tree);
                 let width = 190.0;
                 let text = RichText::new("Find anything").color(cx.p.weak);
-                let button = egui::Button::new(text).right_text(caption(cx.keys().text(Action::Palette), cx.p)).min_size(vec2(width, 24.0));
+                let button = egui::Button::new(text)
+                    .right_text(caption(cx.keys().text(Action::Palette), cx.p))
+                    .min_size(vec2(width, 24.0));
                 let response = ui.add(button).accessible_name("Command palette");
                 if response.on_hover_text(cx.keys().help(Action::Palette)).clicked() {
                     cx.push(ViewCommand::SetPalette(true));
@@ -64,6 +66,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.separator();
         for action in [
             Action::SaveCase,
+            Action::OwnPreferences,
             Action::Figure,
             Action::ExportMeasured,
             Action::ExportPredicted,
@@ -213,7 +216,8 @@ fn following(cx: &mut Cx<'_>, ui: &mut Ui) {
     let newest = follow.newest.as_ref().map_or(String::new(), |name| format!("Newest: {name}. "));
     let text = RichText::new(text).size(12.0).color(cx.p.accent);
     let button = ui.add(egui::Button::new(text).min_size(vec2(0.0, 20.0))).accessible_name("Stop following");
-    if button.on_hover_text(cx.keys().behind(&format!("{newest}Stops following the folder"), Action::Follow)).clicked() {
+    if button.on_hover_text(cx.keys().behind(&format!("{newest}Stops following the folder"), Action::Follow)).clicked()
+    {
         cx.act(Action::Follow);
     }
     ui.add_space(8.0);
@@ -253,7 +257,7 @@ pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
                         "Simulated touches are open; a first prediction is being made."
                     };
                     ui.label(RichText::new(first).color(cx.p.strong));
-                    let steps = "[[next_sample]] and [[previous_sample]] step through the pairs, [[generate]] predicts the one \
+                    let steps = "[[next_pair]] and [[previous_pair]] step through the pairs, [[generate]] predicts the one \
                                  on screen.";
                     ui.label(cx.keys().fill(steps));
                     let rest = "[[palette]] finds everything else. Drop a folder here to open your own data.";

@@ -92,6 +92,14 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
+        let units = match cx.state.pose(source) {
+            Lookup::Failed(err) => err.units.clone(),
+            _ => None,
+        };
+        if let Some(offer) = units {
+            let place = format!("{}, in the metrics", source.name().to_lowercase());
+            ui.horizontal_wrapped(|ui| images::unit_buttons(cx, ui, &offer, &place));
+        }
         if let Some(pose) = cx.state.pose(source).shown() {
             let p = pose.grasp_from_object;
             let text = format!("y {:.2} mm   z {:.2} mm", units::mm(p.y_m), units::mm(p.z_m));

@@ -42,6 +42,7 @@ use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::hand::{HandAxis, HandPose};
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
+use touch2touch::io::dataset::ToolUnit;
 use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::work::adapt::{Adapted, Scored};
 use touch2touch::work::error::TaskError;
@@ -49,6 +50,7 @@ use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
 use touch2touch::work::subject::Subject;
+use touch2touch::work::tool::UnitSet;
 
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;
@@ -255,6 +257,9 @@ macro_rules! draws {
             .prop_map(|(finger, source, at_px, erase)| $command::BeginStroke { finger, source, at_px, erase })
             .boxed()
     };
+    (one $command:ident ReadToolAs $a:expr, $b:expr, $c:expr) => {
+        ($a, $b, $c).prop_map(|(tool, unit, replacing)| $command::ReadToolAs { tool, unit, replacing }).boxed()
+    };
     (one $command:ident BindKey $a:expr, $b:expr, $c:expr) => {
         ($a, $b, $c).prop_map(|(action, place, shortcut)| $command::BindKey { action, place, shortcut }).boxed()
     };
@@ -276,6 +281,7 @@ draws! {
         1 Open(place()),
         1 Reload,
         1 ForgetRecent(place()),
+        1 ReadToolAs(Just("tool_a".to_owned()), any_of::<ToolUnit>(), proptest::option::of(Just("in".to_owned()))),
         1 SetFilter(select(vec![String::new(), "tool_a".into(), "is:todo".into(), "angle>5".into(), "nothing like it".into()])),
         1 SetToolFilter(proptest::option::of(Just("tool_b".to_owned()))),
         1 SetSort(any_of::<Sort>()),
@@ -380,6 +386,7 @@ draws! {
         1 Ask(any::<bool>()),
         1 SetForm(form()),
         1 Place(output()),
+        1 OwnPreferences,
         1 WriteCase(Just(PathBuf::from("no/such/folder/a.t2tcase")), Just(String::new())),
         1 Write(output(), Just(PathBuf::from("no/such/folder/picture.png"))),
     }
@@ -437,6 +444,13 @@ draws! {
         1 Followed(Just(NEVER), Just(()).prop_map(|()| followed())),
         1 Opened(ticket(), Just(NEVER), place(), Just(()).prop_map(|()| {
             Double::new(false, true).open(&Place::Demo).expect("the double opens")
+        })),
+        1 UnitSet(ticket(), select(vec![DatasetSeq(1), NEVER]), Just(()).prop_map(|()| UnitSet {
+            tool: "tool_a".into(),
+            unit: ToolUnit::Millimeters,
+            file: "unit.txt".into(),
+            word: "mm".into(),
+            not_written: None,
         })),
         1 Bundles(Just(()).prop_map(|()| Double::new(false, true).find_bundles(&[]).0), Just(Vec::new())),
         1 SettingsLoaded(mask().prop_map(|mask| Box::new(Settings { mask, ..Settings::default() })), Just(None)),

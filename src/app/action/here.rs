@@ -14,7 +14,7 @@ impl Action {
         match workspace {
             Workspace::Inspect => matches!(
                 self,
-                Self::Generate | Self::GenerateNewSeed | Self::NextSample | Self::PreviousSample | Self::NextWorst
+                Self::Generate | Self::GenerateNewSeed | Self::NextPair | Self::PreviousPair | Self::NextWorst
             ),
             Workspace::Align => self.group() == Group::Pose,
             Workspace::Label => self.group() == Group::Mask || self == Self::NextUnfinished,

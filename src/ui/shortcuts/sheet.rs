@@ -90,7 +90,9 @@ pub(in crate::ui) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Me
         question(cx, ui, memory);
         ui.add_space(4.0);
         let height = (size.y - 180.0).max(120.0);
-        egui::ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, |ui| body(cx, ui, memory));
+        let scroll = egui::ScrollArea::vertical().max_height(height).min_scrolled_height(height);
+        // The sheet stays as large as it is when a filter leaves little of it.
+        scroll.auto_shrink(false).show(ui, |ui| body(cx, ui, memory));
     });
     if modal.should_close() {
         cx.push(ViewCommand::SetShortcutSheet(false));
@@ -235,6 +237,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
 fn row(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, memory: &mut Memory) {
     let keys = cx.keys().all(action);
     let name = action.name();
+    ui.spacing_mut().interact_size.y = ROW;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(3.0, 1.0);
         ui.spacing_mut().button_padding = vec2(4.0, 0.0);
