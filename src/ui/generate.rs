@@ -78,7 +78,7 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     for problem in &cx.state.library.bundle_problems {
         ui.label(RichText::new(problem.to_string()).size(SMALL).color(cx.p.wrong));
     }
-    row(ui, cx.p.weak, "Quality", |ui| {
+    row(ui, cx.p.weak, "Preset", |ui| {
         for preset in Preset::iter() {
             let chosen = spelt_out.preset == Some(preset);
             let button = ui.add(egui::Button::selectable(chosen, preset_name(preset)));
@@ -181,7 +181,10 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.horizontal(|ui| {
                 progress::bar(ui, width - 76.0, fraction, &text);
                 let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
-                if cancel.on_hover_text(cx.keys().behind("Stop generating; what is shown stays", Action::CancelJobs)).clicked() {
+                if cancel
+                    .on_hover_text(cx.keys().behind("Stop generating; what is shown stays", Action::CancelJobs))
+                    .clicked()
+                {
                     cx.push(TasksCommand::Cancel(ticket));
                 }
             });

@@ -218,7 +218,7 @@ fn look(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.push(SettingsCommand::SetMaskOutline(outline));
         }
         let mut footprint = settings.footprint_visible;
-        if ui.checkbox(&mut footprint, "gel window").on_hover_text(cx.keys().help(Action::Footprint)).changed() {
+        if ui.checkbox(&mut footprint, "GelSlim window").on_hover_text(cx.keys().help(Action::Footprint)).changed() {
             cx.push(SettingsCommand::SetFootprintVisible(footprint));
         }
     });

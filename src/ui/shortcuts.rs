@@ -42,8 +42,10 @@ pub(super) fn pressed(
     let mut actions = Vec::new();
     ctx.input_mut(|input| {
         // The most specific first: Ctrl + Shift + Z is not Ctrl + Z.
-        let mut all: Vec<(Action, Shortcut)> =
-            Action::iter().filter(|a| possible(*a)).flat_map(|a| keys.all(a).into_iter().map(move |s| (a, s))).collect();
+        let mut all: Vec<(Action, Shortcut)> = Action::iter()
+            .filter(|a| possible(*a))
+            .flat_map(|a| keys.all(a).into_iter().map(move |s| (a, s)))
+            .collect();
         all.sort_by_key(|(_, s)| std::cmp::Reverse(u8::from(s.ctrl) + u8::from(s.shift) + u8::from(s.alt)));
         for (action, s) in all {
             if typing && !s.ctrl && !s.key.is_function() {

@@ -133,7 +133,7 @@ fn the_sheet_begins_with_what_works_here_and_fits_the_window() {
         rig.harness.step();
         press(&mut rig, Modifiers::NONE, Key::F1);
         rig.shoot(&format!("shortcuts-{}", size[0]));
-        assert!(says(&rig, "Here: Align, 3D measured"));
+        assert!(says(&rig, "HERE: ALIGN, 3D MEASURED"));
         let top = |rig: &Rig, name: &str| rig.harness.get_by_label(name).rect().top();
         let (here, file) = (top(&rig, "Another key for Cut open"), top(&rig, "Another key for Open folder…"));
         assert!(here < file, "{here} {file}");

@@ -230,7 +230,10 @@ mod tests {
         keys.bind(Action::OpenDemo, 0, Some(key("Ctrl+G")));
         let written = serde_json::to_value(&keys).unwrap();
         assert_eq!(written["save"], serde_json::json!(["Ctrl+Shift+S"]));
-        assert_eq!((Bindings::read(&written), serde_json::from_value(written).unwrap()), ((keys.clone(), vec![]), keys));
+        assert_eq!(
+            (Bindings::read(&written), serde_json::from_value(written).unwrap()),
+            ((keys.clone(), vec![]), keys)
+        );
         let damaged = serde_json::json!({
             "fly": ["F9"], "save": ["Hyper+S"], "reload": 7, "generate": [3], "undo": ["Alt+F4"],
             "figure": ["F7"], "flag": ["F7", "F8"], "skip": [],

@@ -208,7 +208,9 @@ impl Shortcut {
             Self { ctrl: true, alt: false, key: K::Escape, .. } => "the desktop",
             Self { ctrl: true, alt: false, shift: false, key: K::X | K::V } => "cutting and pasting",
             Self { ctrl: true, alt: false, key: K::Minus | K::Equals | K::Num0, .. } => "the zoom of the window",
-            Self { ctrl: false, alt: false, shift: false, key: K::F } => "the Compare pane, which shows B while it is held",
+            Self { ctrl: false, alt: false, shift: false, key: K::F } => {
+                "the Compare pane, which shows B while it is held"
+            }
             _ => return None,
         })
     }
@@ -254,9 +256,21 @@ mod tests {
     #[test]
     fn what_window_managers_use_is_known() {
         for text in [
-            "Alt+F4", "Alt+F2", "Alt+Space", "Alt+Esc", "Alt+Shift+Esc", "Ctrl+Alt+Left", "Ctrl+Alt+Right",
-            "Ctrl+Alt+Up", "Ctrl+Alt+Down", "Ctrl+Alt+Shift+Left", "Ctrl+Alt+F1", "Ctrl+Alt+F12", "Ctrl+Alt+Delete",
-            "Ctrl+Alt+T", "Ctrl+V",
+            "Alt+F4",
+            "Alt+F2",
+            "Alt+Space",
+            "Alt+Esc",
+            "Alt+Shift+Esc",
+            "Ctrl+Alt+Left",
+            "Ctrl+Alt+Right",
+            "Ctrl+Alt+Up",
+            "Ctrl+Alt+Down",
+            "Ctrl+Alt+Shift+Left",
+            "Ctrl+Alt+F1",
+            "Ctrl+Alt+F12",
+            "Ctrl+Alt+Delete",
+            "Ctrl+Alt+T",
+            "Ctrl+V",
         ] {
             assert!(text.parse::<Shortcut>().unwrap().used_by().is_some(), "{text}");
         }

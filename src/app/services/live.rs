@@ -321,8 +321,11 @@ impl LiveServices {
         match parse_settings(&bytes) {
             Ok((settings, refused)) => {
                 let problem = (!refused.is_empty()).then(|| {
-                    TaskError::new("Some keys have their defaults", format!("{} ({})", refused.join("; "), file.display()))
-                        .with_hint("The shortcut sheet sets them")
+                    TaskError::new(
+                        "Some keys have their defaults",
+                        format!("{} ({})", refused.join("; "), file.display()),
+                    )
+                    .with_hint("The shortcut sheet sets them")
                 });
                 (settings.validated(), problem)
             }

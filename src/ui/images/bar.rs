@@ -38,7 +38,7 @@ pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &
 /// What setting the range does.
 const AUTO: &str = "Set the range once from what is shown";
 /// What the lock means.
-const LOCK: &str = "Locked: colors mean the same in every sample. Unlocked: set from each sample shown";
+const LOCK: &str = "Locked: colors mean the same in every pair. Unlocked: set from each pair shown";
 
 /// The bar of a pane's pictures: that of errors, else that of depth.
 pub(in crate::ui) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histogram>) {

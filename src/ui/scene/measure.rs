@@ -120,7 +120,9 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
                 ui.label(caption("Point", cx.p));
                 ui.with_layout(eframe::egui::Layout::right_to_left(eframe::egui::Align::Center), |ui| {
                     let close = ui.add(eframe::egui::Button::new("×").frame(false).min_size(vec2(14.0, 14.0)));
-                    let close = close.accessible_name("Close the read-out").on_hover_text(cx.keys().fill("Closes it ([[cancel_jobs]])"));
+                    let close = close
+                        .accessible_name("Close the read-out")
+                        .on_hover_text(cx.keys().fill("Closes it ([[cancel_jobs]])"));
                     if close.clicked() {
                         cx.push(Command::Workbench(WorkbenchCommand::Pick(None)));
                     }
