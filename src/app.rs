@@ -10,9 +10,11 @@
 //! * [`pane`] is the table of the panes: titles, places, which file of the window draws each and what it needs.
 //! * [`state::State::wanted`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
 //!   its lanes (files, computing, models) and answers with commands.
-//! * [`action::Action`] is the table of what a person can trigger: menus, palette and shortcut sheet are made from it.
+//! * [`action::Action`] is the table of what a person can trigger, with its keys: menus, palette and shortcut sheet are made
+//!   from it; [`act`] says what each does now.
 //! * [`services`] joins the model to files and models; the command line calls the same functions.
 
+pub mod act;
 pub mod action;
 pub mod adapt;
 pub mod answers;

@@ -31,6 +31,7 @@ mod simulate;
 mod stats;
 mod sweep;
 mod training_data;
+mod unit;
 mod version;
 mod watch;
 
@@ -54,7 +55,7 @@ use crate::io::dataset::ToolScale;
 struct Cli {
     #[command(subcommand)]
     verb: Option<Verb>,
-    /// A dataset to open in the studio: a folder in the lab's layout or of image pairs, or a built-in one.
+    /// A data set to open in the studio: a folder in the lab's layout or of image pairs, or a built-in one.
     path: Option<PathBuf>,
     /// Start the studio with its default layout and settings.
     #[arg(long)]
@@ -69,7 +70,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Write a simulated dataset in the lab's format.
+    /// Write a simulated data set in the lab's format.
     Simulate(simulate::SimulateArgs),
     /// Predict Soft Bubble imprints from GelSlim images and compare them with the measured ones.
     Generate(generate::GenerateArgs),
@@ -77,16 +78,16 @@ enum Verb {
     Compare(Box<compare::CompareArgs>),
     /// Everything between the decoder and the meters, for one pair: stages, histograms, line against truth, what is odd.
     Ledger(Box<ledger::LedgerArgs>),
-    /// Statistics of a dataset's predictions and measurements, for the shift `--shift refit`.
+    /// Statistics of a data set's predictions and measurements, for the shift `--shift refit`.
     Stats(stats::StatsArgs),
     /// Follow a folder: predict and pose each GelSlim touch that appears, and write the result beside it.
     ///
-    /// PATH may still be empty: a dataset in the lab's layout (the bubbles may be missing), a folder of GelSlim .pt
+    /// PATH may still be empty: a data set in the lab's layout (the bubbles may be missing), a folder of GelSlim .pt
     /// files, of NAME_gelslim.png, or of NAME_touch.png with NAME_reference.png or one reference.png (or .jpg).
     Watch(Box<watch::WatchArgs>),
     /// Estimate in-hand poses from measured or predicted imprints.
     Pose(pose::PoseArgs),
-    /// The paper's results table of a dataset: generators side by side, with the measured imprints as the upper bound.
+    /// The paper's results table of a data set: generators side by side, with the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
     /// Turn a dial (mask threshold or probability, gate, trim, shift) over all pairs, and say what it does to every pose.
     Sweep(Box<sweep::SweepArgs>),
@@ -96,7 +97,7 @@ enum Verb {
     Export(Box<export::ExportArgs>),
     /// Fits a generator to pairs of your own sensors, and says what it is worth on pairs that were left out.
     Adapt(Box<adapt::AdaptArgs>),
-    /// Write training data for the networks: a dataset or, with `simulator` as PATH, simulated touches, as shards that
+    /// Write training data for the networks: a data set or, with `simulator` as PATH, simulated touches, as shards that
     /// `python -m training.train` reads.
     TrainingData(Box<training_data::TrainingDataArgs>),
     /// Where starts of the registration lead, for one pair: the numbers behind the basin map.
@@ -106,8 +107,10 @@ enum Verb {
     /// Contact masks.
     #[command(subcommand)]
     Masks(masks::MasksVerb),
-    /// Open a dataset and list what is wrong with it.
+    /// Open a data set and list what is wrong with it.
     Doctor(doctor::DoctorArgs),
+    /// Say which unit the CAD models (STL) of a data set are in, or set it for good.
+    Unit(unit::UnitArgs),
     /// Time and error of the registration engines and of the generator, side by side.
     #[command(subcommand)]
     Bench(bench::BenchVerb),
@@ -207,7 +210,7 @@ fn is_verb(word: &std::ffi::OsStr) -> bool {
     verbs().iter().any(|verb| word == verb.as_str())
 }
 
-/// Refuses what is neither a folder nor a file nor the name of a built-in dataset, before a window opens: most likely it
+/// Refuses what is neither a folder nor a file nor the name of a built-in data set, before a window opens: most likely it
 /// is a mistyped verb.
 fn check_studio_path(path: &Path) -> anyhow::Result<()> {
     use crate::io::dataset::BuiltIn;
@@ -254,6 +257,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Label(args)) => label::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
+        Some(Verb::Unit(args)) => unit::run(&args),
         Some(Verb::Bench(verb)) => bench::run(&verb),
         Some(Verb::Case(verb)) => case::run(&verb),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),

@@ -1,4 +1,4 @@
-//! Adapters to files: datasets, meshes, arrays, masks, export.
+//! Adapters to files: data sets, meshes, arrays, masks, export.
 //!
 //! Every error names the file, what is wrong with it, and (`hint`) what to do about it.
 

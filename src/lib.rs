@@ -11,7 +11,7 @@
 //! ```
 //!
 //! * [`domain`]: pure science, no files, threads, clocks or windows.
-//! * [`io`]: datasets, meshes, masks and every other file.
+//! * [`io`]: data sets, meshes, masks and every other file.
 //! * [`infer`]: model bundles and the engines that run them.
 //! * [`work`]: the job itself, from a touch to a pose and its figures, once for the studio and the command line.
 //! * [`app`]: the application model (state, commands, jobs), without a window.

@@ -102,8 +102,8 @@ fn how(action: Action) -> How {
         }
         A::NextLayer | A::AnimateWeakest => Options(&["pose", "demo", "--trace", "--json"]),
         A::CancelJobs | A::Undo | A::Redo => Shell,
-        A::PreviousSample | A::NextSample | A::TenBack | A::TenForward | A::FirstSample | A::LastSample => Window,
-        A::NextUnfinished | A::NextWorst | A::OtherFinger | A::BothFingers | A::FindSample => Window,
+        A::PreviousPair | A::NextPair | A::TenBack | A::TenForward | A::FirstPair | A::LastPair => Window,
+        A::NextUnfinished | A::NextWorst | A::OtherFinger | A::BothFingers | A::FindPair => Window,
         A::Brush | A::Eraser | A::Lasso | A::Polygon | A::RectangleTool | A::Wand => Verb(&[
             "label",
             "demo",
@@ -125,7 +125,7 @@ fn how(action: Action) -> How {
         A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace => Window,
         A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
         // Image panes are drawn by `figure`; these are photographs of the window.
-        A::SavePane | A::CopyPane => Window,
+        A::SavePane | A::CopyPane | A::OwnPreferences => Window,
         A::Palette | A::ShortcutSheet | A::ResetSettings => Window,
     }
 }

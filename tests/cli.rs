@@ -22,8 +22,10 @@ mod hostile;
 #[cfg(feature = "onnx")]
 mod outputs;
 mod training_data;
+mod unit;
 #[cfg(feature = "onnx")]
 mod watch;
+mod words;
 
 fn json(output: &Output) -> Value {
     let text = String::from_utf8(output.stdout.clone()).unwrap();

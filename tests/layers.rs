@@ -246,3 +246,30 @@ fn assets_stay_small() {
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
     assert!(bytes(&assets) < 30_000_000, "assets must stay under 30 MB");
 }
+
+#[test]
+fn no_text_of_the_window_says_a_key_that_can_be_another() {
+    use strum::IntoEnumIterator as _;
+    use touch2touch::app::action::{Action, Key};
+    let mut files = Vec::new();
+    rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/ui"), &mut files);
+    // Escape closes what covers the panes and Enter takes what was typed, whatever their actions are.
+    let keys = Action::iter().flat_map(|action| action.defaults().iter().copied());
+    let keys: Vec<_> = keys.filter(|key| !matches!(key.key, Key::Escape | Key::Enter)).collect();
+    let mut filled = 0;
+    for file in files {
+        let text = code(&std::fs::read_to_string(&file).unwrap());
+        for key in &keys {
+            let said = text.contains(&format!(" ({key})")) || (key.ctrl && text.contains(&key.to_string()));
+            assert!(!said, "{}: {key} is said by hand; `Bindings` says it", file.display());
+        }
+        for part in text.split("[[").skip(1) {
+            let name = part.split("]]").next().unwrap_or_default();
+            if name.chars().all(|c| c.is_ascii_lowercase() || c == '_') {
+                assert!(name.parse::<Action>().is_ok(), "{}: [[{name}]] is no action", file.display());
+                filled += 1;
+            }
+        }
+    }
+    assert!(filled > 20, "{filled}");
+}

@@ -1,28 +1,15 @@
-//! [`Action`]: the table of what a person can trigger. Menus, toolbar, palette and shortcut sheet are made from it.
+//! [`Action`]: the table of what a person can trigger. Menus, toolbar, palette and shortcut sheet are made from it; what
+//! an action does is in [`super::act`].
 
+mod bindings;
+mod here;
 mod key;
 
-use strum::{EnumIter, IntoEnumIterator};
+use strum::{EnumIter, EnumString, IntoEnumIterator, IntoStaticStr};
 
-use super::command::{
-    AdaptCommand, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
-    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest,
-    ViewCommand, WorkbenchCommand,
-};
-use super::export::state::Output;
-use super::inspect::state::Inspected;
-use super::keys::{ImprintSource, Registration, Request, ShiftMode};
-use super::labels::state::Review;
-use super::library::state::Place;
-use super::settings::state::scene::{LayerLook, SceneLayer, SceneLook};
-use super::settings::state::versus::{Versus, VersusMode};
-use super::settings::state::{ColorRange, MaskTool, Theme, Workspace};
-use super::state::{Absent, State};
-use super::workbench::state::{Layer, SceneTool, Section};
-use crate::domain::hand::HandAxis;
-use crate::domain::label::CleanKind;
+pub use bindings::Bindings;
 pub use key::{Key, Shortcut};
-use key::{alt, alt_shift, ctrl, ctrl_alt, ctrl_shift, plain, shift};
+use key::{alt, alt_shift, ctrl, ctrl_shift, plain, shift};
 
 /// The part of the shortcut sheet an action stands in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter)]
@@ -65,8 +52,9 @@ impl Group {
 
 macro_rules! actions {
     ($( $name:ident, $group:ident, $label:literal, $tooltip:literal, [$($shortcut:expr),*]; )*) => {
-        /// Something a person can trigger.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter)]
+        /// Something a person can trigger. The settings name it in snake case.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter, EnumString, IntoStaticStr)]
+        #[strum(serialize_all = "snake_case")]
         pub enum Action {
             $( #[doc = $tooltip] $name, )*
         }
@@ -87,8 +75,8 @@ macro_rules! actions {
                 match self { $( Self::$name => Group::$group, )* }
             }
 
-            /// Its shortcuts, the main one first.
-            pub fn shortcuts(self) -> &'static [Shortcut] {
+            /// Its shortcuts where a person chose none ([`Bindings`] has those in force), the main one first.
+            pub fn defaults(self) -> &'static [Shortcut] {
                 match self { $( Self::$name => const { &[$($shortcut),*] }, )* }
             }
         }
@@ -104,21 +92,22 @@ actions! {
     Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)];
     Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)];
     SaveCase, File, "Save case…", "Writes this pair with all that its results depend on into one file, which opens to the same picture elsewhere", [];
+    OwnPreferences, File, "Back to my preferences", "Gives your own preferences back, while the case stays open", [];
     ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [];
     ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [];
     ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
 
-    PreviousSample, Navigate, "Previous sample", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)];
-    NextSample, Navigate, "Next sample", "Shows the next pair of the list", [plain(K::D), plain(K::PageDown)];
+    PreviousPair, Navigate, "Previous pair", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)];
+    NextPair, Navigate, "Next pair", "Shows the next pair of the list", [plain(K::D), plain(K::PageDown)];
     TenBack, Navigate, "10 back", "Moves 10 pairs back in the list", [shift(K::A)];
     TenForward, Navigate, "10 forward", "Moves 10 pairs forward in the list", [shift(K::D)];
-    FirstSample, Navigate, "First sample", "Shows the first pair of the list", [plain(K::Home)];
-    LastSample, Navigate, "Last sample", "Shows the last pair of the list", [plain(K::End)];
+    FirstPair, Navigate, "First pair", "Shows the first pair of the list", [plain(K::Home)];
+    LastPair, Navigate, "Last pair", "Shows the last pair of the list", [plain(K::End)];
     NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift(K::N)];
     NextWorst, Navigate, "Next worst", "Shows the pair that is worst by the chosen score, then the next worse one", [plain(K::N)];
     OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)];
     BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)];
-    FindSample, Navigate, "Filter samples", "Moves the keyboard to the filter of the list", [ctrl(K::F)];
+    FindPair, Navigate, "Filter pairs", "Moves the keyboard to the filter of the list", [ctrl(K::F)];
 
     Generate, Generate, "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", [ctrl(K::G)];
     GenerateNewSeed, Generate, "Generate with a new seed", "Draws another seed, then generates", [ctrl_shift(K::G)];
@@ -132,7 +121,7 @@ actions! {
     ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
     NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)];
-    Refit, Generate, "Refit on this dataset", "Computes shift statistics of this data set's predictions and measurements, and uses them", [];
+    Refit, Generate, "Refit on this data set", "Computes shift statistics of this data set's predictions and measurements, and uses them", [];
 
     Brush, Mask, "Brush", "Adds to the mask while the button is down", [plain(K::Num1), plain(K::B)];
     Eraser, Mask, "Eraser", "Removes from the mask while the button is down", [plain(K::Num2), plain(K::E)];
@@ -172,15 +161,15 @@ actions! {
     AcceptPredictedPose, Pose, "Accept the predicted pose", "Stores the pose of the predicted imprint with the pair", [];
     PoseTool, Pose, "Pose tool", "Moves the tool by hand in the 3D panes: arrow keys, or the handles", [plain(K::Z)];
     SixDof, Pose, "6-DoF", "Lets the pose tool leave the plane: x, pitch and yaw as well", [];
-    NudgeLeft, Pose, "Nudge -y", "Moves the tool by 0.1 mm along -y; Shift 1 mm, Ctrl 0.01 mm", [plain(K::ArrowLeft), shift(K::ArrowLeft), ctrl(K::ArrowLeft)];
-    NudgeRight, Pose, "Nudge +y", "Moves the tool by 0.1 mm along +y; Shift 1 mm, Ctrl 0.01 mm", [plain(K::ArrowRight), shift(K::ArrowRight), ctrl(K::ArrowRight)];
-    NudgeUp, Pose, "Nudge -z", "Moves the tool by 0.1 mm along -z, to the wrist; Shift 1 mm, Ctrl 0.01 mm", [plain(K::ArrowUp), shift(K::ArrowUp), ctrl(K::ArrowUp)];
-    NudgeDown, Pose, "Nudge +z", "Moves the tool by 0.1 mm along +z; Shift 1 mm, Ctrl 0.01 mm", [plain(K::ArrowDown), shift(K::ArrowDown), ctrl(K::ArrowDown)];
-    TurnLeft, Pose, "Turn -", "Turns the tool by -0.5° about x; Shift 5°, Ctrl 0.05°", [alt(K::ArrowLeft), alt_shift(K::ArrowLeft), ctrl_alt(K::ArrowLeft)];
-    TurnRight, Pose, "Turn +", "Turns the tool by 0.5° about x; Shift 5°, Ctrl 0.05°", [alt(K::ArrowRight), alt_shift(K::ArrowRight), ctrl_alt(K::ArrowRight)];
+    NudgeLeft, Pose, "Nudge -y", "Moves the tool by 0.1 mm along -y; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowLeft), shift(K::ArrowLeft), ctrl(K::ArrowLeft)];
+    NudgeRight, Pose, "Nudge +y", "Moves the tool by 0.1 mm along +y; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowRight), shift(K::ArrowRight), ctrl(K::ArrowRight)];
+    NudgeUp, Pose, "Nudge -z", "Moves the tool by 0.1 mm along -z, to the wrist; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowUp), shift(K::ArrowUp), ctrl(K::ArrowUp)];
+    NudgeDown, Pose, "Nudge +z", "Moves the tool by 0.1 mm along +z; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowDown), shift(K::ArrowDown), ctrl(K::ArrowDown)];
+    TurnLeft, Pose, "Turn -", "Turns the tool by -0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt(K::ArrowLeft), alt_shift(K::ArrowLeft), ctrl_shift(K::ArrowLeft)];
+    TurnRight, Pose, "Turn +", "Turns the tool by 0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt(K::ArrowRight), alt_shift(K::ArrowRight), ctrl_shift(K::ArrowRight)];
     IcpFromHere, Pose, "Start ICP from here", "Registers from the pose set by hand, with the chosen registration", [shift(K::Z)];
     AcceptHand, Pose, "Accept the pose by hand", "Stores the pose set by hand with the pair", [plain(K::Enter)];
-    RevertHand, Pose, "Revert the pose by hand", "Gives the pose set by hand up (Esc)", [];
+    RevertHand, Pose, "Revert the pose by hand", "Gives the pose set by hand up", [];
     MeasureDistance, Pose, "Measure distance", "Measures between two points clicked in 3D", [plain(K::Y)];
     MeasureAngle, Pose, "Measure angle", "Measures the angle at the second of three points clicked in 3D", [shift(K::Y)];
     StepBack, Pose, "Previous step", "Shows the step before in the time machine", [plain(K::Comma)];
@@ -229,20 +218,9 @@ actions! {
     CopyHovered, View, "Copy the hovered value", "Copies the number under the pointer", [ctrl(K::C)];
 
     Palette, Help, "Command palette", "Finds anything that can be done", [ctrl(K::P), ctrl(K::K)];
-    ShortcutSheet, Help, "Shortcuts", "Shows all shortcuts", [plain(K::Questionmark), plain(K::F1)];
+    ShortcutSheet, Help, "Shortcuts", "Shows the keys of all actions, and changes them", [plain(K::Questionmark), plain(K::F1)];
     ResetSettings, Help, "Reset preferences", "Sets all preferences to their defaults", [];
 }
-
-/// The next or previous of a fixed set, going round.
-fn next_of<T: IntoEnumIterator + PartialEq>(current: &T) -> Option<T> {
-    let position = T::iter().position(|t| t == *current)?;
-    T::iter().cycle().nth(position + 1)
-}
-
-/// Factor by which a key press changes the brush.
-const BRUSH_STEP: f32 = 1.25;
-/// By how much a key press changes the opacity.
-const OPACITY_STEP: f32 = 0.1;
 
 impl Action {
     /// Whether it moves the tool in hand: Shift and Ctrl make its steps larger and smaller.
@@ -263,7 +241,7 @@ impl Action {
             Self::ExportMasks => "unet training labels npy save",
             Self::NextWorst => "bad largest error outlier failure hardest",
             Self::NextUnfinished => "todo open unlabeled remaining",
-            Self::FindSample => "search list find",
+            Self::FindPair => "search list find samples",
             Self::Generate => "predict prediction run inference diffusion",
             Self::RunSeeds => "ensemble uncertainty spread repeat",
             Self::FitPairs => "adapt calibrate tune finetune train",
@@ -300,322 +278,6 @@ impl Action {
         };
         text.split_whitespace()
     }
-
-    /// Its main shortcut.
-    pub fn shortcut(self) -> Option<Shortcut> {
-        self.shortcuts().first().copied()
-    }
-
-    /// The action of a shortcut.
-    pub fn of_shortcut(shortcut: Shortcut) -> Option<Self> {
-        Self::iter().find(|action| action.shortcuts().contains(&shortcut))
-    }
-
-    /// Tooltip with the shortcut behind it.
-    pub fn help(self) -> String {
-        match self.shortcut() {
-            Some(shortcut) => format!("{} ({shortcut})", self.tooltip()),
-            None => self.tooltip().to_owned(),
-        }
-    }
-
-    /// What it does now; `None` = it cannot do anything now (grayed out).
-    pub fn command(self, state: &State) -> Option<Command> {
-        let open = state.library.open.is_some();
-        let selected = state.entry().is_some();
-        let listed = !state.library.order.is_empty();
-        let editable = state.document.is_editable(state.pair_name());
-        let settings = &state.settings;
-        let ui = |request: UiRequest| does(ViewCommand::Ui(request));
-        let clean_up = |kind| when(editable, LabelsCommand::CleanUp(settings.mask.clean_up(kind)));
-        match self {
-            Self::OpenFolder => ui(UiRequest::PickFolder),
-            Self::OpenDemo => does(LibraryCommand::Open(Place::Demo)),
-            Self::Reload => when(open, LibraryCommand::Reload),
-            Self::Follow => {
-                let folder = state.library.open.as_ref().is_some_and(|open| open.source.root().is_some());
-                when(folder, FollowCommand::Set(state.library.follow.is_none()))
-            }
-            Self::Save => does(LabelsCommand::Save),
-            Self::Figure => when(state.can_draw(), ExportCommand::Ask(!state.export.asking)),
-            Self::SaveCase => when(state.can_draw(), ExportCommand::Place(Output::Case)),
-            Self::ExportMeasured => export(state, ImprintSource::Measured),
-            Self::ExportPredicted => export(state, ImprintSource::Predicted),
-            Self::ExportMasks => when(open, ExportCommand::AskMasks(true)),
-
-            Self::PreviousSample => when(listed, LibraryCommand::Step(-1)),
-            Self::NextSample => when(listed, LibraryCommand::Step(1)),
-            Self::TenBack => when(listed, LibraryCommand::Step(-10)),
-            Self::TenForward => when(listed, LibraryCommand::Step(10)),
-            Self::FirstSample => when(listed, LibraryCommand::First),
-            Self::LastSample => when(listed, LibraryCommand::Last),
-            Self::NextUnfinished => when(listed, LibraryCommand::NextUnfinished),
-            Self::NextWorst => when(listed && state.table.by().is_some(), LibraryCommand::NextWorst),
-            Self::OtherFinger => does(ViewCommand::SelectFinger(state.other_finger())),
-            Self::BothFingers => does(ViewCommand::ShowBothFingers(!state.selection.both_fingers)),
-            Self::FindSample => {
-                when(state.selection.panes.contains(&Pane::Browser), ViewCommand::Ui(UiRequest::FocusFilter))
-            }
-
-            Self::Generate => when(state.can_generate().is_ok(), PredictCommand::Generate),
-            Self::GenerateNewSeed => when(state.can_generate().is_ok(), PredictCommand::GenerateNewSeed),
-            Self::TurnDial => when(state.turning().is_none() && state.sweep_setup().is_ok(), DialCommand::Start),
-            Self::FitPairs => {
-                let ready = state.can_adapt() && state.adapting().is_none();
-                when(ready, AdaptCommand::Start)
-            }
-            Self::UseFit => when(state.fitted().is_some() && !state.uses_fit(), AdaptCommand::Use),
-            Self::EvaluateDataset => {
-                let ready = state.evaluation_setup().is_some() && state.evaluating().is_none();
-                when(ready, EvaluateCommand::Start)
-            }
-            Self::PredictAll => {
-                let ready = state.scores_key().is_some() && state.evaluating().is_none();
-                when(ready, EvaluateCommand::All)
-            }
-            Self::ExportTable => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder)),
-            Self::RunSeeds => {
-                let possible = state.can_generate().is_ok() && state.selection.panes.contains(&Pane::Seeds);
-                when(possible, SeedsCommand::Run(!state.seeds_running()))
-            }
-            Self::LockSeed => {
-                let mut generate = settings.generate.clone();
-                generate.seed_locked = !generate.seed_locked;
-                does(SettingsCommand::SetGenerate(generate))
-            }
-            Self::CancelJobs => {
-                if state.document.stroke.is_some() {
-                    does(LabelsCommand::CancelStroke)
-                } else if let Some(command) = escape(state) {
-                    does(command)
-                } else if state.tasks.demanded.iter().any(|r| matches!(r, Request::Basin(_))) {
-                    does(InspectCommand::StopBasin)
-                } else if state.library.brush.is_some() && state.tasks.running.is_empty() {
-                    does(LibraryCommand::Brush(None))
-                } else if state.seeds_to_come() > 0 {
-                    does(SeedsCommand::Run(false))
-                } else {
-                    when(!state.tasks.running.is_empty(), TasksCommand::CancelAll)
-                }
-            }
-            Self::NextShift => {
-                // The refit, where there is one, comes after the last of the others.
-                let next = match (settings.shift, settings.refit) {
-                    (ShiftMode::Refit(_), _) => Some(ShiftMode::Raw),
-                    (ShiftMode::ExactInverse, Some(refit)) => Some(ShiftMode::Refit(refit)),
-                    (shift, _) => next_of::<ShiftMode>(&shift),
-                };
-                next.and_then(|shift| does(SettingsCommand::SetShift(shift)))
-            }
-            Self::Refit => when(state.can_generate().is_ok(), PredictCommand::Refit),
-
-            Self::Brush => does(SettingsCommand::SetMaskTool(MaskTool::Brush)),
-            Self::Eraser => does(SettingsCommand::SetMaskTool(MaskTool::Eraser)),
-            Self::Lasso => does(SettingsCommand::SetMaskTool(MaskTool::Lasso)),
-            Self::Polygon => does(SettingsCommand::SetMaskTool(MaskTool::Polygon)),
-            Self::RectangleTool => does(SettingsCommand::SetMaskTool(MaskTool::Rectangle)),
-            Self::Wand => does(SettingsCommand::SetMaskTool(MaskTool::Wand)),
-            Self::PanTool => does(SettingsCommand::SetMaskTool(MaskTool::Pan)),
-            Self::LastTool => does(SettingsCommand::LastMaskTool),
-            Self::BrushSmaller => does(SettingsCommand::SetBrushRadius(settings.mask.radius_px / BRUSH_STEP)),
-            Self::BrushLarger => does(SettingsCommand::SetBrushRadius(settings.mask.radius_px * BRUSH_STEP)),
-            Self::FillHoles => clean_up(CleanKind::FillHoles),
-            Self::LargestIsland => clean_up(CleanKind::LargestIsland),
-            Self::DropSmall => clean_up(CleanKind::DropSmall),
-            Self::OpenMask => clean_up(CleanKind::Open),
-            Self::CloseMask => clean_up(CleanKind::Close),
-            Self::SmoothMask => clean_up(CleanKind::Smooth),
-            Self::GrowMask => clean_up(CleanKind::Grow),
-            Self::ShrinkMask => clean_up(CleanKind::Shrink),
-            Self::ClearBorder => clean_up(CleanKind::ClearBorder),
-            Self::AdoptAutomatic => when(editable, LabelsCommand::AdoptAutomatic),
-            Self::TakeOver => when(editable, LabelsCommand::TakeOver),
-            Self::ResetMask => {
-                let finger = state.selection.finger;
-                let corrected = state.hand_mask(state.worked_on(finger), finger).is_some();
-                when(editable && corrected, LabelsCommand::ResetMask)
-            }
-            Self::Undo => {
-                when(state.history.next_undo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Undo)
-            }
-            Self::Redo => {
-                when(state.history.next_redo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Redo)
-            }
-            Self::MaskVisible => does(SettingsCommand::SetMaskVisible(!settings.mask_visible)),
-            Self::MaskOutline => does(SettingsCommand::SetMaskOutline(!settings.mask_outline)),
-            Self::MaskFainter => does(SettingsCommand::SetMaskOpacity(settings.mask_opacity - OPACITY_STEP)),
-            Self::MaskStronger => does(SettingsCommand::SetMaskOpacity(settings.mask_opacity + OPACITY_STEP)),
-            Self::DoneAndNext => when(editable, LibraryCommand::DoneAndNext),
-            Self::Flag => when(editable, LabelsCommand::SetReview(Review::Flagged)),
-            Self::Skip => when(editable, LabelsCommand::SetReview(Review::Skip)),
-            Self::MarkTodo => when(editable, LabelsCommand::SetReview(Review::Todo)),
-
-            Self::RunPose => when(selected, TasksCommand::Retry),
-            Self::AcceptMeasuredPose => accept(state, ImprintSource::Measured),
-            Self::AcceptPredictedPose => accept(state, ImprintSource::Predicted),
-            Self::PoseTool => toggle(state, SceneTool::Pose),
-            Self::MeasureDistance => toggle(state, SceneTool::Distance),
-            Self::MeasureAngle => toggle(state, SceneTool::Angle),
-            Self::SixDof => does(WorkbenchCommand::SetSixDof(!state.workbench.six_dof)),
-            Self::NudgeLeft => nudge(state, HandAxis::Y, -1.0),
-            Self::NudgeRight => nudge(state, HandAxis::Y, 1.0),
-            Self::NudgeUp => nudge(state, HandAxis::Z, -1.0),
-            Self::NudgeDown => nudge(state, HandAxis::Z, 1.0),
-            Self::TurnLeft => nudge(state, HandAxis::Theta, -1.0),
-            Self::TurnRight => nudge(state, HandAxis::Theta, 1.0),
-            Self::IcpFromHere => when(in_hand(state), WorkbenchCommand::StartIcp),
-            Self::AcceptHand => when(editable && state.workbench.hand.is_some(), WorkbenchCommand::AcceptHand),
-            Self::RevertHand => when(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand),
-            Self::StepBack => inspect(state, |s| s.at > 0, InspectCommand::By(-1)),
-            Self::StepForward => inspect(state, |s| !s.is_last(), InspectCommand::By(1)),
-            Self::FirstStep => inspect(state, |s| s.at > 0, InspectCommand::Begin),
-            Self::LastStep => inspect(state, |s| !s.is_last(), InspectCommand::End),
-            Self::PlaySteps => {
-                inspect(state, |s| s.inspection.num_steps(s.run) > 1, InspectCommand::Play(!state.inspect.playing))
-            }
-            Self::PinStep => inspect(state, |_| true, InspectCommand::Pin),
-            Self::OwnStarts => when(state.inspect.start.is_some(), InspectCommand::Start(None)),
-            Self::Correspondences => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines)),
-            Self::NextPoseEngine => next_of::<Registration>(&settings.pose_engine.by)
-                .and_then(|next| does(SettingsCommand::SetPoseEngine(next.into()))),
-
-            Self::LockRange => {
-                does(SettingsCommand::SetRange(ColorRange { locked: !settings.range.locked, ..settings.range }))
-            }
-            Self::RangeOnce => when(selected, SettingsCommand::RangeFromShown),
-            Self::ResetRange => does(SettingsCommand::SetRange(ColorRange::default())),
-            Self::Fit => ui(UiRequest::Fit),
-            Self::CameraLeft => ui(UiRequest::Camera(CameraPreset::Left)),
-            Self::CameraRight => ui(UiRequest::Camera(CameraPreset::Right)),
-            Self::CameraFront => ui(UiRequest::Camera(CameraPreset::Front)),
-            Self::CameraTop => ui(UiRequest::Camera(CameraPreset::Top)),
-            Self::NextLayer => {
-                next_of::<Layer>(&state.workbench.layer).and_then(|l| does(WorkbenchCommand::SetLayer(l)))
-            }
-            Self::AnimateWeakest => does(WorkbenchCommand::SetAnimateWeakest(!state.workbench.animate_weakest)),
-            Self::BothClouds => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds)),
-            Self::CompareMode => {
-                let versus = state.versus();
-                next_of::<VersusMode>(&versus.mode)
-                    .and_then(|mode| does(SettingsCommand::SetVersus(Versus { mode, ..versus })))
-            }
-            Self::SwapCompared => does(SettingsCommand::SetVersus(state.versus().swapped())),
-            Self::Section => {
-                let next = if state.workbench.section.is_some() { None } else { Some(Section::default()) };
-                does(WorkbenchCommand::SetSection(next))
-            }
-            Self::WindowOnly => {
-                let scene = &settings.scene;
-                does(SettingsCommand::SetScene(SceneLook { only_window: !scene.only_window, ..scene.clone() }))
-            }
-            Self::MembraneSurface => {
-                let scene = &settings.scene;
-                let surface = scene.layer(SceneLayer::Surface);
-                let points = scene.layer(SceneLayer::Membrane);
-                let changed = scene.clone().with(SceneLayer::Surface, LayerLook { shown: !surface.shown, ..surface });
-                let points = LayerLook { shown: surface.shown, ..points };
-                does(SettingsCommand::SetScene(changed.with(SceneLayer::Membrane, points)))
-            }
-            Self::EyeDome => {
-                let scene = &settings.scene;
-                does(SettingsCommand::SetScene(SceneLook { eye_dome: !scene.eye_dome, ..scene.clone() }))
-            }
-            Self::Parallel => {
-                let scene = &settings.scene;
-                does(SettingsCommand::SetScene(SceneLook { orthographic: !scene.orthographic, ..scene.clone() }))
-            }
-            Self::CopyCamera => ui(UiRequest::CopyCamera),
-            Self::LinkCameras => does(SettingsCommand::SetCamerasLinked(!settings.cameras_linked)),
-            Self::Footprint => does(SettingsCommand::SetFootprintVisible(!settings.footprint_visible)),
-            Self::SwitchTheme => {
-                next_of::<Theme>(&settings.theme).and_then(|next| does(SettingsCommand::SetTheme(next)))
-            }
-            Self::DepthChain => ui(UiRequest::ShowPane(Pane::Ledger)),
-            Self::InspectWorkspace => does(SettingsCommand::SetWorkspace(Workspace::Inspect)),
-            Self::AlignWorkspace => does(SettingsCommand::SetWorkspace(Workspace::Align)),
-            Self::LabelWorkspace => does(SettingsCommand::SetWorkspace(Workspace::Label)),
-            Self::EvaluateWorkspace => does(SettingsCommand::SetWorkspace(Workspace::Evaluate)),
-            Self::ResetWorkspace => ui(UiRequest::ResetWorkspace),
-            Self::MaximizePane => ui(UiRequest::ToggleMaximized),
-            Self::Fullscreen => ui(UiRequest::ToggleFullscreen),
-            Self::Screenshot => ui(UiRequest::Screenshot),
-            Self::SavePane => ui(UiRequest::PanePicture { copied: false }),
-            Self::CopyPane => ui(UiRequest::PanePicture { copied: true }),
-            Self::CopyHovered => when(state.selection.hover.is_some(), ViewCommand::Ui(UiRequest::CopyHovered)),
-
-            Self::Palette => does(ViewCommand::SetPalette(!state.selection.palette)),
-            Self::ShortcutSheet => does(ViewCommand::SetShortcutSheet(!state.selection.shortcut_sheet)),
-            Self::ResetSettings => does(SettingsCommand::ResetSettings),
-        }
-    }
-}
-
-impl Absent {
-    /// The action that brings it, if one does.
-    pub fn action(self) -> Option<Action> {
-        match self {
-            Self::NothingOpen => Some(Action::OpenDemo),
-            Self::NothingSelected => Some(Action::FirstSample),
-            Self::NoPrediction => Some(Action::Generate),
-            _ => None,
-        }
-    }
-}
-
-fn does(command: impl Into<Command>) -> Option<Command> {
-    Some(command.into())
-}
-
-fn when(possible: bool, command: impl Into<Command>) -> Option<Command> {
-    possible.then(|| command.into())
-}
-
-/// Whether the pose tool is in hand and there is a tool to be moved.
-fn in_hand(state: &State) -> bool {
-    state.workbench.tool == SceneTool::Pose && state.tool().ready().is_some()
-}
-
-/// Takes a tool of the 3D panes, or puts it away.
-fn toggle(state: &State, tool: SceneTool) -> Option<Command> {
-    let next = if state.workbench.tool == tool { SceneTool::Look } else { tool };
-    when(state.entry().is_some(), WorkbenchCommand::SetTool(next))
-}
-
-fn nudge(state: &State, axis: HandAxis, steps: f64) -> Option<Command> {
-    when(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
-}
-
-/// What Escape gives up in the 3D panes: the pose in hand, then a measurement, then the point read.
-fn escape(state: &State) -> Option<WorkbenchCommand> {
-    let bench = &state.workbench;
-    if bench.hand.is_some() {
-        Some(WorkbenchCommand::RevertHand)
-    } else if !bench.marks.is_empty() {
-        Some(WorkbenchCommand::ClearMarks)
-    } else if bench.tool != SceneTool::Look {
-        Some(WorkbenchCommand::SetTool(SceneTool::Look))
-    } else {
-        bench.picked.map(|_| WorkbenchCommand::Pick(None))
-    }
-}
-
-/// A command of the time machine, where it is on screen and shows a step for which it can do something.
-fn inspect(state: &State, useful: impl Fn(Inspected<'_>) -> bool, command: InspectCommand) -> Option<Command> {
-    let shown = state.selection.panes.contains(&Pane::TimeMachine).then(|| state.inspected())??;
-    when(useful(shown), command)
-}
-
-/// Asks where the cloud, pose and mesh of an imprint go, where there is a cloud.
-fn export(state: &State, source: ImprintSource) -> Option<Command> {
-    when(state.pair_export(source).is_some(), ExportCommand::Place(Output::Pair(source)))
-}
-
-/// Accepts the pose shown, or withdraws it if it is the accepted one.
-fn accept(state: &State, source: ImprintSource) -> Option<Command> {
-    let shown = state.pose(source).ready()?.grasp_from_object;
-    let accepted = state.document.pair(state.pair_name()).and_then(|labels| labels.accepted(source));
-    let editable = state.document.is_editable(state.pair_name());
-    when(editable, LabelsCommand::AcceptPose(source, accepted != Some(shown.into())))
 }
 
 #[cfg(test)]
@@ -629,9 +291,10 @@ mod tests {
         let mut shortcuts: BTreeMap<Shortcut, Action> = BTreeMap::new();
         let mut names: BTreeMap<&str, Action> = BTreeMap::new();
         for action in Action::iter() {
-            for shortcut in action.shortcuts() {
+            for shortcut in action.defaults() {
                 assert_eq!(shortcuts.insert(*shortcut, action), None, "{shortcut} is taken, {action:?} wants it too");
-                assert_eq!(Action::of_shortcut(*shortcut), Some(action));
+                assert_eq!(shortcut.used_by(), None, "{action:?} {shortcut}");
+                assert_eq!(shortcut.plainly(), *shortcut, "{action:?}");
             }
             assert_eq!(names.insert(action.name(), action), None);
         }
@@ -642,21 +305,7 @@ mod tests {
         for action in Action::iter() {
             assert!(action.tooltip().len() >= 8 && !action.tooltip().ends_with('.'), "{action:?}");
             assert!(action.name().chars().next().is_some_and(|c| c.is_uppercase() || c.is_numeric()), "{action:?}");
-            assert!(action.help().starts_with(action.tooltip()));
         }
-        assert_eq!(Action::Redo.help(), "Does it again (Ctrl+Shift+Z)");
-        assert_eq!(Action::CameraTop.shortcut().unwrap().to_string(), "Ctrl+4");
         assert_eq!(Group::iter().flat_map(Group::actions).count(), Action::iter().count());
-    }
-
-    #[test]
-    fn nothing_open_grays_out_what_needs_data() {
-        let state = State::default();
-        for action in [Action::Generate, Action::NextSample, Action::Undo, Action::FillHoles, Action::Reload] {
-            assert!(action.command(&state).is_none(), "{action:?}");
-        }
-        for action in [Action::OpenFolder, Action::OpenDemo, Action::Palette, Action::SwitchTheme, Action::Brush] {
-            assert!(action.command(&state).is_some(), "{action:?}");
-        }
     }
 }

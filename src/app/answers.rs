@@ -20,6 +20,7 @@ use crate::work::error::{TaskError, TaskErrorKind};
 use crate::work::evaluate::Evaluation;
 use crate::work::job::Progress;
 use crate::work::sweep::Sweep;
+use crate::work::tool::UnitSet;
 
 /// What the runtime answers.
 #[derive(Clone, Debug)]
@@ -28,6 +29,8 @@ pub enum Answer {
     Followed(DatasetSeq, Followed),
     /// A data set was opened.
     Opened(Ticket, DatasetSeq, Place, Opened),
+    /// A tool's CAD file is read in another unit, of an opening.
+    UnitSet(Ticket, DatasetSeq, UnitSet),
     /// Bundles were looked for.
     Bundles(Vec<BundleInfo>, Vec<TaskError>),
     /// The settings file was read.
@@ -82,6 +85,11 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::Followed(seq, followed) => {
             let current = is_open(state, seq);
             follow::arrived(state, followed, current, effects);
+        }
+        Answer::UnitSet(ticket, seq, set) => {
+            tasks::forget(state, ticket);
+            let current = is_open(state, seq);
+            library::unit_set(state, set, current);
         }
         Answer::Bundles(bundles, problems) => {
             library::found(state, bundles, problems);

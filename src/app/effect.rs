@@ -13,6 +13,7 @@ use super::settings::state::Settings;
 use super::tasks::state::Ticket;
 use super::view::state::UiRequest;
 use crate::domain::sample::Sample;
+use crate::io::dataset::ToolUnit;
 use crate::work::adapt::AdaptSetup;
 use crate::work::bundles::BundleInfo;
 use crate::work::case::CaseSetup;
@@ -95,6 +96,21 @@ pub enum Effect {
         choice: ExportChoice,
         /// Where to.
         folder: PathBuf,
+    },
+    /// Have a tool's CAD file read in a unit.
+    SetUnit {
+        /// The job.
+        ticket: Ticket,
+        /// The opening.
+        seq: DatasetSeq,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// The tool.
+        tool: String,
+        /// The unit.
+        unit: ToolUnit,
+        /// What the file beside it says now, as the person was told.
+        replacing: Option<String>,
     },
     /// Score the open data set.
     Evaluate {
@@ -185,6 +201,7 @@ impl std::fmt::Debug for Effect {
             Self::SaveLabels(_, save) => write!(f, "SaveLabels({})", save.name),
             Self::SaveSettings(_) => write!(f, "SaveSettings"),
             Self::ExportMasks { folder, .. } => write!(f, "ExportMasks({})", folder.display()),
+            Self::SetUnit { tool, unit, .. } => write!(f, "SetUnit({tool}, {unit:?})"),
             Self::Evaluate { ticket, .. } => write!(f, "Evaluate({ticket:?})"),
             Self::Sweep { ticket, .. } => write!(f, "Sweep({ticket:?})"),
             Self::Adapt { ticket, .. } => write!(f, "Adapt({ticket:?})"),

@@ -8,7 +8,7 @@ pub use state::{CaseView, ExportState, FigureForm, MOST_PAIRS, Output, PairExpor
 use std::path::PathBuf;
 
 use super::effect::Effect;
-use super::settings::state::{GenerateSettings, Settings};
+use super::settings::state::GenerateSettings;
 use super::state::State;
 use super::view::state::UiRequest;
 use super::{library, predict, settings};
@@ -34,6 +34,8 @@ pub enum ExportCommand {
     Write(Output, PathBuf),
     /// Writes a case of the selected pair; the text is where 3D views look from.
     WriteCase(PathBuf, String),
+    /// Gives the person's own preferences back, while a case stays open.
+    OwnPreferences,
 }
 
 pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<Effect>) {
@@ -50,6 +52,7 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
             let file = ended(file, case_file::ENDING);
             effects.push(Effect::SaveCase { ticket, source, setup: Box::new(setup), file });
         }
+        ExportCommand::OwnPreferences => own_preferences(state, effects),
         ExportCommand::Write(Output::Case, file) => {
             step(state, ExportCommand::WriteCase(file, String::new()), effects);
         }
@@ -61,21 +64,13 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
 pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
     state.export.predict = false;
     let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-    let Some((pair, case)) = source.case() else { return };
+    let Some((pair, case)) = source.case() else { return own_preferences(state, effects) };
     let now = state.settings.clone();
+    // Of several cases in a row the first took over from the person.
+    state.own.get_or_insert_with(|| Box::new(now.clone()));
     let view = case.view.clone().and_then(|view| serde_json::from_value::<CaseView>(view).ok());
     if let Some(view) = &view {
-        // What is of the person and the machine stays as it is.
-        let settings = Settings {
-            theme: now.theme,
-            ui_zoom: now.ui_zoom,
-            recent: now.recent,
-            bundle_folders: now.bundle_folders,
-            cache_mib: now.cache_mib,
-            hint_dismissed: now.hint_dismissed,
-            ..view.settings.clone()
-        };
-        state.settings = settings.validated();
+        state.settings = view.settings.clone().of_person(&now).validated();
         state.selection.both_fingers = view.both_fingers;
         if state.rig().pads().any(|pad| pad == view.finger) {
             state.selection.finger = view.finger;
@@ -104,8 +99,17 @@ pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
     settings::save(state, effects);
     library::select(state, pair, effects);
     effects.push(Effect::Ui(UiRequest::ShowView(view.map_or_else(String::new, |view| view.camera))));
-    state.log.info(format!("A case of {}, with the preferences that it was saved with", case.dataset));
+    let text = "with the preferences that it was saved with; yours come back with the next data set";
+    state.log.info(format!("A case of {}, {text}", case.dataset));
     predict_case(state, effects);
+}
+
+/// Gives the person's own preferences back, where a case has brought others.
+fn own_preferences(state: &mut State, effects: &mut Vec<Effect>) {
+    let Some(own) = state.own.take() else { return };
+    state.settings = own.of_person(&state.settings).validated();
+    settings::save(state, effects);
+    effects.push(Effect::Ui(UiRequest::ShowView(String::new())));
 }
 
 /// Predicts what an opened case showed, as soon as there is a generator.

@@ -22,8 +22,10 @@ use super::tasks::state::Level;
 use super::{inspect, labels, settings, tasks};
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
+use crate::io::dataset::ToolUnit;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
+use crate::work::tool::UnitSet;
 
 /// What can happen to the data set and its list.
 #[derive(Clone, Debug)]
@@ -34,6 +36,15 @@ pub enum LibraryCommand {
     Reload,
     /// Removes a place from the recent ones.
     ForgetRecent(Place),
+    /// Reads a tool's CAD file in a unit from now on: writes that beside it.
+    ReadToolAs {
+        /// The tool.
+        tool: String,
+        /// The unit.
+        unit: ToolUnit,
+        /// What the file beside it says now, as the person was told.
+        replacing: Option<String>,
+    },
     /// Narrows the list.
     SetFilter(String),
     /// Narrows the list to one tool.
@@ -73,6 +84,12 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::ForgetRecent(place) => {
             state.settings.recent.retain(|p| *p != place);
             settings::save(state, effects);
+        }
+        LibraryCommand::ReadToolAs { tool, unit, replacing } => {
+            if let Some((source, seq)) = state.library.open.as_ref().map(|open| (open.source.clone(), open.seq)) {
+                let ticket = state.tasks.start(format!("Read {tool} in {}", unit.name()), Vec::new());
+                effects.push(Effect::SetUnit { ticket, seq, source, tool, unit, replacing });
+            }
         }
         LibraryCommand::SetFilter(filter) => {
             state.library.filter = filter;
@@ -122,6 +139,24 @@ fn open(state: &mut State, place: Place, effects: &mut Vec<Effect>) {
     state.library.opening = Some(place.clone());
     state.library.failure = None;
     effects.push(Effect::Open { ticket, seq, place });
+}
+
+/// A CAD file is read in another unit: what failed for it is tried again.
+pub(super) fn unit_set(state: &mut State, set: UnitSet, current: bool) {
+    let done = format!("{} is read in {}", set.tool, set.unit.name());
+    match set.not_written {
+        None => state.log.saved(format!("{done}: unit.txt says {}", set.word), set.file),
+        Some(why) => state.log.push(
+            Level::Warning,
+            format!("{done} as long as this data set is open: unit.txt could not be written"),
+            Some(why),
+            Some("Copy the data set to where you may write, or ask who may".to_owned()),
+        ),
+    }
+    if current {
+        state.tasks.failed.clear();
+        state.table.round += 1;
+    }
 }
 
 /// Puts a place first among the recent ones.

@@ -81,7 +81,7 @@ macro_rules! panes {
     ($with:ident) => {
         $with! {
             browser { Browser {
-                "Samples", "The pairs of what is open", Form, needs [Thumbnails, Scores],
+                "Pairs", "The pairs of what is open", Form, needs [Thumbnails, Scores],
                 at [Inspect Left, Align Left, Label Left, Evaluate Left]
             } }
             metrics { Metrics {
@@ -189,7 +189,7 @@ macro_rules! panes {
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
             } }
             settings_pane {
-                Settings { "Settings", "Preferences", Form, needs [], at [Inspect Right(1)] }
+                Settings { "Preferences", "What is kept between runs: look, runtime, kept predictions", Form, needs [], at [Inspect Right(1)] }
             }
         }
     };

@@ -22,7 +22,7 @@ use crate::domain::mesh::TriMesh;
 use crate::domain::rig::Rig;
 use crate::domain::sample::Sample;
 use crate::infer::engine::EngineChoice;
-use crate::io::dataset::Dataset;
+use crate::io::dataset::{Dataset, ToolUnit};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::adapt::{self, AdaptSetup, Adapted};
 use crate::work::bundles::BundleInfo;
@@ -35,6 +35,7 @@ use crate::work::labels::{Deed, Past};
 use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
 use crate::work::sweep::{self, Sweep, SweepSetup};
+use crate::work::tool::{UnitSet, set_unit};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
@@ -70,6 +71,17 @@ pub trait DataSource: Send + Sync {
     /// # Errors
     /// If there is none, or it cannot be read.
     fn tool_mesh(&self, tool: &str) -> Result<TriMesh, TaskError>;
+
+    /// Has a tool's CAD file read in a unit from now on; `replacing` is what the file beside it says now.
+    ///
+    /// # Errors
+    /// As [`set_unit`].
+    fn set_tool_unit(&self, tool: &str, unit: ToolUnit, replacing: Option<&str>) -> Result<UnitSet, TaskError> {
+        match self.as_dataset() {
+            Some(dataset) => set_unit(dataset, tool, unit, replacing),
+            None => Err(TaskError::new(format!("Read {tool} in {}", unit.name()), "this data set has no files")),
+        }
+    }
 
     /// Follows its folder for touches that appear; `None` for a source without a folder.
     fn follow(&self) -> Option<Box<dyn Following>> {

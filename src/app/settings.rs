@@ -9,6 +9,7 @@ pub use state::{
     MaskSettings, MaskSource, MaskTool, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
 };
 
+use super::action::{Action, Shortcut};
 use super::effect::Effect;
 use super::keys::{ImprintSource, RegistrationChoice, ShiftMode};
 use super::state::State;
@@ -67,6 +68,18 @@ pub enum SettingsCommand {
     SetLayout(Workspace, String),
     /// What is on screen as the window is closed.
     Remember(Last),
+    /// Another shortcut of an action, in the place of its `place`th (0 is the main one, behind the last one more) or none
+    /// there. It is taken from the action that has it.
+    BindKey {
+        /// Whose.
+        action: Action,
+        /// Which of its shortcuts.
+        place: usize,
+        /// What is pressed for it.
+        shortcut: Option<Shortcut>,
+    },
+    /// The default shortcuts back, of one action or of all.
+    ResetKeys(Option<Action>),
     /// The hint of the first start is not shown again.
     DismissHint,
     /// All preferences back to their defaults; recent places stay.
@@ -117,10 +130,13 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
             settings.layouts.insert(workspace.name().to_owned(), layout);
         }
         SettingsCommand::Remember(last) => settings.last = last,
+        SettingsCommand::BindKey { action, place, shortcut } => settings.keys.bind(action, place, shortcut),
+        SettingsCommand::ResetKeys(action) => settings.keys.reset(action),
         SettingsCommand::DismissHint => settings.hint_dismissed = true,
         SettingsCommand::ResetSettings => {
             let recent = std::mem::take(&mut settings.recent);
             *settings = Settings { recent, hint_dismissed: true, ..Settings::default() };
+            state.own = None;
         }
     }
     state.settings = std::mem::take(&mut state.settings).validated();
@@ -170,5 +186,10 @@ fn range_from_shown(state: &mut State) {
 
 /// Has the settings written.
 pub(super) fn save(state: &State, effects: &mut Vec<Effect>) {
-    effects.push(Effect::SaveSettings(Box::new(state.settings.clone())));
+    // What a case brought is gone with it.
+    let kept = match &state.own {
+        Some(own) => own.as_ref().clone().of_person(&state.settings),
+        None => state.settings.clone(),
+    };
+    effects.push(Effect::SaveSettings(Box::new(kept)));
 }

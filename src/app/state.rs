@@ -49,8 +49,10 @@ pub struct State {
     pub workbench: Workbench,
     /// What a person chose about seeds.
     pub seeds: Seeds,
-    /// What a person prefers.
+    /// What a person prefers; while a case is open, what it was saved with.
     pub settings: Settings,
+    /// The person's own preferences, while a case is open that has others.
+    pub own: Option<Box<Settings>>,
     /// What runs.
     pub tasks: Tasks,
     /// What happened.

@@ -1,4 +1,4 @@
-//! The index of a dataset: names only, no images.
+//! The index of a data set: names only, no images.
 
 use std::path::PathBuf;
 
@@ -25,7 +25,7 @@ pub enum Split {
 /// One grasp felt by both sensors.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PairEntry {
-    /// Unique and stable within the dataset, e.g. `pattern_31_rod/data_0`; masks and results are stored under it.
+    /// Unique and stable within the data set, e.g. `pattern_31_rod/data_0`; masks and results are stored under it.
     pub name: String,
     /// The tool's name without prefixes; `None` where the source has no tools.
     pub tool: Option<String>,
@@ -57,7 +57,7 @@ impl Index {
     }
 }
 
-/// Something wrong with a dataset that did not keep the rest from opening.
+/// Something wrong with a data set that did not keep the rest from opening.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Problem {
     /// The file or folder.

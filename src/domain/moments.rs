@@ -2,7 +2,7 @@
 //!
 //! Sums of the differences from the first number and of their squares, compensated after Neumaier: a large mean does
 //! not swallow a small spread, and a constant has none. The figures depend on the order of the numbers in their last
-//! bits only, so a pass adds them in the dataset's order.
+//! bits only, so a pass adds them in the data set's order.
 
 /// A sum with what its roundings lost.
 #[derive(Clone, Copy, Debug, Default)]

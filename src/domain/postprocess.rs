@@ -117,7 +117,7 @@ impl ShiftMode {
             ShiftMode::ExactInverse => "Exact inverse",
             ShiftMode::Parts(CorrectionParts::NONE) => "Exact inverse, without the fit",
             ShiftMode::Parts(_) => "Exact inverse, parts of the fit",
-            ShiftMode::Refit(_) => "Refit on this dataset",
+            ShiftMode::Refit(_) => "Refit on this data set",
         }
     }
 }

@@ -16,10 +16,10 @@ use crate::domain::rig::{PadId, Rig};
 use crate::io::atomic;
 use crate::io::dataset::{Dataset, ToolScale};
 
-/// The dataset that a verb reads.
+/// The data set that a verb reads.
 #[derive(Debug, Clone, Args)]
 pub(super) struct DatasetArgs {
-    /// The dataset: a folder in the lab's layout or of image pairs, or a built-in one: `demo`, `test-set` (46 unseen
+    /// The data set: a folder in the lab's layout or of image pairs, or a built-in one: `demo`, `test-set` (46 unseen
     /// grasps of each of 9 seen and 3 unseen tools, simulated), `test-set-ambiguous`, `-mixed`, `-misaligned`, `-noise`.
     #[arg(value_name = "PATH", required_unless_present = "input")]
     path: Option<PathBuf>,
@@ -35,7 +35,7 @@ impl DatasetArgs {
         self.path.as_deref().or(self.input.as_deref()).unwrap_or(Path::new(""))
     }
 
-    /// The folder's dataset, or the built-in one of that name.
+    /// The folder's data set, or the built-in one of that name.
     pub(super) fn open(&self) -> anyhow::Result<Dataset> {
         Dataset::open(self.path()).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))
     }
@@ -126,10 +126,10 @@ impl TypedValueParser for RegistrationParser {
     }
 }
 
-/// How much of a dataset is taken.
+/// How much of a data set is taken.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(super) struct LimitArgs {
-    /// Take only this many, spread evenly over the dataset.
+    /// Take only this many, spread evenly over the data set.
     #[arg(long, value_name = "N", value_parser = at_least_one::<usize>)]
     limit: Option<usize>,
 }

@@ -28,7 +28,7 @@ pub(super) enum BenchVerb {
     Generator(generator::GeneratorArgs),
     /// Write fresh known grasps of the built-in simulator, for `bench registration`.
     Cases(cases::CasesArgs),
-    /// Seconds for a whole dataset on all cores, on simulated pairs.
+    /// Seconds for a whole data set on all cores, on simulated pairs.
     Dataset(dataset::DatasetArgs),
 }
 

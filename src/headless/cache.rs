@@ -71,7 +71,7 @@ pub(super) fn run(args: &CacheArgs) -> VerbResult {
             text += &format!("removed      {predictions} and {sheets} of scores ({:.1} MiB)\n", mib(removed.bytes));
         }
         text + &format!(
-            "folder       {}\npredictions  {}\nscores       {} files\nsize         {:.1} of {:.0} MiB (Settings, \"Keep predictions\")\n",
+            "folder       {}\npredictions  {}\nscores       {} files\nsize         {:.1} of {:.0} MiB (Preferences, \"Keep predictions\")\n",
             report.folder.display(),
             report.predictions,
             report.sheets,

@@ -1,4 +1,4 @@
-//! `touch2touch doctor PATH`: opens a dataset, loads every pair and lists what is wrong.
+//! `touch2touch doctor PATH`: opens a data set, loads every pair and lists what is wrong.
 
 use std::ops::ControlFlow;
 

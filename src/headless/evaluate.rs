@@ -1,4 +1,4 @@
-//! `touch2touch evaluate`: the paper's results table of a dataset.
+//! `touch2touch evaluate`: the paper's results table of a data set.
 
 use crate::io::dataset::Dataset;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! `touch2touch generate`: predicted imprints of a whole dataset, beside the measured ones.
+//! `touch2touch generate`: predicted imprints of a whole data set, beside the measured ones.
 
 mod report;
 mod write;

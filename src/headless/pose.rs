@@ -1,4 +1,4 @@
-//! `touch2touch pose`: in-hand poses of a whole dataset, with the error against the truth where it is known.
+//! `touch2touch pose`: in-hand poses of a whole data set, with the error against the truth where it is known.
 
 mod args;
 mod report;

@@ -1,4 +1,4 @@
-//! `touch2touch simulate`: a dataset in the lab's format, with its truth.
+//! `touch2touch simulate`: a data set in the lab's format, with its truth.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! `touch2touch stats`: the statistics behind the "refit on this dataset" shift, in one pass over a dataset.
+//! `touch2touch stats`: the statistics behind the "refit on this data set" shift, in one pass over a data set.
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -44,7 +44,7 @@ pub(super) struct WatchArgs {
     /// Write the results into this folder instead of beside the touches.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// The tool held: an .stl file, or the name of a tool of the dataset or the demo. Without it, the tool that the
+    /// The tool held: an .stl file, or the name of a tool of the data set or the demo. Without it, the tool that the
     /// file's name says; if that says none, there is no pose.
     #[arg(long, value_name = "NAME|FILE.stl")]
     tool: Option<String>,

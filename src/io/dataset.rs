@@ -15,8 +15,9 @@ mod pictures;
 mod plausible;
 mod tool_scale;
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::domain::dataset::{Index, PairEntry, PairId, Problem};
 use crate::domain::grid::{DepthMap, Grid};
@@ -31,9 +32,11 @@ pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
 pub use grow::{Growth, RIG_FILE, cameras_of};
 pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_meters, rig_of};
-pub use tool_scale::{ToolFile, ToolScale, UNIT_FILE, read_in_meters, read_tool};
+pub use tool_scale::{
+    ToolFile, ToolScale, ToolUnit, UNIT_FILE, read_in_meters, read_tool, said_beside, tool_size, write_beside,
+};
 
-/// Which kind of source a dataset is.
+/// Which kind of source a data set is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SourceKind {
     /// The lab's folders of `.pt` files.
@@ -103,6 +106,8 @@ pub struct Dataset {
     source: Source,
     /// The depth cameras of the rig, for touches that come without a depth picture; read when first needed.
     cameras: OnceLock<PerPad<Arc<DepthCamera>>>,
+    /// The units of CAD models that were named for this run only, by tool.
+    held_units: Arc<Mutex<BTreeMap<String, ToolUnit>>>,
 }
 
 #[derive(Clone, Debug)]
@@ -127,7 +132,7 @@ impl Dataset {
     ///
     /// Where nothing has that path, the name of a built-in data set ([`BuiltIn`]) opens that one.
     ///
-    /// `path` may be the dataset's root, the folder above its `data` folder, any folder inside it, or a file in it.
+    /// `path` may be the data set's root, the folder above its `data` folder, any folder inside it, or a file in it.
     ///
     /// # Errors
     /// [`OpenError`] if nothing can be opened at all; everything smaller is listed in [`Dataset::problems`].
@@ -161,6 +166,7 @@ impl Dataset {
             rig: scan.rig,
             source: scan.source,
             cameras: OnceLock::new(),
+            held_units: Arc::default(),
         }
     }
 
@@ -181,6 +187,7 @@ impl Dataset {
             rig: Rig::lab(),
             source: Source::BuiltIn(set),
             cameras: OnceLock::new(),
+            held_units: Arc::default(),
         }
     }
 
@@ -234,7 +241,7 @@ impl Dataset {
             .unwrap_or_else(|message| Err(LoadError::Bug { files: self.pair_files(id), message }))
     }
 
-    /// The tool's CAD model in meters and the object frame; `None` where the dataset has none.
+    /// The tool's CAD model in meters and the object frame; `None` where the data set has none.
     ///
     /// # Errors
     /// [`MeshError`] if there is a file that cannot be used, or whose size cannot be meters.
@@ -250,7 +257,18 @@ impl Dataset {
         if let Source::BuiltIn(set) = self.source {
             return Ok(set.mesh(tool).map(|mesh| ToolFile { mesh, notes: Vec::new() }));
         }
-        self.tool_mesh_file(tool).map(|path| read_tool(path, self.tool_scale)).transpose()
+        self.tool_mesh_file(tool).map(|path| read_tool(path, self.scale_of(tool))).transpose()
+    }
+
+    /// What was said of the unit of a tool's CAD file other than beside it: for this run, else on the command line.
+    pub fn scale_of(&self, tool: &str) -> Option<ToolScale> {
+        let held = self.held_units.lock().unwrap_or_else(PoisonError::into_inner);
+        held.get(tool).map(|unit| unit.scale()).or(self.tool_scale)
+    }
+
+    /// Reads a tool's CAD file in this unit as long as the data set is open: for folders that cannot be written.
+    pub fn hold_unit(&self, tool: &str, unit: ToolUnit) {
+        self.held_units.lock().unwrap_or_else(PoisonError::into_inner).insert(tool.to_owned(), unit);
     }
 
     /// The file of the tool's CAD model, if the source has files.

@@ -1,4 +1,4 @@
-//! The doctor: loads every pair of a dataset and lists what is wrong with it, in words that say what to do.
+//! The doctor: loads every pair of a data set and lists what is wrong with it, in words that say what to do.
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ pub struct DoctorReport {
     pub pairs: usize,
     /// Pairs that were loaded or tried before the examination ended.
     pub examined: usize,
-    /// Everything wrong, dataset first, then CAD models, then pairs in the order of the index. What differs only in file,
+    /// Everything wrong, data set first, then CAD models, then pairs in the order of the index. What differs only in file,
     /// finger or numbers is one entry.
     pub problems: Vec<Finding>,
 }
@@ -36,7 +36,7 @@ pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> Cont
     let mut findings = Findings::default();
     findings.extend(dataset.problems.iter().cloned());
     for tool in dataset.index.tools() {
-        // A missing file is found when the dataset is opened.
+        // A missing file is found when the data set is opened.
         findings.extend(match dataset.tool_with_notes(&tool) {
             Ok(file) => file.map_or_else(Vec::new, |file| file.notes),
             Err(err) => vec![Problem { file: err.file().to_owned(), what: err.to_string(), hint: err.hint().into() }],

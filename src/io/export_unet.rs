@@ -101,7 +101,7 @@ pub enum ExportError {
 
 /// One failure as it is, several one below the other.
 fn listed(failures: &[(String, String)]) -> String {
-    /// A dataset of nothing but damaged files still gives a page.
+    /// A data set of nothing but damaged files still gives a page.
     const MOST: usize = 40;
     let mut lines: Vec<String> = failures.iter().take(MOST).map(|(name, why)| format!("{name}: {why}")).collect();
     if let [only] = lines.as_slice() {

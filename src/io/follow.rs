@@ -126,7 +126,7 @@ pub struct FollowConfig {
     pub patience: Duration,
     /// Unit of the CAD models, as in [`Dataset::tool_scale`].
     pub tool_scale: Option<ToolScale>,
-    /// Cameras for touches without a bubble, by finger; without them those that the dataset finds itself.
+    /// Cameras for touches without a bubble, by finger; without them those that the data set finds itself.
     pub cameras: Option<PerPad<DepthCamera>>,
 }
 
@@ -165,7 +165,7 @@ impl Follower {
         Ok(follower)
     }
 
-    /// Follows the folder of an open dataset, whose pairs keep their ids; `None` for one without a folder.
+    /// Follows the folder of an open data set, whose pairs keep their ids; `None` for one without a folder.
     pub fn continuing(dataset: Arc<Dataset>) -> Option<Self> {
         let mut follower = Self::of(dataset.root.clone()?, FollowConfig::default());
         follower.dataset = Some(dataset);
@@ -188,7 +188,7 @@ impl Follower {
         }
     }
 
-    /// The dataset as far as it is known; `None` while the folder holds none.
+    /// The data set as far as it is known; `None` while the folder holds none.
     pub fn dataset(&self) -> Option<&Arc<Dataset>> {
         self.dataset.as_ref()
     }
@@ -302,7 +302,7 @@ impl Follower {
         self.next_scan = Instant::now() + RESCAN.max(now.elapsed() * RESCAN_SHARE);
     }
 
-    /// Compares the files of the dataset with what was seen of them.
+    /// Compares the files of the data set with what was seen of them.
     fn enter(&mut self, now: Instant, first: bool) {
         let Some(dataset) = self.dataset.clone() else { return };
         let time = |folder: PathBuf| (folder.clone(), modified(&folder));

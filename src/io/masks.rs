@@ -1,8 +1,9 @@
 //! Corrected masks on disk: saved after every stroke, never half, never replaced by something empty.
 //!
-//! One folder per dataset, beside it (`touch2touch_masks`) if that can be written, else in the user's data folder.
+//! One folder per data set, beside it (`touch2touch_masks`) if that can be written, else in the user's data folder.
 //! Per pair and finger one JSON file with the run-length coded mask of the measured imprint, and one with those of
-//! predictions; per pair one with the review state and accepted poses, and one append-only journal of what was done. Files are written beside their place, flushed and renamed, so a
+//! predictions; per pair one with the review state and accepted poses, and one append-only journal of what was done.
+//! Files are written beside their place, flushed and renamed, so a
 //! crash costs at most the stroke that was being saved.
 //!
 //! A file that cannot be understood blocks its pair: it is reported, and nothing overwrites it.
@@ -21,7 +22,7 @@ use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{decode_runs, encode_runs};
 use crate::domain::rig::{PadId, Rig};
 
-/// Name of the folder beside a dataset.
+/// Name of the folder beside a data set.
 pub const FOLDER: &str = "touch2touch_masks";
 const JOURNAL_SUFFIX: &str = ".journal.jsonl";
 const FORMAT: &str = "touch2touch-mask";
@@ -162,26 +163,26 @@ struct ReviewFile {
     review: StoredReview,
 }
 
-/// The labels of one dataset. Cheap to clone; may be used from any thread, one writer at a time.
+/// The labels of one data set. Cheap to clone; may be used from any thread, one writer at a time.
 #[derive(Clone, Debug)]
 pub struct MaskStore {
     /// Where files are written; also read first.
     folder: PathBuf,
-    /// A folder that is only read: labels beside a dataset that cannot be written.
+    /// A folder that is only read: labels beside a data set that cannot be written.
     also_read: Option<PathBuf>,
     /// The names of the pads.
     rig: Arc<Rig>,
 }
 
 impl MaskStore {
-    /// Finds the store of a dataset. Nothing is created before the first save.
+    /// Finds the store of a data set. Nothing is created before the first save.
     ///
     /// # Errors
-    /// [`StoreError::NoFolder`] if neither the dataset's folder nor the user's data folder can be written.
+    /// [`StoreError::NoFolder`] if neither the data set's folder nor the user's data folder can be written.
     pub fn for_dataset(dataset: &Dataset) -> Result<Self, StoreError> {
         let key = match &dataset.root {
             Some(root) => {
-                // The path is part of the name: datasets often share their last folder's name.
+                // The path is part of the name: data sets often share their last folder's name.
                 let name = root.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
                 format!("{}-{}", names::label(&name), short_hash(root))
             }
@@ -200,7 +201,7 @@ impl MaskStore {
         if let (Some(beside), Some(root)) = (&beside, dataset_root)
             && is_writable(if beside.is_dir() { beside } else { root })
         {
-            // Labels made while the dataset was read-only stay visible.
+            // Labels made while the data set was read-only stay visible.
             let also_read = user_folder.filter(|folder| folder.is_dir());
             return Ok(Self { folder: beside.clone(), also_read, rig: Rig::lab() });
         }

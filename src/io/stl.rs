@@ -110,8 +110,8 @@ impl MeshError {
             Self::NotStl { .. } => "export the part as STL from the CAD program",
             Self::Truncated { .. } => "copy or export the file again",
             Self::Unit { .. } => {
-                "accept the scale with --tool-scale auto on the command line, or for good (in the studio, too) with a \
-                 file unit.txt beside the model that says auto, m, cm, mm, um, in or a factor"
+                "accept the scale with --tool-scale auto on the command line, or for good with `touch2touch unit` or the \
+                 button at the 3D view: a file unit.txt beside the model says auto, m, cm, mm, um, in or a factor"
             }
             Self::NotATool { .. } => {
                 "tools are 4 mm to 0.4 m long: name the right unit in unit.txt beside the model or with --tool-scale, or \

@@ -77,6 +77,7 @@ pub struct StudioApp {
     shared: Shared,
     panes: Panes,
     palette: palette::Memory,
+    shortcuts: shortcuts::Memory,
     /// Time of the last frame, milliseconds.
     frame_ms: f32,
     trees: BTreeMap<Workspace, Tree<Pane>>,
@@ -130,6 +131,7 @@ impl StudioApp {
             shared: Shared::new(options.native_dialogs),
             panes: Panes::default(),
             palette: palette::Memory::default(),
+            shortcuts: shortcuts::Memory::default(),
             frame_ms: 0.0,
             trees: BTreeMap::new(),
             device,
@@ -173,6 +175,11 @@ impl StudioApp {
     /// Where a point of the grasp frame (meters) appeared in a 3D pane when it was last drawn. For tests.
     pub fn on_screen(&self, source: ImprintSource, p: [f64; 3]) -> Option<egui::Pos2> {
         self.panes.memories.scene.on_screen(source, p.into())
+    }
+
+    /// Where each pane was drawn last. For tests.
+    pub fn places(&self) -> BTreeMap<Pane, egui::Rect> {
+        self.panes.places.clone()
     }
 
     /// The panes of the workspace in front are arranged validly. For tests.
@@ -426,6 +433,7 @@ impl eframe::App for StudioApp {
         self.shared.hover_claimed = false;
         // Keys come before the panes.
         let over = self.panes.hovered.take();
+        self.shortcuts.observe(over);
         let workspace = self.state.settings.workspace;
         let stored = self.state.settings.layouts.get(workspace.name());
         let mut tree = self.trees.remove(&workspace).unwrap_or_else(|| layout::restore(stored, workspace));
@@ -445,17 +453,20 @@ impl eframe::App for StudioApp {
                 cx.state.selection.palette || cx.state.selection.shortcut_sheet || cx.shared.dialogs.is_path_box_open();
             let state = cx.state;
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
-            for action in shortcuts::pressed(&ctx, covered, possible) {
+            let keys = &state.settings.keys;
+            let pressed =
+                if self.shortcuts.waits() { Vec::new() } else { shortcuts::pressed(&ctx, keys, covered, possible) };
+            for action in pressed {
                 if action == Action::CancelJobs && self.panes.maximized.take().is_some() {
                     continue;
                 }
                 match action.command(state) {
                     Some(Command::Workbench(WorkbenchCommand::Nudge(axis, by))) if action.is_nudge() => {
-                        let keys = ctx.input(|i| i.modifiers);
-                        let scale = if keys.shift {
-                            10.0
-                        } else if keys.command || keys.ctrl {
+                        let held = ctx.input(|i| i.modifiers);
+                        let scale = if held.command || held.ctrl {
                             0.1
+                        } else if held.shift {
+                            10.0
                         } else {
                             1.0
                         };
@@ -482,7 +493,7 @@ impl eframe::App for StudioApp {
             export::form(&mut cx, &ctx);
             export::masks::form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
-            shortcuts::sheet(&mut cx, &ctx);
+            shortcuts::sheet(&mut cx, &ctx, &mut self.shortcuts);
             bars::drop_overlay(&cx, &ctx);
             if let Some((purpose, path)) = cx.shared.dialogs.show(&ctx) {
                 cx.push(match purpose {

@@ -34,9 +34,11 @@ pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
                 edited = view_menu(cx, ui, tree);
                 let width = 190.0;
                 let text = RichText::new("Find anything").color(cx.p.weak);
-                let button = egui::Button::new(text).right_text(caption("Ctrl+P", cx.p)).min_size(vec2(width, 24.0));
+                let button = egui::Button::new(text)
+                    .right_text(caption(cx.keys().text(Action::Palette), cx.p))
+                    .min_size(vec2(width, 24.0));
                 let response = ui.add(button).accessible_name("Command palette");
-                if response.on_hover_text(Action::Palette.help()).clicked() {
+                if response.on_hover_text(cx.keys().help(Action::Palette)).clicked() {
                     cx.push(ViewCommand::SetPalette(true));
                 }
             });
@@ -54,7 +56,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.button("Test set").on_hover_text(tip).clicked() {
             cx.push(LibraryCommand::Open(Place::Path("test-set".into())));
         }
-        let button = ui.add(egui::Button::new("Folder…").shortcut_text("Ctrl+O"));
+        let button = ui.add(egui::Button::new("Folder…").shortcut_text(cx.keys().text(Action::OpenFolder)));
         if button.on_hover_text(Action::OpenFolder.tooltip()).clicked() {
             cx.act(Action::OpenFolder);
         }
@@ -64,6 +66,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.separator();
         for action in [
             Action::SaveCase,
+            Action::OwnPreferences,
             Action::Figure,
             Action::ExportMeasured,
             Action::ExportPredicted,
@@ -72,7 +75,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             Action::Reload,
             Action::Follow,
         ] {
-            let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
+            let keys = cx.keys().text(action);
             let on = action == Action::Follow && cx.state.library.follow.is_some();
             let button = egui::Button::new(action.name()).shortcut_text(keys).selected(on);
             let response = ui.add_enabled(action.command(cx.state).is_some(), button).accessible_name(action.name());
@@ -166,14 +169,15 @@ fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
         let name = cx.state.rig().pad_name(finger).to_owned();
         let button = ui.add(egui::Button::selectable(on, RichText::new(&name).size(12.0)).min_size(vec2(44.0, 20.0)));
         let button = button.accessible_name(format!("{name} finger"));
-        if button.on_hover_text(format!("Show the {} finger (U switches)", cx.state.finger_name(finger))).clicked() {
+        let tip = format!("Show the {} finger ([[other_finger]] switches)", cx.state.finger_name(finger));
+        if button.on_hover_text(cx.keys().fill(&tip)).clicked() {
             cx.push(ViewCommand::SelectFinger(finger));
         }
     }
     let both = cx.state.selection.both_fingers;
     let button = ui.add(egui::Button::selectable(both, RichText::new("Both").size(12.0)).min_size(vec2(44.0, 20.0)));
     let button = button.accessible_name("Both fingers");
-    if button.on_hover_text(Action::BothFingers.help()).clicked() {
+    if button.on_hover_text(cx.keys().help(Action::BothFingers)).clicked() {
         cx.push(ViewCommand::ShowBothFingers(!both));
     }
 }
@@ -186,7 +190,7 @@ fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
         let (ticket, cancelling) = (*ticket, task.cancelling);
         let cancel = ui.add_enabled(!cancelling, egui::Button::new(RichText::new("Cancel").size(SMALL)));
         let cancel = cancel.accessible_name(format!("Cancel: {}", task.title));
-        if cancel.on_hover_text("Stop this job (Esc)").clicked() {
+        if cancel.on_hover_text(cx.keys().behind("Stop this job", Action::CancelJobs)).clicked() {
             cx.push(TasksCommand::Cancel(ticket));
         }
         let text = if cancelling { "stopping…".to_owned() } else { task.progress.text.clone() };
@@ -212,7 +216,8 @@ fn following(cx: &mut Cx<'_>, ui: &mut Ui) {
     let newest = follow.newest.as_ref().map_or(String::new(), |name| format!("Newest: {name}. "));
     let text = RichText::new(text).size(12.0).color(cx.p.accent);
     let button = ui.add(egui::Button::new(text).min_size(vec2(0.0, 20.0))).accessible_name("Stop following");
-    if button.on_hover_text(format!("{newest}Stops following the folder (Ctrl+Shift+F)")).clicked() {
+    if button.on_hover_text(cx.keys().behind(&format!("{newest}Stops following the folder"), Action::Follow)).clicked()
+    {
         cx.act(Action::Follow);
     }
     ui.add_space(8.0);
@@ -252,8 +257,11 @@ pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
                         "Simulated touches are open; a first prediction is being made."
                     };
                     ui.label(RichText::new(first).color(cx.p.strong));
-                    ui.label("D and A step through the pairs, Ctrl+G predicts the one on screen.");
-                    ui.label("Ctrl+P finds everything else. Drop a folder here to open your own data.");
+                    let steps = "[[next_pair]] and [[previous_pair]] step through the pairs, [[generate]] predicts the one \
+                                 on screen.";
+                    ui.label(cx.keys().fill(steps));
+                    let rest = "[[palette]] finds everything else. Drop a folder here to open your own data.";
+                    ui.label(cx.keys().fill(rest));
                 });
                 ui.add_space(8.0);
                 if ui.button("Got it").on_hover_text("Do not show this again").clicked() {

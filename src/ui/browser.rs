@@ -74,19 +74,23 @@ fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.button("Demo").on_hover_text("Simulated touches of 12 tools, made when they are looked at").clicked() {
             cx.push(LibraryCommand::Open(Place::Demo));
         }
-        let folder = ui.add(egui::Button::new("Open folder…").shortcut_text("Ctrl+O"));
+        let folder = ui.add(egui::Button::new("Open folder…").shortcut_text(cx.keys().text(Action::OpenFolder)));
         if folder.on_hover_text("A folder in the lab's layout, or a folder of image pairs").clicked() {
             cx.act(Action::OpenFolder);
         }
         if ui.button("Open path…").on_hover_text("Type or paste a path").clicked() {
             cx.shared.dialogs.type_path(Purpose::Folder, "");
         }
-        let reload = ui.add_enabled(cx.state.library.open.is_some(), egui::Button::new("Reload").shortcut_text("F5"));
+        let reload = ui.add_enabled(
+            cx.state.library.open.is_some(),
+            egui::Button::new("Reload").shortcut_text(cx.keys().text(Action::Reload)),
+        );
         if reload.on_hover_text(Action::Reload.tooltip()).clicked() {
             cx.act(Action::Reload);
         }
         let following = cx.state.library.follow.is_some();
-        let button = egui::Button::new(Action::Follow.name()).shortcut_text("Ctrl+Shift+F").selected(following);
+        let button =
+            egui::Button::new(Action::Follow.name()).shortcut_text(cx.keys().text(Action::Follow)).selected(following);
         let follow = ui.add_enabled(Action::Follow.command(cx.state).is_some(), button);
         if follow.on_hover_text(Action::Follow.tooltip()).clicked() {
             cx.act(Action::Follow);
@@ -114,7 +118,7 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         let edit = egui::TextEdit::singleline(&mut memory.filter)
             .hint_text("Filter")
             .desired_width(ui.available_width() - sort_width - 12.0);
-        let response = ui.add(edit).accessible_name("Filter samples");
+        let response = ui.add(edit).accessible_name("Filter pairs");
         if std::mem::take(&mut memory.focus_filter) {
             response.request_focus();
         }
@@ -123,11 +127,10 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         } else if !response.has_focus() && memory.filter != cx.state.library.filter {
             memory.filter.clone_from(&cx.state.library.filter);
         }
-        response.on_hover_text(
-            "Words of the name or tool. tool:rod narrows to tools; is:todo, is:in-progress, is:flagged, is:done and \
+        let tip = "Words of the name or tool. tool:rod narrows to tools; is:todo, is:in-progress, is:flagged, is:done and \
              is:skip to review states; angle>5, psnr<20, ssim<0.8, rms>1, named<100 to scores (of the source chosen, \
-             or measured:angle>2) in °, dB, mm and % (Ctrl+F)",
-        );
+             or measured:angle>2) in °, dB, mm and %";
+        response.on_hover_text(cx.keys().behind(tip, Action::FindPair));
         let sort = cx.state.library.sort;
         let combo = egui::ComboBox::from_id_salt("sort").width(sort_width).selected_text(sort.name());
         let response = combo.show_ui(ui, |ui| {
@@ -288,7 +291,8 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
     if let Some(brush) = &cx.state.library.brush {
         let button = egui::Button::new(format!("{} brushed ×", brush.len())).selected(true);
         let response = ui.add(button).accessible_name("Show all pairs again");
-        if response.on_hover_text("Only the pairs brushed in the scatter are listed. Shows all again (Esc)").clicked() {
+        let tip = "Only the pairs brushed in the scatter are listed. Shows all again";
+        if response.on_hover_text(cx.keys().behind(tip, Action::CancelJobs)).clicked() {
             cx.push(LibraryCommand::Brush(None));
         }
     }

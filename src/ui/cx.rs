@@ -10,7 +10,7 @@ use super::scene_view::Device;
 use super::theme::Palette;
 use super::widget::image_canvas::ViewTransform;
 use super::widget::texture::Textures;
-use crate::app::action::Action;
+use crate::app::action::{Action, Bindings};
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
@@ -37,6 +37,11 @@ impl Cx<'_> {
         self.out.push(command.into());
     }
 
+    /// The keys in force.
+    pub(super) fn keys(&self) -> &Bindings {
+        &self.state.settings.keys
+    }
+
     /// Puts an action on the list, if it can do anything now.
     pub(super) fn act(&mut self, action: Action) {
         if let Some(command) = action.command(self.state) {
@@ -48,7 +53,8 @@ impl Cx<'_> {
     pub(super) fn action_button(&mut self, ui: &mut Ui, action: Action, text: &str) -> Response {
         let command = action.command(self.state);
         let response = ui.add_enabled(command.is_some(), egui::Button::new(text)).accessible_name(action.name());
-        let response = response.on_hover_text(action.help()).on_disabled_hover_text(action.help());
+        let help = self.keys().help(action);
+        let response = response.on_hover_text(&help).on_disabled_hover_text(help);
         if response.clicked()
             && let Some(command) = command
         {

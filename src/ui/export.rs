@@ -207,7 +207,7 @@ pub(super) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
         None => &[],
     };
     for action in [Action::Figure].iter().chain(sides).chain(&[Action::SaveCase]).copied() {
-        let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
+        let keys = cx.keys().text(action);
         let button = egui::Button::new(action.name()).shortcut_text(keys);
         let response = ui.add_enabled(action.command(cx.state).is_some(), button).accessible_name(action.name());
         if response.on_hover_text(action.tooltip()).clicked() {
@@ -224,7 +224,8 @@ pub(super) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
         }
     }
     ui.separator();
-    if ui.button("Copy as picture").on_hover_text("Copies this pane as it is on the screen (Ctrl+F12)").clicked() {
+    let tip = cx.keys().behind("Copies this pane as it is on the screen", Action::CopyPane);
+    if ui.button("Copy as picture").on_hover_text(tip).clicked() {
         cx.push(ViewCommand::Ui(UiRequest::PictureOf(pane)));
         ui.close();
     }

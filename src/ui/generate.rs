@@ -78,7 +78,7 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     for problem in &cx.state.library.bundle_problems {
         ui.label(RichText::new(problem.to_string()).size(SMALL).color(cx.p.wrong));
     }
-    row(ui, cx.p.weak, "Quality", |ui| {
+    row(ui, cx.p.weak, "Preset", |ui| {
         for preset in Preset::iter() {
             let chosen = spelt_out.preset == Some(preset);
             let button = ui.add(egui::Button::selectable(chosen, preset_name(preset)));
@@ -128,7 +128,7 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
             },
         );
         let lock = ui.add(egui::Button::selectable(new.seed_locked, "Lock")).accessible_name("Lock the seed");
-        if lock.on_hover_text(Action::LockSeed.help()).clicked() {
+        if lock.on_hover_text(cx.keys().help(Action::LockSeed)).clicked() {
             new.seed_locked = !new.seed_locked;
         }
         cx.action_button(ui, Action::GenerateNewSeed, "New");
@@ -181,7 +181,10 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.horizontal(|ui| {
                 progress::bar(ui, width - 76.0, fraction, &text);
                 let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
-                if cancel.on_hover_text("Stop generating; what is shown stays (Esc)").clicked() {
+                if cancel
+                    .on_hover_text(cx.keys().behind("Stop generating; what is shown stays", Action::CancelJobs))
+                    .clicked()
+                {
                     cx.push(TasksCommand::Cancel(ticket));
                 }
             });
@@ -191,7 +194,7 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
             let text = RichText::new("Generate").family(super::theme::medium()).color(cx.p.on_accent);
             let button = egui::Button::new(text).fill(cx.p.accent).min_size(vec2(width, 28.0));
             let response = ui.add_enabled(can.is_ok(), button).accessible_name("Generate");
-            let response = response.on_hover_text(Action::Generate.help());
+            let response = response.on_hover_text(cx.keys().help(Action::Generate));
             let why = can.err().map_or("", |absent| absent.text());
             if response.on_disabled_hover_text(why).clicked() {
                 cx.act(Action::Generate);

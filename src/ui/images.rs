@@ -6,15 +6,16 @@ mod paint;
 
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Color32, Rect, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{Align2, Button, Color32, Rect, RichText, Ui, UiBuilder, pos2, vec2};
 
 use super::cx::{Cx, side_color};
-use super::theme::Palette;
+use super::theme::{Palette, SMALL};
 use super::widget::colorbar;
 use super::widget::empty;
 use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, shows_squares};
 use super::widget::texture::{Histogram, Memo, depth_image, picture_image};
-use crate::app::command::{Hover, Pane, TasksCommand, ViewCommand};
+use crate::app::action::Action;
+use crate::app::command::{Hover, LibraryCommand, Pane, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::results::Preview;
 use crate::app::settings::{ColorMap as MapChoice, MaskTool};
@@ -27,7 +28,7 @@ use crate::domain::sample::Scale;
 use crate::domain::turn::Turn;
 use crate::domain::units;
 use crate::work::bundles::BundleKind;
-use crate::work::error::TaskError;
+use crate::work::error::{TaskError, UnitOffer};
 use link::Link;
 
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
@@ -214,14 +215,32 @@ pub(super) fn failed(cx: &mut Cx<'_>, ui: &mut Ui, err: &TaskError) {
         Some(hint) => format!("{}\n{hint}", err.why),
         None => err.why.clone(),
     };
-    if empty::show(ui, &format!("{} failed", err.what), &why, Some(("Try again", "Computes it again (Ctrl+R)"))) {
+    let again = cx.keys().behind("Computes it again", Action::RunPose);
+    if empty::show(ui, &format!("{} failed", err.what), &why, Some(("Try again", &again))) {
         cx.push(TasksCommand::Retry);
+    }
+}
+
+/// Buttons that read a CAD file in the units that fit it, where that is what failed; `place` tells them apart.
+pub(super) fn unit_buttons(cx: &mut Cx<'_>, ui: &mut Ui, offer: &UnitOffer, place: &str) {
+    for (unit, length) in &offer.units {
+        let says = offer.says.as_ref().map_or(String::new(), |says| format!(", which says {says} now"));
+        let tip = format!(
+            "{} is then {length} long. Writes unit.txt beside its STL{says}: it is for all models of that folder",
+            offer.tool
+        );
+        let button = Button::new(RichText::new(format!("Read it as {}", unit.name())).size(SMALL));
+        let button = ui.add(button.min_size(vec2(0.0, 18.0)));
+        let name = format!("Read {} as {}, {place}", offer.tool, unit.name());
+        if button.accessible_name(name).on_hover_text(tip).clicked() {
+            let (tool, replacing) = (offer.tool.clone(), offer.says.clone());
+            cx.push(LibraryCommand::ReadToolAs { tool, unit: *unit, replacing });
+        }
     }
 }
 
 /// What is missing, and the action that brings it.
 pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
-    use crate::app::action::Action;
     // A prediction on its way shows how far it is, where it will appear.
     if absent == Absent::NoPrediction
         && let Some((_, task)) = cx.state.tasks.any_generating()
@@ -248,13 +267,10 @@ pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
             },
             what,
         ),
-        Absent::NoGenerator => ("Put a model bundle into assets/models, or choose one in Settings.", what),
+        Absent::NoGenerator => ("Put a model bundle into assets/models, or choose one in Generate.", what),
         _ => ("", what),
     };
-    let text = button.map(|a: Action| match a.shortcut() {
-        Some(shortcut) => (format!("{} ({shortcut})", a.name()), a),
-        None => (a.name().to_owned(), a),
-    });
+    let text = button.map(|a: Action| (cx.keys().behind(a.name(), a), a));
     let shown = text.as_ref().map(|(text, a)| (text.as_str(), a.tooltip()));
     if empty::show(ui, what, why, shown)
         && let Some((_, action)) = text

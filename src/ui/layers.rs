@@ -229,7 +229,7 @@ fn observability(cx: &mut Cx<'_>, ui: &mut Ui, o: &Observability, noise_m: f64) 
             let text = RichText::new("Animate").size(SMALL);
             let button = ui.add(Button::selectable(on, text).frame_when_inactive(true).min_size(vec2(0.0, 18.0)));
             let button = button.accessible_name(Action::AnimateWeakest.name());
-            if button.on_hover_text(Action::AnimateWeakest.help()).clicked() {
+            if button.on_hover_text(cx.keys().help(Action::AnimateWeakest)).clicked() {
                 cx.act(Action::AnimateWeakest);
             }
         });

@@ -125,7 +125,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
             });
         }
         None => {
-            cx.action_button(ui, Action::Refit, "Refit on this dataset");
+            cx.action_button(ui, Action::Refit, "Refit on this data set");
         }
     }
 }

@@ -51,7 +51,7 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
         ] {
             let on = cx.state.settings.mask.tool == tool;
             let button = ui.add(egui::Button::selectable(on, tool.name()).min_size(vec2(56.0, 24.0)));
-            if button.on_hover_text(action.tooltip()).clicked() {
+            if button.on_hover_text(cx.keys().help(action)).clicked() {
                 cx.push(SettingsCommand::SetMaskTool(tool));
             }
         }
@@ -78,9 +78,9 @@ fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         let mm = f64::from(radius) / cx.state.rig().depth().map_or(f64::NAN, |sensor| sensor.px_per_m) * 1e3;
         ui.label(caption(format!("{mm:.2} mm"), cx.p));
-        response.on_hover_text(
-            "Radius of brush and eraser, image pixels ([ and ], Shift + wheel, Alt + move). Double-click resets",
-        );
+        let tip = "Radius of brush and eraser, image pixels ([[brush_smaller]] and [[brush_larger]], Shift + wheel, \
+                   Alt + move). Double-click resets";
+        response.on_hover_text(cx.keys().fill(tip));
     });
 }
 
@@ -373,15 +373,15 @@ fn look(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 6.0;
         let settings = &cx.state.settings;
         let mut visible = settings.mask_visible;
-        if ui.checkbox(&mut visible, "mask").on_hover_text(Action::MaskVisible.help()).changed() {
+        if ui.checkbox(&mut visible, "mask").on_hover_text(cx.keys().help(Action::MaskVisible)).changed() {
             cx.push(SettingsCommand::SetMaskVisible(visible));
         }
         let mut outline = settings.mask_outline;
-        if ui.checkbox(&mut outline, "outline").on_hover_text(Action::MaskOutline.help()).changed() {
+        if ui.checkbox(&mut outline, "outline").on_hover_text(cx.keys().help(Action::MaskOutline)).changed() {
             cx.push(SettingsCommand::SetMaskOutline(outline));
         }
         let mut footprint = settings.footprint_visible;
-        if ui.checkbox(&mut footprint, "gel window").on_hover_text(Action::Footprint.help()).changed() {
+        if ui.checkbox(&mut footprint, "GelSlim window").on_hover_text(cx.keys().help(Action::Footprint)).changed() {
             cx.push(SettingsCommand::SetFootprintVisible(footprint));
         }
     });

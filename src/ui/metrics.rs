@@ -92,6 +92,14 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
+        let units = match cx.state.pose(source) {
+            Lookup::Failed(err) => err.units.clone(),
+            _ => None,
+        };
+        if let Some(offer) = units {
+            let place = format!("{}, in the metrics", source.name().to_lowercase());
+            ui.horizontal_wrapped(|ui| images::unit_buttons(cx, ui, &offer, &place));
+        }
         if let Some(pose) = cx.state.pose(source).shown() {
             let p = pose.grasp_from_object;
             let text = format!("y {:.2} mm   z {:.2} mm", units::mm(p.y_m), units::mm(p.z_m));
@@ -125,8 +133,8 @@ fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: HandPose) 
         text += &format!(" (error {})", units::text_deg(PoseDifference::between(hand.planar, truth).angle_rad));
     }
     ui.label(RichText::new(text).size(SMALL).color(cx.p.good));
-    let withdraw =
-        ui.small_button("Withdraw").on_hover_text("The registered pose counts again (Ctrl+Z brings it back)");
+    let tip = cx.keys().fill("The registered pose counts again ([[undo]] brings it back)");
+    let withdraw = ui.small_button("Withdraw").on_hover_text(tip);
     if withdraw.accessible_name(format!("Withdraw the pose by hand, {}", source.name().to_lowercase())).clicked() {
         cx.push(LabelsCommand::AcceptPose(source, false));
     }

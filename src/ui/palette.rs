@@ -56,7 +56,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
             )
         });
         let edit = egui::TextEdit::singleline(&mut memory.query)
-            .hint_text("Find an action, a sample or a tool")
+            .hint_text("Find an action, a pair or a tool")
             .font(FontId::proportional(15.0))
             .desired_width(520.0);
         let response = ui.add(edit).accessible_name("Find anything");
@@ -137,10 +137,10 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
     let (name, kind, enabled) = match entry {
         Entry::Action(action) => {
-            let keys = action.shortcut().map_or(String::new(), |s| s.to_string());
+            let keys = cx.keys().text(*action);
             (action.name(), keys, action.command(cx.state).is_some())
         }
-        Entry::Pair(_, name) => (name.as_str(), "sample".to_owned(), true),
+        Entry::Pair(_, name) => (name.as_str(), "pair".to_owned(), true),
         Entry::Tool(tool) => (tool.as_str(), "tool".to_owned(), true),
     };
     response.widget_info(|| WidgetInfo::labeled(Role::Button, enabled, name));

@@ -64,7 +64,7 @@ fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
         Kind::Steps => help::STEPS,
         Kind::Map => help::BASIN,
     };
-    help::mark(ui, pane.title(), controls);
+    help::mark(ui, pane.title(), controls, cx.keys());
 }
 
 /// How the panes behave in their tree.
@@ -186,7 +186,11 @@ pub(super) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pa
         ui.horizontal_centered(|ui| {
             ui.label(super::theme::title(pane.title()));
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                if ui.button(RichText::new("Back to all panes").size(SMALL)).on_hover_text("` or Esc").clicked() {
+                if ui
+                    .button(RichText::new("Back to all panes").size(SMALL))
+                    .on_hover_text(cx.keys().fill("[[maximize_pane]] or [[cancel_jobs]]"))
+                    .clicked()
+                {
                     panes.maximized = None;
                 }
                 help_mark(cx, ui, pane);

@@ -23,6 +23,10 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 
 fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     let settings = &cx.state.settings;
+    if cx.state.own.is_some() {
+        ui.label(caption("A case is open: these are its preferences. Yours come back with the next data set.", cx.p));
+        cx.action_button(ui, Action::OwnPreferences, Action::OwnPreferences.name());
+    }
     ui.label(section("Window", cx.p));
     ui.horizontal(|ui| {
         for (theme, name) in [(Theme::Dark, "Dark"), (Theme::Light, "Light")] {
@@ -57,7 +61,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         cx.out.push(Command::Settings(SettingsCommand::SetFootprintVisible(footprint)));
     }
     let mut mask = settings.mask_visible;
-    if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(Action::MaskVisible.help()).changed() {
+    if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(cx.keys().help(Action::MaskVisible)).changed() {
         cx.out.push(Command::Settings(SettingsCommand::SetMaskVisible(mask)));
     }
     let mut linked = settings.cameras_linked;

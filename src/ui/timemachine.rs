@@ -152,7 +152,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
         let mut lines = inspect.lines;
         let text = RichText::new("Lines").size(12.0);
         let tip = "Draws a line from contact points to the points of the tool that they are pulled to, in the 3D view";
-        if ui.checkbox(&mut lines, text).on_hover_text(tip).changed() {
+        if ui.checkbox(&mut lines, text).on_hover_text(cx.keys().fill(tip)).changed() {
             cx.push(Command::Inspect(InspectCommand::Lines(lines)));
         }
     });
@@ -263,8 +263,9 @@ fn transport(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         let mut to = at;
         let slider = Slider::new(&mut to, 0..=steps.saturating_sub(1)).show_value(false);
         let slider = ui.add_enabled(steps > 1, slider).accessible_name("Step");
-        let tip = "The step shown, 0 is the applied start. Keys: , and . step, Shift with them jumps to the ends";
-        if slider.on_hover_text(tip).changed() {
+        let tip = "The step shown, 0 is the applied start. [[step_back]] and [[step_forward]] step, [[first_step]] and \
+                   [[last_step]] jump to the ends";
+        if slider.on_hover_text(cx.keys().fill(tip)).changed() {
             cx.push(Command::Inspect(InspectCommand::Go { run, at: to }));
         }
     });

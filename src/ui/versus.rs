@@ -144,7 +144,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
     });
     ui.horizontal_wrapped(|ui| {
         for mode in VersusMode::iter() {
-            let tip = format!("{} (Shift+F: next)", mode.tooltip());
+            let tip = cx.keys().fill(&format!("{} ([[compare_mode]]: next)", mode.tooltip()));
             if ui.selectable_label(versus.mode == mode, mode.name()).on_hover_text(tip).clicked() {
                 cx.push(SettingsCommand::SetVersus(Versus { mode, ..versus.clone() }));
             }

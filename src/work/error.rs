@@ -1,8 +1,11 @@
 //! [`TaskError`]: a failure in words a person can act on.
 
 use std::fmt;
+use std::sync::Arc;
 
 use serde::Serialize;
+
+use crate::io::dataset::ToolUnit;
 
 /// What failed, why, and what to do about it. Shown once, in the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -15,6 +18,19 @@ pub struct TaskError {
     pub hint: Option<String>,
     /// How it ended.
     pub kind: TaskErrorKind,
+    /// Units in which the CAD model that it is about would fit.
+    pub units: Option<Arc<UnitOffer>>,
+}
+
+/// The units in which a tool's CAD file would be as large as a tool, where it is not in the one that it is read in.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UnitOffer {
+    /// The tool.
+    pub tool: String,
+    /// The units, each with how long the tool then is: `64.35 mm`.
+    pub units: Vec<(ToolUnit, String)>,
+    /// What `unit.txt` beside the file says, if it is there.
+    pub says: Option<String>,
 }
 
 /// A pair that was left out of a pass over a data set, or that is worth a look.
@@ -40,7 +56,7 @@ pub enum TaskErrorKind {
 impl TaskError {
     /// A failure of `what` because of `why`.
     pub fn new(what: impl Into<String>, why: impl fmt::Display) -> Self {
-        Self { what: what.into(), why: why.to_string(), hint: None, kind: TaskErrorKind::Failed }
+        Self { what: what.into(), why: why.to_string(), hint: None, kind: TaskErrorKind::Failed, units: None }
     }
 
     /// A failure with the whole chain of causes, each after a colon.
@@ -50,7 +66,7 @@ impl TaskError {
 
     /// The end of a task that was told to stop.
     pub fn cancelled(what: impl Into<String>) -> Self {
-        Self { what: what.into(), why: "cancelled".into(), hint: None, kind: TaskErrorKind::Cancelled }
+        Self { what: what.into(), why: "cancelled".into(), hint: None, kind: TaskErrorKind::Cancelled, units: None }
     }
 
     /// A panic caught at the edge of a lane.
@@ -60,6 +76,7 @@ impl TaskError {
             why: format!("an internal error: {message}"),
             hint: Some("Nothing is lost. Please report this with the steps that led here.".into()),
             kind: TaskErrorKind::Panicked,
+            units: None,
         }
     }
 

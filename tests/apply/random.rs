@@ -10,6 +10,7 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::Union;
 use strum::IntoEnumIterator;
+use touch2touch::app::action::{Action, Key, Shortcut};
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
     AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
@@ -46,6 +47,7 @@ use touch2touch::domain::label::{CleanKind, CleanUp};
 use touch2touch::domain::pose::Rejection;
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
+use touch2touch::io::dataset::ToolUnit;
 use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::work::adapt::{Adapted, Scored};
 use touch2touch::work::error::TaskError;
@@ -55,6 +57,7 @@ use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
 use touch2touch::work::subject::Subject;
 use touch2touch::work::sweep::{Dial, InForce, Setting, Sweep};
+use touch2touch::work::tool::UnitSet;
 
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;
@@ -208,6 +211,10 @@ fn setting() -> impl Strategy<Value = Setting> {
     (settings, any::<usize>()).prop_map(|(settings, at)| settings[at % settings.len()])
 }
 
+fn shortcut() -> impl Strategy<Value = Shortcut> {
+    (any_of::<Key>(), any::<[bool; 3]>()).prop_map(|(key, [ctrl, shift, alt])| Shortcut { ctrl, shift, alt, key })
+}
+
 fn form() -> impl Strategy<Value = FigureForm> {
     let panes = proptest::collection::vec(any_of::<FigurePane>(), 0..9);
     (proptest::option::of(any::<usize>()), panes, any::<u8>(), number())
@@ -281,6 +288,12 @@ macro_rules! draws {
             .prop_map(|(finger, source, at_px, erase)| $command::BeginStroke { finger, source, at_px, erase })
             .boxed()
     };
+    (one $command:ident ReadToolAs $a:expr, $b:expr, $c:expr) => {
+        ($a, $b, $c).prop_map(|(tool, unit, replacing)| $command::ReadToolAs { tool, unit, replacing }).boxed()
+    };
+    (one $command:ident BindKey $a:expr, $b:expr, $c:expr) => {
+        ($a, $b, $c).prop_map(|(action, place, shortcut)| $command::BindKey { action, place, shortcut }).boxed()
+    };
     (one $command:ident Go $a:expr, $b:expr) => { ($a, $b).prop_map(|(run, at)| $command::Go { run, at }).boxed() };
     (one $command:ident $variant:ident $a:expr) => { $a.prop_map($command::$variant).boxed() };
     (one $command:ident $variant:ident $a:expr, $b:expr) => {
@@ -299,6 +312,7 @@ draws! {
         1 Open(place()),
         1 Reload,
         1 ForgetRecent(place()),
+        1 ReadToolAs(Just("tool_a".to_owned()), any_of::<ToolUnit>(), proptest::option::of(Just("in".to_owned()))),
         1 SetFilter(select(vec![String::new(), "tool_a".into(), "is:todo".into(), "angle>5".into(), "nothing like it".into()])),
         1 SetToolFilter(proptest::option::of(Just("tool_b".to_owned()))),
         1 SetSort(any_of::<Sort>()),
@@ -414,6 +428,7 @@ draws! {
         1 AskMasks(any::<bool>()),
         1 SetMasks(mask_choice()),
         1 Place(output()),
+        1 OwnPreferences,
         1 WriteCase(Just(PathBuf::from("no/such/folder/a.t2tcase")), Just(String::new())),
         1 Write(output(), Just(PathBuf::from("no/such/folder/picture.png"))),
     }
@@ -450,6 +465,8 @@ draws! {
         1 SetVersus(versus()),
         1 SetWorkspace(any_of::<Workspace>()),
         1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
+        1 BindKey(any_of::<Action>(), 0usize..4, proptest::option::of(shortcut())),
+        1 ResetKeys(proptest::option::of(any_of::<Action>())),
         1 DismissHint,
         1 Remember(Just(Last { pair: "nowhere".into(), finger: 7, ..Last::default() })),
         1 ResetSettings,
@@ -469,6 +486,13 @@ draws! {
         1 Followed(Just(NEVER), Just(()).prop_map(|()| followed())),
         1 Opened(ticket(), Just(NEVER), place(), Just(()).prop_map(|()| {
             Double::new(false, true).open(&Place::Demo).expect("the double opens")
+        })),
+        1 UnitSet(ticket(), select(vec![DatasetSeq(1), NEVER]), Just(()).prop_map(|()| UnitSet {
+            tool: "tool_a".into(),
+            unit: ToolUnit::Millimeters,
+            file: "unit.txt".into(),
+            word: "mm".into(),
+            not_written: None,
         })),
         1 Bundles(Just(()).prop_map(|()| Double::new(false, true).find_bundles(&[]).0), Just(Vec::new())),
         1 SettingsLoaded(mask().prop_map(|mask| Box::new(Settings { mask, ..Settings::default() })), Just(None)),
@@ -644,5 +668,9 @@ proptest! {
         let mut bench = Bench::open_simulated();
         bench.send(LibraryCommand::Select(SIMULATED));
         carry_out(&mut bench, commands)?;
+        let keys = &bench.state.settings.keys;
+        for action in Action::iter() {
+            prop_assert!(keys.all(action).into_iter().all(|key| keys.holder(key) == Some(action)), "{:?}", action);
+        }
     }
 }

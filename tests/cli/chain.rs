@@ -84,7 +84,7 @@ fn statistics_are_written_once_and_serve_their_bundle_only() {
     assert!(pair["ambiguity"]["kind"].is_string());
     let ledger = ["ledger", "--input", "demo", "--pair", "pattern_36/data_0", "--json"];
     let done = run(&[&ledger[..], &QUICK, &refit].concat(), dir.path());
-    assert_eq!(json(&done)["shift"], "Refit on this dataset", "{}", error_text(&done));
+    assert_eq!(json(&done)["shift"], "Refit on this data set", "{}", error_text(&done));
 
     // Another bundle's statistics are refused, and both are named.
     let other = report["bundle_hash"].as_str().unwrap();

@@ -86,6 +86,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch bench cases", How::Run(&[("200", "4")], "", &[0])),
     ("touch2touch bench dataset", How::Run(&[], "--pairs 20 --grasps 1", &[0])),
     ("touch2touch cache", How::Run(&[], "", &[0])),
+    ("touch2touch unit", How::Run(&[], "", &[0])),
     ("touch2touch doctor", How::Run(&[], "", &[0])),
     ("touch2touch bundle check", How::Run(&[], "", &[0])),
     // Without an engine on the machine it says so by its exit code.

@@ -9,7 +9,7 @@ use touch2touch::domain::grid::Grid;
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::Sample;
-use touch2touch::io::dataset::Dataset;
+use touch2touch::io::dataset::{Dataset, ToolUnit};
 use touch2touch::io::doctor::{DoctorReport, examine};
 use touch2touch::io::pt::read_text_lists;
 use touch2touch::io::simulated::{Layout, WriteError, write_pair, write_tools};
@@ -217,4 +217,20 @@ fn what_the_simulator_writes_is_healthy() {
     // Dropped pixels are the camera's, and summed up in one entry; nothing else may be odd.
     let odd: Vec<_> = report.problems.iter().filter(|p| !p.what.contains("without measurement")).collect();
     assert!(report.pairs == 3 && odd.is_empty() && report.problems.len() <= 1, "{odd:#?}");
+}
+
+#[test]
+fn a_unit_that_is_not_written_holds_as_long_as_the_data_set_is_open() {
+    let dir = tempfile::tempdir().unwrap();
+    write_pair(dir.path(), Layout::Test, "rod", 0, &touch(0.0)).unwrap();
+    write_tools(dir.path(), &[("rod", true, tetrahedron(50.0))]).unwrap();
+    let dataset = Dataset::open(dir.path()).unwrap();
+    assert!(dataset.tool_mesh("rod").is_err());
+    dataset.hold_unit("rod", ToolUnit::Millimeters);
+    let length = |dataset: &Dataset| dataset.tool_mesh("rod").unwrap().unwrap().bounds().map(|[lo, hi]| hi.x - lo.x);
+    let held = length(&dataset).unwrap();
+    // A copy of it, as jobs have, reads the same.
+    assert_eq!(length(&dataset.clone()), Some(held));
+    std::fs::write(dir.path().join("tools_stls/unit.txt"), "mm").unwrap();
+    assert_eq!(length(&Dataset::open(dir.path()).unwrap()), Some(held));
 }

@@ -228,8 +228,8 @@ fn the_modules_of_a_layer_form_no_circle() {
 
 /// What of `app` knows each other by its nature, and so counts as one part, beside each room's `state.rs`: the state
 /// holds the results and what the rooms keep, a recipe says how its result is computed from the state, the data behind
-/// the state is one of the services, and a pane's row says what is computed for it.
-const MODEL: &[&str] = &["history", "keys", "pane", "results", "services", "state", "wanted"];
+/// the state is one of the services, a pane's row says what is computed for it, and the settings have the actions' keys.
+const MODEL: &[&str] = &["action", "history", "keys", "pane", "results", "services", "state", "wanted"];
 
 /// The part of `app` that a module or an item lies in: the model, or the module that acts on it.
 fn part_of_app(path: &[String]) -> Option<String> {
@@ -261,8 +261,8 @@ fn the_rooms_of_the_studio_form_no_circle() {
     let knows: Vec<&String> = arrows["model"].keys().collect();
     assert_eq!(knows, ["jobs"], "{:?}", arrows["model"]);
     // Rooms know neither the list of all commands nor the runtime.
-    for (_, named) in arrows.iter().filter(|(room, _)| !["action", "apply", "runtime"].contains(&room.as_str())) {
-        for above in ["apply", "runtime", "action", "command"] {
+    for (_, named) in arrows.iter().filter(|(room, _)| !["act", "apply", "runtime"].contains(&room.as_str())) {
+        for above in ["apply", "runtime", "act", "command"] {
             assert!(!named.contains_key(above), "{}", named[above]);
         }
     }

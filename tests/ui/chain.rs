@@ -77,7 +77,7 @@ fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
     rig.send(SettingsCommand::DismissHint);
     rig.send(PredictCommand::Generate);
     rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Ledger)));
-    rig.take("Refit on this dataset");
+    rig.take("Refit on this data set");
     let state = rig.harness.state().state();
     let ShiftMode::Refit(refit) = state.settings.shift else { panic!("{:?}", state.settings.shift) };
     assert!(state.log.entries.iter().any(|e| e.text.contains("Shift statistics of 8 touches")), "{:?}", state.log);

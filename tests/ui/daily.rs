@@ -107,7 +107,7 @@ fn notes_cover_nothing_and_only_errors_stay() {
     rig.send(TasksCommand::Report(TaskError::new("Read the cup", "the handle is missing")));
     let note = dismiss(&rig).expect("an error is said");
     let view = rig.harness.get_by_label("3D view, measured").rect();
-    let panes = rig.harness.get_by_label("Filter samples").rect();
+    let panes = rig.harness.get_by_label("Filter pairs").rect();
     assert!(note.top() >= view.bottom() && note.top() >= panes.bottom(), "{note:?} {view:?}");
     rig.shoot("daily-note");
     // A minute of the window's clock: the error stands.

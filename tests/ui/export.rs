@@ -8,6 +8,8 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
+use touch2touch::app::services::Services as _;
+use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::{ColorRange, Theme, Workspace};
 use touch2touch::app::state::State;
 use touch2touch::domain::dataset::PairId;
@@ -143,6 +145,8 @@ fn a_case_is_saved_and_opened_elsewhere_to_the_same_picture_in_eight_actions() {
 
     let Some(mut other) = Rig::live(SIZE, Place::Demo) else { return };
     other.send(SettingsCommand::DismissHint);
+    let own = ColorRange { min_m: 0.002, max_m: 0.009, locked: true };
+    other.send(SettingsCommand::SetRange(own));
     actions += other.clicks(&["Open", "Path…"]) + other.take_to(&file);
     assert!(actions <= 8, "{actions}");
     other.shoot("case-elsewhere");
@@ -165,4 +169,26 @@ fn a_case_is_saved_and_opened_elsewhere_to_the_same_picture_in_eight_actions() {
         let pose = |state: &State| state.pose(source).ready().map(|found| found.grasp_from_object);
         assert_eq!(pose(here), pose(there), "{source:?}");
     }
+
+    // What the case brought holds for the case alone: neither the disk nor the next data set has it.
+    let range = |rig: &Rig| rig_state(rig).settings.range;
+    let kept = |rig: &Rig| {
+        let services = LiveServices::with_config_folder(Some(rig.config.clone()));
+        services.load_settings().0
+    };
+    other.send(SettingsCommand::SetMaskOpacity(0.5));
+    assert_eq!((kept(&other).range, kept(&other).workspace), (own, Workspace::Inspect));
+    other.send(LibraryCommand::Open(Place::Demo));
+    let state = rig_state(&other);
+    assert_eq!((state.settings.range, state.settings.workspace), (own, Workspace::Inspect));
+    // And while it is open, where a person asks for it.
+    other.send(LibraryCommand::Open(Place::Path(file)));
+    assert_ne!(range(&other), own);
+    other.clicks(&["Open", "Back to my preferences"]);
+    assert_eq!((range(&other), rig_state(&other).own.is_none()), (own, true));
+    other.shoot("case-own-preferences");
+}
+
+fn rig_state(rig: &Rig) -> &State {
+    rig.harness.state().state()
 }

@@ -104,7 +104,7 @@ fn space_plays_where_the_pointer_is_over_the_steps() {
         rig.harness.step();
         rig.settle();
     };
-    over(&mut rig, "Filter samples");
+    over(&mut rig, "Filter pairs");
     rig.tap(Modifiers::NONE, Key::Space);
     assert!(!rig.harness.state().state().inspect.playing, "Space is not for the list");
     over(&mut rig, "3D view, measured");

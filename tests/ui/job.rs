@@ -161,7 +161,7 @@ fn keys_of_tools_do_nothing_while_typing() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     rig.key(Modifiers::CTRL, Key::F);
     let before = rig.harness.state().state().selection.pair;
-    rig.harness.get_by_label("Filter samples").type_text("d");
+    rig.harness.get_by_label("Filter pairs").type_text("d");
     rig.harness.key_press(Key::D);
     rig.settle();
     let state = rig.harness.state().state();

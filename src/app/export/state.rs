@@ -313,7 +313,8 @@ impl State {
         let pair = self.selection.pair?;
         let chosen = self.chosen(self.selection.finger).or_else(|| self.rig().pads().find_map(|pad| self.chosen(pad)));
         let generator = chosen.and_then(|key| Some((self.library.bundle(&key.bundle)?.clone(), key.config())));
-        let settings = Settings { recent: Vec::new(), bundle_folders: Vec::new(), ..self.settings.clone() };
+        // What is of the person stays with the person.
+        let settings = self.settings.clone().of_person(&Settings::default());
         let view = CaseView {
             settings,
             camera: camera.to_owned(),

@@ -133,6 +133,13 @@ impl Runtime {
                     }),
                 );
             }
+            Effect::SetUnit { ticket, seq, source, tool, unit, replacing } => {
+                let what = format!("Read {tool} in {}", unit.name());
+                let body = Box::new(move |_: &JobCx| {
+                    Ok(Answer::UnitSet(ticket, seq, source.set_tool_unit(&tool, unit, replacing.as_deref())?))
+                });
+                self.task(Lane::Files, ticket, what, body);
+            }
             Effect::Evaluate { ticket, source, setup } => {
                 let services = self.services.clone();
                 let body = Box::new(move |cx: &JobCx| {

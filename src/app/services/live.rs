@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
 use super::super::labels::state::{PairLabels, Review};
 use super::super::library::state::Place;
@@ -334,7 +335,16 @@ impl LiveServices {
             }
         };
         match parse_settings(&bytes) {
-            Ok(settings) => (settings.validated(), None),
+            Ok((settings, refused)) => {
+                let problem = (!refused.is_empty()).then(|| {
+                    TaskError::new(
+                        "Some keys have their defaults",
+                        format!("{} ({})", refused.join("; "), file.display()),
+                    )
+                    .with_hint("The shortcut sheet sets them")
+                });
+                (settings.validated(), problem)
+            }
             Err(why) => {
                 let bad = folder.join(BAD_SETTINGS_FILE);
                 let kept = match std::fs::rename(&file, &bad) {
@@ -349,7 +359,8 @@ impl LiveServices {
     }
 }
 
-fn parse_settings(bytes: &[u8]) -> Result<Settings, String> {
+/// The settings, and which keys of theirs could not be used.
+fn parse_settings(bytes: &[u8]) -> Result<(Settings, Vec<String>), String> {
     let value: serde_json::Value = serde_json::from_slice(bytes).map_err(|err| err.to_string())?;
     let version = value.get("version").and_then(serde_json::Value::as_u64);
     if version != Some(SETTINGS_VERSION.into()) {
@@ -358,12 +369,14 @@ fn parse_settings(bytes: &[u8]) -> Result<Settings, String> {
             version.map_or_else(|| "unknown".into(), |v| v.to_string())
         ));
     }
-    serde_json::from_value(value).map_err(|err| err.to_string())
+    let refused = value.get("keys").map_or_else(Vec::new, |keys| Bindings::read(keys).1);
+    Ok((serde_json::from_value(value).map_err(|err| err.to_string())?, refused))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::action::Action;
     use crate::app::settings::{ColorMap, MaskChoice, MaskSettings, MaskSource};
     use crate::domain::frames::PlanarPose;
     use crate::domain::grid::Mask;
@@ -491,6 +504,12 @@ mod tests {
         // Numbers that cannot be worked with are brought into range; unknown and missing keys are no harm.
         std::fs::write(&file, r#"{"version": 1, "ui_zoom": 1e9, "new_key": 3}"#).unwrap();
         assert_eq!(services.load_settings().0.ui_zoom, 4.0);
+        // Keys that cannot be used cost nothing else, and are said.
+        std::fs::write(&file, r#"{"version": 1, "ui_zoom": 2.0, "keys": {"fly": ["F9"], "save": ["F8"]}}"#).unwrap();
+        let (settings, problem) = services.load_settings();
+        assert_eq!((settings.ui_zoom, settings.keys.text(Action::Save).as_str()), (2.0, "F8"));
+        assert!(problem.unwrap().why.starts_with("fly: there is no such action ("));
+        assert!(file.exists());
         // What earlier versions wrote opens: the color map under its old name, the numbers of masks beside the tools.
         let old = r#"{"version": 1, "colour_map": "gray", "mask": {"source": "top_percent", "top_percent": 3.0}}"#;
         std::fs::write(&file, old).unwrap();

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
+use super::super::action::Bindings;
 use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
@@ -85,6 +86,8 @@ pub struct Settings {
     pub layouts: std::collections::BTreeMap<String, String>,
     /// The workspace in front.
     pub workspace: Workspace,
+    /// The keys of actions.
+    pub keys: Bindings,
     /// Folders with further model bundles.
     pub bundle_folders: Vec<PathBuf>,
     /// What was on screen when the window was closed.
@@ -135,6 +138,7 @@ impl Default for Settings {
             recent: Vec::new(),
             layouts: std::collections::BTreeMap::new(),
             workspace: Workspace::Inspect,
+            keys: Bindings::default(),
             bundle_folders: Vec::new(),
             last: Last::default(),
         }
@@ -142,6 +146,22 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// These preferences, with what is of the person and the machine as `person` has it: a case brings none of that.
+    #[must_use]
+    pub fn of_person(self, person: &Self) -> Self {
+        Self {
+            theme: person.theme,
+            ui_zoom: person.ui_zoom,
+            recent: person.recent.clone(),
+            bundle_folders: person.bundle_folders.clone(),
+            cache_mib: person.cache_mib,
+            hint_dismissed: person.hint_dismissed,
+            keys: person.keys.clone(),
+            last: person.last.clone(),
+            ..self
+        }
+    }
+
     /// Brings numbers from a file or a text box back into the ranges that can be drawn and computed with.
     #[must_use]
     pub fn validated(mut self) -> Self {

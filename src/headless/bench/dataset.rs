@@ -1,4 +1,4 @@
-//! `touch2touch bench dataset`: how long a whole dataset takes on all cores.
+//! `touch2touch bench dataset`: how long a whole data set takes on all cores.
 
 use std::time::Instant;
 

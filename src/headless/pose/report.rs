@@ -141,7 +141,7 @@ pub(super) fn text(report: &Report) -> String {
     }
     text += &format!(
         "\n{:<28} {:>5} {:>9} {:>9} {:>7} {:>7} {:>10}\n",
-        "engine/imprint", "n", "mean °", "median °", "<=5° %", "<=10° %", "median ms"
+        "registration/imprint", "n", "mean °", "median °", "<=5° %", "<=10° %", "median ms"
     );
     for (key, f) in report.summary.engines.iter().filter(|(k, _)| k.contains('/')) {
         let a = f.angles;

@@ -124,7 +124,7 @@ pub(in crate::headless) enum ShiftArg {
     Exact,
 }
 
-/// [`ShiftArg`] where statistics of a dataset can be named.
+/// [`ShiftArg`] where statistics of a data set can be named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(in crate::headless) enum AnyShiftArg {
     /// What the lab's released script saves: its range is mapped twice.
@@ -133,7 +133,7 @@ pub(in crate::headless) enum AnyShiftArg {
     Paper,
     /// The doubled mapping undone exactly.
     Exact,
-    /// The paper's shift by the statistics of a dataset (see --stats).
+    /// The paper's shift by the statistics of a data set (see --stats).
     Refit,
 }
 

@@ -186,7 +186,7 @@ impl<'a> Worker<'a> {
     }
 }
 
-/// The CAD model of a tool: a file, one of the dataset's, or one of the demo's.
+/// The CAD model of a tool: a file, one of the data set's, or one of the demo's.
 fn tool_model(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<ToolModel> {
     if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("stl")) {
         let mesh = read_in_meters(Path::new(name), args.unit.tool_scale);

@@ -1,4 +1,4 @@
-//! The built-in data sets: the simulator behind the face of a dataset. A sample is rendered when it is asked for, so
+//! The built-in data sets: the simulator behind the face of a data set. A sample is rendered when it is asked for, so
 //! nothing large ships; the same name is the same sample on every machine.
 
 use crate::domain::catalog::{self, ToolSpec};

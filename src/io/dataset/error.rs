@@ -1,4 +1,4 @@
-//! Why a dataset cannot be opened, or one of its pairs not be loaded.
+//! Why a data set cannot be opened, or one of its pairs not be loaded.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use crate::io::files::listed;
 use crate::io::images::PictureError;
 use crate::io::pt::PtError;
 
-/// Why a folder cannot be opened as a dataset.
+/// Why a folder cannot be opened as a data set.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// The folder does not exist or may not be read.
@@ -18,7 +18,7 @@ pub enum OpenError {
         /// The system's reason.
         source: std::io::Error,
     },
-    /// Nothing in the folder looks like a dataset.
+    /// Nothing in the folder looks like a data set.
     #[error("no paired touches found ({})", path.display())]
     NothingFound {
         /// The folder.
@@ -84,8 +84,8 @@ pub enum LoadError {
         /// What the panic said.
         message: String,
     },
-    /// The pair is not one of this dataset.
-    #[error("the dataset has no pair number {}", id.0)]
+    /// The pair is not one of this data set.
+    #[error("the data set has no pair number {}", id.0)]
     NoSuchPair {
         /// The number asked for.
         id: PairId,
@@ -112,7 +112,7 @@ impl LoadError {
             Self::Sizes { .. } => "take both images with the same camera settings",
             Self::MostlyInvalid { .. } => "record the grasp again, or remove the file",
             Self::Bug { .. } => "please report it with these files; the other pairs are not affected",
-            Self::NoSuchPair { .. } => "open the dataset again",
+            Self::NoSuchPair { .. } => "open the data set again",
         }
     }
 

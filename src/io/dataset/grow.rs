@@ -12,13 +12,13 @@ use crate::domain::rig::PerPad;
 use crate::domain::sample::{DepthCamera, Sample};
 use crate::io::caught::caught;
 
-/// A bubble file of the rig, in the root of a dataset: its cameras serve touches that have no bubble file.
+/// A bubble file of the rig, in the root of a data set: its cameras serve touches that have no bubble file.
 pub const RIG_FILE: &str = "rig.pt";
 
-/// A dataset after its folder was read again.
+/// A data set after its folder was read again.
 #[derive(Debug)]
 pub struct Growth {
-    /// The dataset: pairs known before keep their ids, also where their files are gone.
+    /// The data set: pairs known before keep their ids, also where their files are gone.
     pub dataset: Dataset,
     /// The pairs that were not there before.
     pub new: Vec<PairId>,
@@ -26,7 +26,7 @@ pub struct Growth {
     pub changed: Vec<PairId>,
 }
 
-/// Touches of another kind beside those of the dataset.
+/// Touches of another kind beside those of the data set.
 fn other_kind(root: &Path, what: &str, mine: &str) -> Problem {
     problem(
         root,
@@ -39,7 +39,7 @@ impl Dataset {
     /// Reads the folder again, for pairs that appeared.
     ///
     /// # Errors
-    /// [`OpenError`]; [`OpenError::NothingFound`] also where the folder now holds another kind of dataset only.
+    /// [`OpenError`]; [`OpenError::NothingFound`] also where the folder now holds another kind of data set only.
     pub fn grown(&self) -> Result<Growth, OpenError> {
         let Some(root) = &self.root else {
             return Ok(Growth { dataset: self.clone(), new: Vec::new(), changed: Vec::new() });

@@ -97,7 +97,7 @@ fn groups_below(folder: &Path) -> Vec<Group> {
         .collect()
 }
 
-/// The dataset's root: the same whichever of its folders is opened, so that masks stay with their pairs.
+/// The data set's root: the same whichever of its folders is opened, so that masks stay with their pairs.
 fn root_of(group: &Group) -> PathBuf {
     let parent = |path: &Path| path.parent().unwrap_or(path).to_owned();
     let up = parent(&group.folder);

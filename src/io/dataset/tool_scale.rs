@@ -3,17 +3,89 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use strum::{EnumIter, IntoEnumIterator as _};
+
 use super::problem;
 use crate::domain::dataset::Problem;
 use crate::domain::mesh::TriMesh;
 use crate::domain::units::{is_tool_length, scale_to_meters};
-use crate::io::files;
 use crate::io::stl::{self, MeshError};
+use crate::io::{atomic, files};
 
 /// The file beside the CAD models that says which unit they are in.
 pub const UNIT_FILE: &str = "unit.txt";
 /// Most bytes of that file: a word or a number.
 const MAX_UNIT_BYTES: u64 = 4096;
+
+/// A unit that CAD programs write models in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter)]
+pub enum ToolUnit {
+    /// Most CAD programs' own.
+    Millimeters,
+    /// Blender's and others'.
+    Centimeters,
+    /// The lab's.
+    Meters,
+    /// Rarely anyone's.
+    Micrometers,
+    /// Where parts are drawn in them.
+    Inches,
+}
+
+impl ToolUnit {
+    /// The word in [`UNIT_FILE`] and on the command line.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Millimeters => "mm",
+            Self::Centimeters => "cm",
+            Self::Meters => "m",
+            Self::Micrometers => "um",
+            Self::Inches => "in",
+        }
+    }
+
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Millimeters => "millimeters",
+            Self::Centimeters => "centimeters",
+            Self::Meters => "meters",
+            Self::Micrometers => "micrometers",
+            Self::Inches => "inches",
+        }
+    }
+
+    /// One of it, meters.
+    pub fn meters(self) -> f64 {
+        match self {
+            Self::Millimeters => 1e-3,
+            Self::Centimeters => 1e-2,
+            Self::Meters => 1.0,
+            Self::Micrometers => 1e-6,
+            Self::Inches => 0.0254,
+        }
+    }
+
+    /// The units in which something of this size is as large as a hand-held tool.
+    pub fn fitting(size: f64) -> impl Iterator<Item = Self> {
+        Self::iter().filter(move |unit| is_tool_length(size * unit.meters()))
+    }
+
+    /// What reading a file in this unit is.
+    pub fn scale(self) -> ToolScale {
+        if self == Self::Meters { ToolScale::Meters } else { ToolScale::Factor(self.meters()) }
+    }
+}
+
+impl FromStr for ToolUnit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::iter()
+            .find(|unit| unit.key() == text)
+            .ok_or_else(|| format!("{:?} is no unit: use m, cm, mm, um or in", files::clip(text)))
+    }
+}
 
 /// What the numbers of a CAD file mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,13 +104,12 @@ impl FromStr for ToolScale {
 
     /// `m`, `cm`, `mm`, `um`, `in`, `auto`, or the factor to meters.
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Ok(match text.trim() {
-            "m" => Self::Meters,
+        let text = text.trim();
+        if let Ok(unit) = text.parse::<ToolUnit>() {
+            return Ok(unit.scale());
+        }
+        Ok(match text {
             "auto" => Self::Auto,
-            "cm" => Self::Factor(1e-2),
-            "mm" => Self::Factor(1e-3),
-            "um" => Self::Factor(1e-6),
-            "in" => Self::Factor(0.0254),
             other => match other.parse::<f64>() {
                 Ok(factor) if factor.is_finite() && factor > 0.0 => Self::Factor(factor),
                 _ => {
@@ -55,13 +126,39 @@ impl FromStr for ToolScale {
 impl ToolScale {
     /// What [`UNIT_FILE`] beside `model` says; `None` without one.
     fn beside(model: &Path) -> Result<Option<Self>, MeshError> {
-        let file: PathBuf = model.with_file_name(UNIT_FILE);
-        match files::read_to_string(&file, MAX_UNIT_BYTES) {
-            Ok(text) => text.parse().map(Some).map_err(|reason| MeshError::UnitFile { file, reason }),
-            Err(err) if err.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(source) => Err(MeshError::Io { file, source }),
-        }
+        let unknown = |reason| MeshError::UnitFile { file: model.with_file_name(UNIT_FILE), reason };
+        said_beside(model)?.map(|text| text.parse().map_err(unknown)).transpose()
     }
+}
+
+/// The words of [`UNIT_FILE`] beside `model`; `None` without one.
+///
+/// # Errors
+/// If it is there and cannot be read.
+pub fn said_beside(model: &Path) -> Result<Option<String>, MeshError> {
+    let file: PathBuf = model.with_file_name(UNIT_FILE);
+    match files::read_to_string(&file, MAX_UNIT_BYTES) {
+        Ok(text) => Ok(Some(text.trim().to_owned())),
+        Err(err) if err.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(MeshError::Io { file, source }),
+    }
+}
+
+/// Longest side of a CAD model, in its file's own unit.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn tool_size(path: &Path) -> Result<f64, MeshError> {
+    let bounds = stl::read(path)?.mesh.bounds();
+    Ok(bounds.map_or(0.0, |[lo, hi]| (hi - lo).max_element()))
+}
+
+/// Names the unit of all CAD models beside `model`, for good. What the file said before is lost.
+///
+/// # Errors
+/// Whatever the disk says.
+pub fn write_beside(model: &Path, word: &str) -> std::io::Result<()> {
+    atomic::write_bytes(&model.with_file_name(UNIT_FILE), format!("{word}\n").as_bytes())
 }
 
 /// A CAD model that can be worked with.

@@ -1,4 +1,4 @@
-//! What a simulated dataset says about itself: that it was begun, what was asked for, and, last of all, that it is whole.
+//! What a simulated data set says about itself: that it was begun, what was asked for, and, last of all, that it is whole.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use crate::domain::mesh::TriMesh;
 use crate::domain::sample::Sample;
 use crate::io::{atomic, files};
 
-/// The manifest's name, in the root of the dataset.
+/// The manifest's name, in the root of the data set.
 pub const MANIFEST: &str = "simulated.json";
 const FORMAT: &str = "touch2touch-simulated";
 const VERSION: u32 = 1;
@@ -38,7 +38,7 @@ struct Part {
     recipe: Value,
 }
 
-/// A dataset that is being written: [`Writing::begin`], the pairs, [`Writing::finish`].
+/// A data set that is being written: [`Writing::begin`], the pairs, [`Writing::finish`].
 #[derive(Debug)]
 pub struct Writing {
     root: PathBuf,
@@ -73,7 +73,7 @@ impl Writing {
             Some(manifest) => {
                 let same = manifest.parts.get(key).is_none_or(|part| part.recipe == recipe && part.pairs == pairs);
                 if !same || manifest.tools != names {
-                    let found = "a simulated dataset of other tools, grasps or seeds".to_owned();
+                    let found = "a simulated data set of other tools, grasps or seeds".to_owned();
                     return Err(WriteError::NotOurs { folder: root.to_owned(), found });
                 }
                 manifest
@@ -150,14 +150,14 @@ fn first_entry(root: &Path) -> Result<Option<String>, WriteError> {
     Ok(names.into_iter().filter(|name| !name.starts_with('.')).min())
 }
 
-/// What is to be said about a dataset whose simulation did not end.
+/// What is to be said about a data set whose simulation did not end.
 pub fn unfinished(root: &Path) -> Option<Problem> {
     let parts = read(root)?.parts;
     let open: Vec<String> =
         parts.iter().filter(|(_, p)| !p.finished).map(|(k, p)| format!("{k} ({})", p.pairs)).collect();
     (!open.is_empty()).then(|| Problem {
         file: root.join(MANIFEST),
-        what: format!("the simulation that writes this dataset was not finished; pairs meant: {}", open.join(", ")),
+        what: format!("the simulation that writes this data set was not finished; pairs meant: {}", open.join(", ")),
         hint: "run the same `touch2touch simulate` again into this folder, or remove the folder".into(),
     })
 }

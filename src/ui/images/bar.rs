@@ -21,7 +21,8 @@ pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &
     if !range.locked || bulk.hi <= bulk.lo || shown >= LITTLE * (range.max_m - range.min_m) {
         return;
     }
-    let text = format!("{:.1} to {:.1} mm: fit the colors (C)", bulk.lo * 1e3, bulk.hi * 1e3);
+    let text = format!("{:.1} to {:.1} mm: fit the colors", bulk.lo * 1e3, bulk.hi * 1e3);
+    let text = cx.keys().behind(&text, Action::RangeOnce);
     let place = Rect::from_min_max(pos2(area.left() + 4.0, area.bottom() - 24.0), area.max - vec2(4.0, 2.0));
     ui.scope_builder(UiBuilder::new().max_rect(place).id_salt("offer range"), |ui| {
         ui.vertical_centered(|ui| {
@@ -33,6 +34,11 @@ pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &
         });
     });
 }
+
+/// What setting the range does.
+const AUTO: &str = "Set the range once from what is shown";
+/// What the lock means.
+const LOCK: &str = "Locked: colors mean the same in every pair. Unlocked: set from each pair shown";
 
 /// The bar of a pane's pictures: that of errors, else that of depth.
 pub(in crate::ui) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histogram>) {
@@ -46,6 +52,7 @@ pub(in crate::ui) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogr
             histogram,
             locked: None,
             note,
+            tips: [AUTO.to_owned(), String::new()],
         };
         match bar.show(ui, Range::symmetric(cx.shared.views.error_mm)) {
             Some(Asked::Range(range)) => cx.shared.views.error_mm = range.hi.clamp(0.05, 100.0),
@@ -58,7 +65,7 @@ pub(in crate::ui) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogr
         }
         return;
     }
-    let range = cx.state.settings.range;
+    let (range, keys) = (cx.state.settings.range, cx.keys());
     let default = ColorRange::default();
     let bar = Colorbar {
         label: "Depth range",
@@ -68,6 +75,7 @@ pub(in crate::ui) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogr
         histogram,
         locked: Some(range.locked),
         note,
+        tips: [keys.behind(AUTO, Action::RangeOnce), keys.behind(LOCK, Action::LockRange)],
     };
     match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {
         Some(Asked::Range(r)) => {

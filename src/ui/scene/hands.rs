@@ -44,7 +44,7 @@ pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, column:
             let button = Button::new(text).min_size(vec2(24.0, 18.0)).fill(fill);
             let response = ui.add_enabled(action.command(cx.state).is_some(), button);
             let response = response.accessible_name(format!("{}, {side}", action.name()));
-            if response.on_hover_text(action.help()).clicked() {
+            if response.on_hover_text(cx.keys().help(action)).clicked() {
                 cx.act(action);
             }
         }
@@ -103,7 +103,9 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
                 let six_dof = cx.state.workbench.six_dof;
                 small_button(cx, ui, Action::SixDof, "6-DoF", source, six_dof);
             });
-            ui.label(caption("Arrows y, z 0.1 mm · Alt+Left, Right 0.5° · Shift ×10 · Ctrl ÷10", cx.p));
+            let keys = "[[nudge_left]], [[nudge_right]], [[nudge_up]], [[nudge_down]] 0.1 mm · [[turn_left]], [[turn_right]] 0.5° · \
+                        Shift ×10 · Ctrl ÷10";
+            ui.label(caption(cx.keys().fill(keys), cx.p));
         });
     });
 }
@@ -113,7 +115,7 @@ fn small_button(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, source
     let button = Button::selectable(on, RichText::new(text).size(SMALL)).frame_when_inactive(true);
     let response = ui.add_enabled(command.is_some(), button.min_size(vec2(0.0, 20.0)));
     let response = response.accessible_name(format!("{}, {}", action.name(), source.name().to_lowercase()));
-    if response.on_hover_text(action.help()).on_disabled_hover_text(action.help()).clicked()
+    if response.on_hover_text(cx.keys().help(action)).on_disabled_hover_text(cx.keys().help(action)).clicked()
         && let Some(command) = command
     {
         cx.push(command);

@@ -52,7 +52,8 @@ pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource
         painter.galley(back.min, galley, color);
     };
     if bench.tool.marks() > 0 && bench.marks.len() < bench.tool.marks() {
-        let text = format!("Click point {} of {} · Esc to stop", bench.marks.len() + 1, bench.tool.marks());
+        let text = format!("Click point {} of {} · [[cancel_jobs]] to stop", bench.marks.len() + 1, bench.tool.marks());
+        let text = cx.keys().fill(&text);
         label(pos2(rect.center().x - 90.0, rect.bottom() - 34.0), text, cx.p.text);
     }
     let points: Vec<DVec3> = bench.marks.iter().filter(|(of, _)| *of == source).map(|(_, p)| *p).collect();
@@ -119,7 +120,9 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
                 ui.label(caption("Point", cx.p));
                 ui.with_layout(eframe::egui::Layout::right_to_left(eframe::egui::Align::Center), |ui| {
                     let close = ui.add(eframe::egui::Button::new("×").frame(false).min_size(vec2(14.0, 14.0)));
-                    let close = close.accessible_name("Close the read-out").on_hover_text("Esc");
+                    let close = close
+                        .accessible_name("Close the read-out")
+                        .on_hover_text(cx.keys().fill("Closes it ([[cancel_jobs]])"));
                     if close.clicked() {
                         cx.push(Command::Workbench(WorkbenchCommand::Pick(None)));
                     }

@@ -76,7 +76,7 @@ pub(super) fn sides(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, column:
             let text = egui::RichText::new(letter).size(11.0).color(cx.p.weak);
             let button = ui.add(egui::Button::new(text).min_size(vec2(22.0, 18.0)).fill(cx.p.panel));
             let button = button.accessible_name(format!("{}, {side}", action.name()));
-            if button.on_hover_text(action.help()).clicked() {
+            if button.on_hover_text(cx.keys().help(action)).clicked() {
                 cx.act(action);
             }
         }

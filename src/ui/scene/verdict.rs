@@ -1,6 +1,6 @@
 //! The verdict on a pose: one line above the picture, colored by the worst of what is known; the rest on demand.
 
-use eframe::egui::{Button, Color32, RichText, Sense, Ui, vec2};
+use eframe::egui::{Align, Button, Color32, Layout, RichText, Sense, Ui, UiBuilder, vec2};
 
 use super::hands;
 use super::overlay::{difference, lower_first, pose_details, pose_time, step_text};
@@ -13,6 +13,7 @@ use crate::domain::align::MIN_POINTS;
 use crate::domain::hand::PoseDifference;
 use crate::domain::units;
 use crate::ui::cx::Cx;
+use crate::ui::images;
 use crate::ui::theme::{Palette, SMALL};
 use crate::work::pose::PoseResult;
 
@@ -110,7 +111,19 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
             cx.push(SettingsCommand::SetMaskSource(MaskSource::Threshold));
         }
     }
-    ui.scope_builder(eframe::egui::UiBuilder::new().max_rect(inner), |ui| {
+    // The CAD model is in another unit: it is said in which, and that is all.
+    let units = match cx.state.pose(source) {
+        Lookup::Failed(err) => err.units.clone(),
+        _ => None,
+    };
+    if let Some(offer) = units {
+        let right = Layout::right_to_left(Align::Center);
+        let place = UiBuilder::new().max_rect(inner).layout(right);
+        let side = source.name().to_lowercase();
+        let used = ui.scope_builder(place, |ui| images::unit_buttons(cx, ui, &offer, &side)).response.rect;
+        inner.set_right(used.left() - 4.0);
+    }
+    ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
         ui.set_clip_rect(inner.intersect(ui.clip_rect()));
         ui.add(eframe::egui::Label::new(RichText::new(text).size(12.0).color(color)).truncate());
     });

@@ -32,6 +32,8 @@ pub struct Colorbar<'a> {
     pub locked: Option<bool>,
     /// Beside the unit, e.g. `assumed scale`.
     pub note: &'a str,
+    /// What setting the range from what is shown does, and what the lock means.
+    pub tips: [String; 2],
 }
 
 /// What a person asked of the bar.
@@ -106,15 +108,14 @@ impl Colorbar<'_> {
         let mut asked = None;
         let auto = ui.add(egui::Button::new(egui::RichText::new("Auto").size(SMALL)).min_size(vec2(32.0, 18.0)));
         let auto = auto.accessible_name(format!("{}: set from what is shown", self.label));
-        if auto.on_hover_text("Set the range once from what is shown (C)").clicked() {
+        if auto.on_hover_text(&self.tips[0]).clicked() {
             asked = Some(Asked::Auto);
         }
         if let Some(locked) = self.locked {
             let text = egui::RichText::new("Lock").size(SMALL);
             let lock = ui.add(egui::Button::selectable(locked, text).min_size(vec2(32.0, 18.0)));
             let lock = lock.accessible_name(format!("{}: lock", self.label));
-            let tip = "Locked: colors mean the same in every sample. Unlocked: set from each sample shown (O)";
-            if lock.on_hover_text(tip).clicked() {
+            if lock.on_hover_text(&self.tips[1]).clicked() {
                 asked = Some(Asked::Lock(!locked));
             }
         }

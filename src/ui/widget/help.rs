@@ -2,21 +2,22 @@
 
 use eframe::egui::{self, RichText, Ui};
 
+use crate::app::action::Bindings;
 use crate::ui::theme::{Palette, SMALL, caption};
 
 /// Mouse controls of every image pane.
 pub const IMAGE: &[(&str, &str)] = &[
     ("Wheel", "zoom at the pointer"),
     ("Drag, middle drag or Space + drag", "move all linked images"),
-    ("Double-click or 0", "fit"),
+    ("Double-click or [[fit]]", "fit"),
     ("Hover", "cross-hair in every image and point in 3D"),
 ];
 
 /// Controls of the comparison of any two imprints.
 pub const VERSUS: &[(&str, &str)] = &[
     ("Click on A or B", "choose what it is"),
-    ("Shift + R", "swap A and B"),
-    ("Shift + F", "side by side, wipe, difference, 3D"),
+    ("[[swap_compared]]", "swap A and B"),
+    ("[[compare_mode]]", "side by side, wipe, difference, 3D"),
     ("Hold F", "B in the place of A"),
     ("Drag the line", "wipe"),
     ("Hover", "both values and their difference, in the status bar"),
@@ -27,10 +28,10 @@ pub const VERSUS: &[(&str, &str)] = &[
 pub const PAINT: &[(&str, &str)] = &[
     ("Drag", "paint with the tool in hand"),
     ("Ctrl + drag or right drag", "erase"),
-    ("[ and ], or Shift + wheel", "brush size"),
+    ("[[brush_smaller]] and [[brush_larger]], or Shift + wheel", "brush size"),
     ("Wheel", "zoom at the pointer"),
     ("Middle drag or Space + drag", "move all linked images"),
-    ("0", "fit"),
+    ("[[fit]]", "fit"),
 ];
 
 /// Mouse controls of the 3D panes.
@@ -38,13 +39,13 @@ pub const SCENE: &[(&str, &str)] = &[
     ("Left drag", "orbit"),
     ("Right or middle drag", "move"),
     ("Wheel", "zoom at the pointer"),
-    ("Double-click", "center the point; beside all points, or 0: fit"),
-    ("Ctrl + 1 … 4", "from left, right, front, top"),
+    ("Double-click", "center the point; beside all points, or [[fit]]: fit"),
+    ("[[camera_left]], [[camera_right]], [[camera_front]], [[camera_top]]", "from left, right, front, top"),
     ("Hover", "cross-hair in the images"),
-    ("Click a point", "read it, or measure with Y (mm) and Shift + Y (angle)"),
-    ("Z", "pose tool: arrows or handles; Enter accepts, Esc reverts"),
-    ("V", "next layer"),
-    ("X, W, I", "cut open, GelSlim's window only, parallel lines"),
+    ("Click a point", "read it, or measure with [[measure_distance]] (mm) and [[measure_angle]] (angle)"),
+    ("[[pose_tool]]", "pose tool: keys or handles; [[accept_hand]] accepts, [[cancel_jobs]] reverts"),
+    ("[[next_layer]]", "next layer"),
+    ("[[section]], [[window_only]], [[parallel]]", "cut open, GelSlim's window only, parallel lines"),
     ("Click in the list", "show or hide; the dots: color, size, opacity"),
 ];
 
@@ -52,21 +53,21 @@ pub const SCENE: &[(&str, &str)] = &[
 pub const STEPS: &[(&str, &str)] = &[
     ("Drag in the curves", "scrub"),
     ("Click on a curve", "show that start and step"),
-    (", and .", "previous and next step"),
-    ("Shift with them", "first and last step"),
-    ("Space", "play or pause, also over a 3D view"),
-    ("J", "pin the step for comparison"),
+    ("[[step_back]] and [[step_forward]]", "previous and next step"),
+    ("[[first_step]] and [[last_step]]", "first and last step"),
+    ("[[play_steps]]", "play or pause, also over a 3D view"),
+    ("[[pin_step]]", "pin the step for comparison"),
 ];
 
 /// Mouse controls of the basin map.
 pub const BASIN: &[(&str, &str)] = &[
     ("Hover", "the start asked for, the one applied, and the end"),
     ("Click", "load that run into the time machine"),
-    ("Esc", "give up what is being computed"),
+    ("[[cancel_jobs]]", "give up what is being computed"),
 ];
 
-/// A question mark that lists `controls` under the pointer.
-pub fn mark(ui: &mut Ui, pane: &str, controls: &[(&str, &str)]) {
+/// A question mark that lists `controls` under the pointer, with the keys in force.
+pub fn mark(ui: &mut Ui, pane: &str, controls: &[(&str, &str)], keys: &Bindings) {
     let p = Palette::of(ui);
     let text = RichText::new("?").size(SMALL).color(p.weak);
     let button = ui.add(egui::Button::new(text).frame(false).min_size(egui::vec2(16.0, 16.0)));
@@ -75,8 +76,8 @@ pub fn mark(ui: &mut Ui, pane: &str, controls: &[(&str, &str)]) {
         ui.label(RichText::new(format!("{pane}: mouse controls")).strong());
         egui::Grid::new(("help", pane)).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
             for (control, effect) in controls {
-                ui.label(caption(*control, Palette::of(ui)));
-                ui.label(RichText::new(*effect).size(SMALL));
+                ui.label(caption(keys.fill(control), Palette::of(ui)));
+                ui.label(RichText::new(keys.fill(effect)).size(SMALL));
                 ui.end_row();
             }
         });

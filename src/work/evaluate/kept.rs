@@ -227,7 +227,8 @@ fn tool_part(dataset: &Dataset, tool: Option<&str>, files: &Files) -> Option<Str
         return Some(format!("{name:?}"));
     };
     let unit = files::read_to_string(&file.with_file_name(UNIT_FILE), files::SMALL).ok();
-    Some(format!("{} {unit:?} {:?}", files.digest(file)?, dataset.tool_scale))
+    let said = tool.map_or(dataset.tool_scale, |tool| dataset.scale_of(tool));
+    Some(format!("{} {unit:?} {said:?}", files.digest(file)?))
 }
 
 /// The key of a grasp: of all that its figures depend on and the sheet does not name.

@@ -1,0 +1,86 @@
+//! What belongs to the place where a person is: the workspace on screen and the pane under the pointer.
+
+use super::super::pane::{Kind, Pane};
+use super::super::settings::state::Workspace;
+use super::{Action, Group};
+
+impl Action {
+    /// Whether it is about a workspace, or about a pane in it.
+    pub fn is_of(self, workspace: Workspace, pane: Option<Pane>) -> bool {
+        pane.is_some_and(|pane| self.is_of_pane(pane)) || self.is_of_workspace(workspace)
+    }
+
+    fn is_of_workspace(self, workspace: Workspace) -> bool {
+        match workspace {
+            Workspace::Inspect => matches!(
+                self,
+                Self::Generate | Self::GenerateNewSeed | Self::NextPair | Self::PreviousPair | Self::NextWorst
+            ),
+            Workspace::Align => self.group() == Group::Pose,
+            Workspace::Label => self.group() == Group::Mask || self == Self::NextUnfinished,
+            Workspace::Evaluate => {
+                matches!(self, Self::EvaluateDataset | Self::PredictAll | Self::ExportTable | Self::NextWorst)
+            }
+        }
+    }
+
+    fn is_of_pane(self, pane: Pane) -> bool {
+        use Action as A;
+        let picture = matches!(self, A::Fit | A::SavePane | A::CopyPane | A::CopyHovered | A::MaximizePane);
+        let range = matches!(self, A::LockRange | A::RangeOnce | A::ResetRange);
+        match pane.kind() {
+            Kind::Form => match pane {
+                Pane::Browser => self.group() == Group::Navigate,
+                Pane::Generate => self.group() == Group::Generate,
+                Pane::Masks => self.group() == Group::Mask,
+                _ => false,
+            },
+            Kind::Color => picture,
+            Kind::Imprint(_) | Kind::Error => {
+                picture || range || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
+            }
+            Kind::Versus => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
+            Kind::Scene(_) => picture || self.is_of_scene(),
+            Kind::Steps => self.is_of_steps(),
+            Kind::Map => matches!(self, A::CancelJobs | A::OwnStarts),
+        }
+    }
+
+    /// Whether it is about the 3D views.
+    fn is_of_scene(self) -> bool {
+        use Action as A;
+        let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop | A::Section)
+            || matches!(self, A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera)
+            || matches!(self, A::LinkCameras | A::NextLayer | A::AnimateWeakest | A::BothClouds);
+        look || self.is_nudge()
+            || matches!(self, A::PoseTool | A::SixDof | A::IcpFromHere | A::AcceptHand | A::RevertHand)
+            || matches!(self, A::MeasureDistance | A::MeasureAngle | A::PlaySteps)
+    }
+
+    /// Whether it is about the steps of a registration.
+    fn is_of_steps(self) -> bool {
+        use Action as A;
+        matches!(self, A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep)
+            || matches!(self, A::OwnStarts | A::Correspondences)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use strum::IntoEnumIterator as _;
+
+    use super::*;
+
+    #[test]
+    fn each_workspace_and_each_picture_has_what_belongs_to_it() {
+        for workspace in Workspace::iter() {
+            assert!(Action::iter().any(|action| action.is_of(workspace, None)), "{workspace:?}");
+        }
+        for pane in Pane::iter().filter(|pane| pane.kind() != Kind::Form) {
+            assert!(Action::iter().any(|action| action.is_of_pane(pane)), "{pane:?}");
+        }
+        assert!(Action::Brush.is_of(Workspace::Label, None) && !Action::Brush.is_of(Workspace::Align, None));
+        assert!(Action::PinStep.is_of(Workspace::Inspect, Some(Pane::TimeMachine)));
+        assert!(!Action::PinStep.is_of(Workspace::Inspect, Some(Pane::Measured)));
+    }
+}

@@ -1,0 +1,58 @@
+//! One word for a thing: what docs/glossary.md has replaced is said nowhere.
+
+use std::path::Path;
+
+use strum::IntoEnumIterator as _;
+use touch2touch::app::action::Action;
+use touch2touch::app::pane::Pane;
+
+use crate::support::run;
+
+/// A word that is not said any more, and the one that is.
+const REPLACED: &[(&str, &str)] = &[("dataset", "data set"), ("datasets", "data sets")];
+/// The same for the studio, whose texts are of nothing else.
+const ON_SCREEN: &[(&str, &str)] = &[("sample", "pair"), ("samples", "pairs"), ("settings", "preferences")];
+
+/// The prose of a page: no code, no links' addresses, no paths.
+fn prose(text: &str) -> String {
+    let outside = |text: &str, mark: &str| text.split(mark).step_by(2).collect::<Vec<_>>().join(" ");
+    outside(&outside(text, "```"), "`")
+}
+
+fn check(place: &str, text: &str, replaced: &[(&str, &str)]) {
+    let words = text.split(|c: char| !(c.is_alphanumeric() || "_-/.<>=".contains(c)));
+    for word in words.map(|word| word.trim_end_matches('.').to_lowercase()) {
+        if let Some((old, new)) = replaced.iter().find(|(old, _)| *old == word) {
+            panic!("{place} says {old:?}; the word is {new:?} (docs/glossary.md)");
+        }
+    }
+}
+
+#[test]
+fn replaced_words_are_said_nowhere() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for page in ["README.md", "docs/workbench.md", "docs/generator.md", "docs/benchmarks.md", "docs/glossary.md"] {
+        let text = prose(&std::fs::read_to_string(root.join(page)).unwrap());
+        assert!(text.split_whitespace().count() > 100, "{page}");
+        check(page, &text, REPLACED);
+    }
+    for action in Action::iter() {
+        let text = format!("{}. {}", action.name(), action.tooltip());
+        check(&format!("{action:?}"), &text, &[REPLACED, ON_SCREEN].concat());
+    }
+    for pane in Pane::iter() {
+        check(&format!("{pane:?}"), &format!("{}. {}", pane.title(), pane.tip()), &[REPLACED, ON_SCREEN].concat());
+    }
+    let home = tempfile::tempdir().unwrap();
+    let overview = String::from_utf8(run(&["--help"], home.path()).stdout).unwrap();
+    check("--help", &overview, REPLACED);
+    let verbs = overview.lines().skip_while(|line| !line.starts_with("Commands:")).skip(1);
+    let mut found = 0;
+    for verb in verbs.take_while(|line| line.starts_with("  ")).filter(|line| !line.starts_with("   ")) {
+        let verb = verb.split_whitespace().next().unwrap();
+        let help = String::from_utf8(run(&[verb, "--help"], home.path()).stdout).unwrap();
+        check(verb, &help, REPLACED);
+        found += 1;
+    }
+    assert!(found > 15, "{found} verbs\n{overview}");
+}

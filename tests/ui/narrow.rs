@@ -1,0 +1,77 @@
+//! A window of 1024 x 700 points: nothing stands beyond its pane, in any workspace and any pane.
+
+use std::collections::BTreeMap;
+
+use eframe::egui::accesskit::Role;
+use eframe::egui::{Rect, pos2, vec2};
+use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use strum::IntoEnumIterator as _;
+use touch2touch::app::command::{Command, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::settings::Workspace;
+
+use super::rig::Rig;
+
+const SIZE: [f32; 2] = [1024.0, 700.0];
+/// What a frame around a control may add, points.
+const FRAME: f32 = 1.5;
+
+/// What is read or pressed, and must be there whole.
+fn counts(role: Role) -> bool {
+    matches!(
+        role,
+        Role::Button | Role::CheckBox | Role::RadioButton | Role::ComboBox | Role::TextInput | Role::SpinButton
+    ) || matches!(role, Role::Slider | Role::Label | Role::Link)
+}
+
+/// What stands beyond the window or its pane, in words.
+fn beyond(rig: &Rig) -> Vec<String> {
+    let places: BTreeMap<Pane, Rect> = rig.harness.state().places();
+    let shown = &rig.harness.state().state().selection.panes;
+    let panes: Vec<(Pane, Rect)> = places.into_iter().filter(|(pane, _)| shown.contains(pane)).collect();
+    let mut found = Vec::new();
+    let nodes = rig.harness.get_all_by(|_| true);
+    let mut seen = 0;
+    for node in nodes {
+        let role = node.accesskit_node().role();
+        let rect = node.rect();
+        if !counts(role) || !rect.is_positive() {
+            continue;
+        }
+        seen += 1;
+        let name = node.accesskit_node().label().or_else(|| node.accesskit_node().value()).unwrap_or_default();
+        // What is scrolled out of sight lies above or below its pane.
+        let home = panes.iter().find(|(_, place)| place.contains(rect.center()));
+        let (of, place) = match home {
+            Some((pane, place)) => (pane.title(), *place),
+            None => ("the window", Rect::from_min_size(pos2(0.0, 0.0), vec2(SIZE[0], SIZE[1]))),
+        };
+        if rect.left() < place.left() - FRAME || rect.right() > place.right() + FRAME {
+            found.push(format!("{role:?} {name:?} at {rect:?} of {of}, {place:?}"));
+        }
+    }
+    assert!(seen > 20, "{seen}");
+    found
+}
+
+#[test]
+fn no_control_is_cut_off_in_a_window_of_1024_by_700() {
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(PredictCommand::Generate);
+    let mut found = Vec::new();
+    for workspace in Workspace::iter() {
+        rig.send(SettingsCommand::SetWorkspace(workspace));
+        rig.shoot(&format!("narrow-{}", workspace.name()).to_lowercase());
+        for pane in Pane::of(workspace) {
+            rig.send(Command::View(ViewCommand::Ui(UiRequest::ShowPane(pane))));
+            rig.send(SettingsCommand::SetWorkspace(workspace));
+            assert!(rig.harness.state().state().selection.panes.contains(&pane), "{workspace:?} {pane:?}");
+            rig.shoot(&format!("narrow-{}-{pane:?}", workspace.name()).to_lowercase());
+            let cut = beyond(&rig);
+            found.extend(cut.into_iter().map(|cut| format!("{workspace:?}, {pane:?}: {cut}")));
+        }
+    }
+    found.sort();
+    found.dedup_by_key(|line| line.split_once(": ").map(|(_, what)| what.to_owned()));
+    assert!(found.is_empty(), "{} cut off:\n{}", found.len(), found.join("\n"));
+}

@@ -1,0 +1,64 @@
+//! An STL in millimeters: it is said, one click accepts it, and nothing has to be opened anew.
+
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::command::{Command, LibraryCommand, SettingsCommand};
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::Workspace;
+use touch2touch::app::state::Lookup;
+use touch2touch::app::tasks::Level;
+use touch2touch::io::dataset::ToolUnit;
+use touch2touch::io::stl;
+
+use super::rig::Rig;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+const MEASURED: ImprintSource = ImprintSource::Measured;
+
+#[test]
+fn a_click_reads_the_model_in_the_unit_that_fits() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    let folder = rig.data.join("tools_stls");
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let file = entry.unwrap().path();
+        let mut mesh = stl::read(&file).unwrap().mesh;
+        mesh.vertices.iter_mut().for_each(|v| *v *= 1e3);
+        stl::write(&file, &mesh).unwrap();
+    }
+    rig.restart(SIZE);
+    rig.send(SettingsCommand::DismissHint);
+    for size in [SIZE, [1024.0, 700.0]] {
+        rig.harness.set_size(size.into());
+        for workspace in [Workspace::Inspect, Workspace::Align] {
+            rig.send(SettingsCommand::SetWorkspace(workspace));
+            rig.shoot(&format!("unit-{}-{}", workspace.name(), size[0]).to_lowercase());
+        }
+    }
+    let state = |rig: &Rig| rig.harness.state().state().pose(MEASURED).ready().is_some();
+    assert!(!state(&rig));
+    let tool = rig.harness.state().state().tool_name().unwrap().to_owned();
+    // Both where the pose would stand in 3D and under Metrics.
+    rig.harness.get_by_label(&format!("Read {tool} as millimeters, measured, in the metrics"));
+    let unit = folder.join("unit.txt");
+    assert!(!unit.exists());
+    rig.harness.get_by_label(&format!("Read {tool} as millimeters, measured")).click();
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(std::fs::read_to_string(&unit).unwrap(), "mm\n");
+    assert!(state(&rig), "{:?}", rig.harness.state().state().pose(MEASURED));
+    assert!(rig.harness.query_all_by_label_contains("as millimeters").next().is_none());
+    rig.shoot("unit-accepted");
+
+    // Somebody else wrote another unit meanwhile: it is not lost unsaid.
+    std::fs::write(&unit, "in").unwrap();
+    let (unit_now, replacing) = (ToolUnit::Millimeters, Some("mm".to_owned()));
+    rig.send(Command::Library(LibraryCommand::ReadToolAs { tool, unit: unit_now, replacing }));
+    assert_eq!(std::fs::read_to_string(&unit).unwrap(), "in");
+    let log = &rig.harness.state().state().log;
+    assert!(
+        log.entries.iter().any(|entry| entry.level == Level::Error && entry.detail.as_ref().unwrap().contains("in"))
+    );
+    // What is read anew says so, and the offer names what it would replace.
+    rig.send(LibraryCommand::Reload);
+    let Lookup::Failed(err) = rig.harness.state().state().pose(MEASURED) else { panic!("it is no tool in inches") };
+    assert_eq!(err.units.as_ref().unwrap().says.as_deref(), Some("in"));
+}
