@@ -92,7 +92,7 @@ impl CleanUp {
     /// The mask cleaned. A size that is no number, or smaller than a pixel, changes nothing.
     #[must_use]
     pub fn apply(self, mask: &Mask, px_per_mm: f64) -> Mask {
-        let px = self.size_mm * px_per_mm;
+        let px = (self.size_mm * px_per_mm).max(0.0);
         match self.kind {
             CleanKind::FillHoles => fill_holes(mask),
             CleanKind::LargestIsland => largest_island(mask),
@@ -210,7 +210,7 @@ mod tests {
             assert_eq!(kind.key().parse(), Ok(kind));
             if kind.is_sized() {
                 for size in [0.0, 0.2, -3.0, f64::NAN] {
-                    assert_eq!(clean(kind, size, &scene), scene, "{kind:?} {size}");
+                    assert!(clean(kind, size, &scene) == scene, "{kind:?} {size}");
                 }
             }
             for size in [1.0, 1e300, f64::INFINITY] {

@@ -42,17 +42,17 @@ pub(super) fn parts(entries: &[ExportEntry], config: &ExportConfig) -> Result<Ve
     // The lab's trainer refuses an empty part: each wanted one takes its nearest, as soon as every part can have one.
     if parts.len() >= 3 {
         let held_out = entries.iter().any(is_unseen);
-        if test > 0.0 && !held_out && !parts.contains(&2) {
-            let at = parts.iter().rposition(|part| *part == 1).filter(|at| *at > 0);
-            let at = at.or_else(|| parts.iter().position(|part| *part == 0));
-            at.into_iter().for_each(|at| parts[at] = 2);
-        }
-        if val > 0.0 && !parts.contains(&1) {
-            let at = parts.iter().position(|part| *part == 0).or(Some(0));
-            at.into_iter().for_each(|at| parts[at] = 1);
-        }
-        if !parts.contains(&0) {
-            parts.iter_mut().next_back().into_iter().for_each(|part| *part = 0);
+        for (part, wanted) in [(1, val > 0.0), (2, test > 0.0 && !held_out), (0, true)] {
+            if !wanted || parts.contains(&part) {
+                continue;
+            }
+            let most = (0..3).max_by_key(|donor| parts.iter().filter(|p| *p == donor).count()).unwrap_or(0);
+            // Parts lie in the order val, test, train.
+            let next = match (part, most) {
+                (0, _) | (2, 1) => parts.iter().rposition(|p| *p == most),
+                _ => parts.iter().position(|p| *p == most),
+            };
+            next.into_iter().for_each(|at| parts[at] = part);
         }
     }
     let by_name: HashMap<String, usize> = places.into_iter().map(|(_, name)| name).zip(parts).collect();
