@@ -4,9 +4,9 @@ use strum::IntoEnumIterator;
 
 use super::action::Action;
 use super::command::{
-    AdaptCommand, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand, LabelsCommand,
-    LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
-    WorkbenchCommand,
+    AdaptCommand, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
+    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest,
+    ViewCommand, WorkbenchCommand,
 };
 use super::export::state::Output;
 use super::inspect::state::Inspected;
@@ -150,8 +150,12 @@ impl Action {
                 let corrected = state.hand_mask(state.worked_on(finger), finger).is_some();
                 when(editable && corrected, LabelsCommand::ResetMask)
             }
-            Self::Undo => when(state.history.next_undo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Undo),
-            Self::Redo => when(state.history.next_redo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Redo),
+            Self::Undo => {
+                when(state.history.next_undo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Undo)
+            }
+            Self::Redo => {
+                when(state.history.next_redo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Redo)
+            }
             Self::MaskVisible => does(SettingsCommand::SetMaskVisible(!settings.mask_visible)),
             Self::MaskOutline => does(SettingsCommand::SetMaskOutline(!settings.mask_outline)),
             Self::MaskFainter => does(SettingsCommand::SetMaskOpacity(settings.mask_opacity - OPACITY_STEP)),

@@ -20,7 +20,7 @@ use super::cloud::contact_points;
 use super::error::{Remark, TaskError};
 use super::imprint::{imprint_of, measured};
 use super::job::JobCx;
-use super::labels::{ImprintSource, Labels, PairLabels};
+use super::labels::{ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels};
 use super::mask::{MaskInputs, MaskRecipe, contact_mask};
 use super::models::{Masking, Models, Wanted};
 use super::pose::pose;
@@ -111,6 +111,8 @@ impl Pair {
 
 /// The imprints of a pair by one source under one shift, with the mask model's probabilities where they are needed.
 struct Felt {
+    /// What the imprints are, for masks that were drawn on them.
+    of: ImprintOf,
     imprints: PerPad<DepthMap>,
     probabilities: PerPad<Result<(Grid<f32>, f32), String>>,
 }
@@ -295,7 +297,10 @@ impl<'a> Job<'a> {
             let felt = measured(&pair.sample);
             // A shift is of predictions alone.
             if self.dial != Dial::Shift && felt.iter().flatten().next().is_some() {
-                sides.push(Side { source: ImprintSource::Measured, felt: vec![Ok(self.felt(pair, felt))] });
+                sides.push(Side {
+                    source: ImprintSource::Measured,
+                    felt: vec![Ok(self.felt(pair, ImprintOf::Measured, felt))],
+                });
             }
             if let Some(made) = predictions.get_mut(at).and_then(Option::take) {
                 let turns = if self.dial == Dial::Shift { &self.turns[..] } else { &self.turns[..1] };
@@ -306,7 +311,9 @@ impl<'a> Job<'a> {
                         let found = imprint_of(made, turn.shift, &pair.sample, pad);
                         imprints[pad] = Some(found.map_err(|err| format!("{}: {}", err.what, err.why))?);
                     }
-                    Ok(self.felt(pair, imprints))
+                    let of = self.setup.generator.as_ref();
+                    let of = of.map(|(bundle, config)| ImprintOf::predicted(&bundle.id, config, turn.shift));
+                    Ok(self.felt(pair, of.unwrap_or_default(), imprints))
                 };
                 sides.push(Side { source: ImprintSource::Predicted, felt: turns.iter().map(felt).collect() });
             }
@@ -358,18 +365,19 @@ impl<'a> Job<'a> {
     }
 
     /// Imprints with the mask model's word on those whose mask nobody drew, if any value asks for it.
-    fn felt(&self, pair: &Pair, imprints: PerPad<DepthMap>) -> Felt {
+    fn felt(&self, pair: &Pair, of: ImprintOf, imprints: PerPad<DepthMap>) -> Felt {
         let mut probabilities = PerPad::default();
         let asked = self.recipes.iter().any(|recipe| matches!(recipe, MaskRecipe::Unet(..)));
         if let Some(model) = self.setup.mask_model.as_ref().filter(|_| asked) {
             for (pad, imprint) in imprints.entries() {
-                if pair.labels.as_ref().is_none_or(|labels| labels.drawn(pad, imprint).is_none()) {
+                let place = MaskPlace { pad, of: of.clone() };
+                if pair.labels.as_ref().is_none_or(|labels| labels.drawn(&place, imprint).is_none()) {
                     let found = caught(|| self.models.probability(model, self.setup.engine, imprint));
                     probabilities[pad] = Some(found.and_then(|found| found.map_err(|err| err.why)));
                 }
             }
         }
-        Felt { imprints, probabilities }
+        Felt { of, imprints, probabilities }
     }
 
     /// The pose of a pair without the dial, and with each value.
@@ -404,7 +412,8 @@ impl<'a> Job<'a> {
     /// The contact points of a pair with one value, and whether a mask behind them was drawn by hand.
     fn points(&self, pair: &Pair, tool: &ToolModel, felt: &Felt, at: usize) -> Result<(Vec<DVec3>, bool), String> {
         let (recipe, choice) = (&self.recipes[at], self.turns[at].mask);
-        let inputs = MaskInputs { sample: &pair.sample, tool: Some(tool), labels: pair.labels.as_ref() };
+        let labels = pair.labels.as_ref();
+        let inputs = MaskInputs { sample: &pair.sample, tool: Some(tool), labels, of: Some(&felt.of) };
         let (mut masks, mut hand): (PerPad<Mask>, bool) = (PerPad::default(), false);
         for (pad, imprint) in felt.imprints.entries() {
             let unet = |imprint: &DepthMap| match &felt.probabilities[pad] {
