@@ -87,7 +87,7 @@ fn values(args: &SweepArgs) -> Result<Vec<Setting>, String> {
 fn text(found: &Sweep) -> String {
     let mut text = format!("{}: {}, {} pairs\n", found.dataset, found.dial.name().to_lowercase(), found.pairs);
     for series in &found.series {
-        text += &format!("\n{}\n", table(found.dial, series));
+        text += &format!("\n{}", table(found.dial, series));
     }
     for note in &found.notes {
         text += &format!("- {note}\n");

@@ -96,7 +96,8 @@ fn pictures_of_the_dial() {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
         open(&mut rig);
         rig.shoot(&format!("{name}-dial-empty"));
-        rig.send(DialCommand::Over(DialPairs::Spread(24)));
+        rig.send(DialCommand::Over(DialPairs::Spread(12)));
+        rig.send(DialCommand::Predictions(false));
         rig.send(DialCommand::Start);
         rig.shoot(&format!("{name}-dial"));
         rig.send(SettingsCommand::SetTheme(Theme::Light));
@@ -104,8 +105,5 @@ fn pictures_of_the_dial() {
         rig.send(DialCommand::Choose(Dial::Gate));
         rig.send(DialCommand::Start);
         rig.shoot(&format!("{name}-dial-gate"));
-        rig.send(DialCommand::Choose(Dial::Shift));
-        rig.send(DialCommand::Start);
-        rig.shoot(&format!("{name}-dial-shift"));
     }
 }
