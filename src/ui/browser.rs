@@ -112,12 +112,14 @@ fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
-    ui.horizontal(|ui| {
+    /// Narrower than this the order stands below the filter.
+    const BESIDE: f32 = 60.0;
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let sort_width = 74.0;
-        let edit = egui::TextEdit::singleline(&mut memory.filter)
-            .hint_text("Filter")
-            .desired_width(ui.available_width() - sort_width - 12.0);
+        let (sort_width, full) = (74.0, ui.available_width());
+        let beside = full - sort_width - 12.0;
+        let width = if beside < BESIDE { full - 8.0 } else { beside };
+        let edit = egui::TextEdit::singleline(&mut memory.filter).hint_text("Filter").desired_width(width);
         let response = ui.add(edit).accessible_name("Filter pairs");
         if std::mem::take(&mut memory.focus_filter) {
             response.request_focus();
@@ -307,7 +309,7 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// The button that scores all pairs, or how far that is.
 pub(super) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
     let total = cx.state.library.pairs().len();
-    ui.horizontal(|ui| match cx.state.evaluating() {
+    ui.horizontal_wrapped(|ui| match cx.state.evaluating() {
         Some((ticket, task)) => {
             let (fraction, cancelling) = (task.progress.fraction(), task.cancelling);
             let text = if cancelling {

@@ -18,7 +18,8 @@ const LABEL: f32 = 60.0;
 
 /// A caption at the left of its control.
 fn row(ui: &mut Ui, weak: egui::Color32, name: &str, add: impl FnOnce(&mut Ui)) {
-    ui.horizontal(|ui| {
+    // In a narrow pane what does not fit beside the name stands below it.
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         let layout = egui::Layout::left_to_right(egui::Align::Center);
         ui.allocate_ui_with_layout(vec2(LABEL, 24.0), layout, |ui| {
@@ -287,7 +288,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             true => format!("Made earlier in {:.1} s and kept on the disk", p.seconds),
             false => format!("Made in {:.2} s", p.seconds),
         });
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             let text = format!("seed {}", recipe.seed);
             let label = ui.add(egui::Button::selectable(selected, text).min_size(vec2(84.0, 20.0)));

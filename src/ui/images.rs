@@ -230,7 +230,7 @@ pub(super) fn unit_buttons(cx: &mut Cx<'_>, ui: &mut Ui, offer: &UnitOffer, plac
             offer.tool
         );
         let button = Button::new(RichText::new(format!("Read it as {}", unit.name())).size(SMALL));
-        let button = ui.add(button.min_size(vec2(0.0, 18.0)));
+        let button = ui.add(button.min_size(vec2(0.0, 16.0)));
         let name = format!("Read {} as {}, {place}", offer.tool, unit.name());
         if button.accessible_name(name).on_hover_text(tip).clicked() {
             let (tool, replacing) = (offer.tool.clone(), offer.says.clone());

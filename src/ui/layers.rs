@@ -88,7 +88,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 
 /// Which side the pane is about, and which layer colors the points.
 fn choice(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         for side in ImprintSource::iter() {
             images::side_mark(ui, cx.p, side);
@@ -100,7 +100,7 @@ fn choice(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
             }
         }
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
         ui.label(caption("Color", cx.p));
         for layer in Layer::iter() {
@@ -234,7 +234,7 @@ fn observability(cx: &mut Cx<'_>, ui: &mut Ui, o: &Observability, noise_m: f64) 
             }
         });
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
         let color = if o.degenerate { cx.p.caution } else { cx.p.text };
         ui.label(RichText::new(format!("Weakest: {}", o.weakest_text())).size(SMALL).color(color))

@@ -85,7 +85,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 
 /// Which finger it is about, and the mapping.
 fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         for of in cx.state.rig().pads() {
             let name = cx.state.finger_name(of);
             let text = RichText::new(&*name).size(SMALL);

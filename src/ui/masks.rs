@@ -369,7 +369,7 @@ fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn look(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(2.0);
     ui.label(section("Overlay", cx.p));
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
         let settings = &cx.state.settings;
         let mut visible = settings.mask_visible;

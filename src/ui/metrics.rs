@@ -72,7 +72,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
         });
     });
     for source in [ImprintSource::Measured, ImprintSource::Predicted] {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 6.0;
             images::side_mark(ui, cx.p, source);
             ui.label(source.name());

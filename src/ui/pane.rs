@@ -8,6 +8,7 @@ use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles,
 use super::cx::{Cx, side_color};
 use super::theme::{SMALL, medium};
 use super::widget::help;
+use crate::app::action::Action;
 use crate::app::pane::{Kind, Pane, panes};
 
 macro_rules! views {
@@ -121,7 +122,8 @@ impl Behavior<Pane> for Docking<'_, '_> {
         let color = if response.hovered() { self.cx.p.strong } else { self.cx.p.weak };
         let square = egui::Rect::from_center_size(response.rect.center(), vec2(8.0, 8.0));
         ui.painter().rect_stroke(square, 1.0, Stroke::new(1.25, color), egui::StrokeKind::Inside);
-        if response.on_hover_text("Let this pane fill the window (`)").clicked() {
+        let tip = self.cx.keys().behind("Let this pane fill the window", Action::MaximizePane);
+        if response.on_hover_text(tip).clicked() {
             self.panes.maximized = Some(*pane);
         }
         help_mark(self.cx, ui, *pane);

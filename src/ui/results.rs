@@ -66,7 +66,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
     });
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.label(caption("Grasps per tool", cx.p));
         let name = |n: Option<usize>| n.map_or_else(|| "all".to_owned(), |n| n.to_string());
         let now = cx.state.table.grasps_per_tool;

@@ -146,7 +146,7 @@ fn controls(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTable, 
             response.response.accessible_name(format!("Score along {name}")).on_hover_text(tip);
         });
     }
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         if !memory.by_tool {
             for coloring in Coloring::iter() {

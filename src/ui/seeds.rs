@@ -62,7 +62,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey]) {
     let (count, every, running) = (cx.state.seeds.count, cx.state.seeds.every, cx.state.seeds_running());
     let there = recipes.iter().filter(|r| cx.state.results.predictions.contains(r)).count();
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let mut count = count;
         let drag = ui.add(egui::DragValue::new(&mut count).speed(0.1).range(COUNT).suffix(" seeds"));
         let drag = drag.accessible_name("Number of seeds");
@@ -86,7 +86,7 @@ fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey]) {
             true => format!("{there} of {}, seed {}…", recipes.len(), recipes[0].seed.wrapping_add(there as u64)),
             false => format!("{there} of {}", recipes.len()),
         };
-        ui.add(egui::Label::new(caption(text, cx.p)).truncate());
+        ui.label(caption(text, cx.p));
     });
 }
 

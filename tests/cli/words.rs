@@ -51,7 +51,14 @@ fn replaced_words_are_said_nowhere() {
     for verb in verbs.take_while(|line| line.starts_with("  ")).filter(|line| !line.starts_with("   ")) {
         let verb = verb.split_whitespace().next().unwrap();
         let help = String::from_utf8(run(&[verb, "--help"], home.path()).stdout).unwrap();
-        check(verb, &help, REPLACED);
+        // The names of verbs below a verb were published.
+        let told = help.lines().map(|line| match line.strip_prefix("  ") {
+            Some(listed) if listed.starts_with(|c: char| c.is_ascii_lowercase()) => {
+                listed.split_once(' ').map_or("", |(_, tip)| tip)
+            }
+            _ => line,
+        });
+        check(verb, &told.collect::<Vec<_>>().join("\n"), REPLACED);
         found += 1;
     }
     assert!(found > 15, "{found} verbs\n{overview}");

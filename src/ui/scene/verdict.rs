@@ -120,7 +120,12 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
         let right = Layout::right_to_left(Align::Center);
         let place = UiBuilder::new().max_rect(inner).layout(right);
         let side = source.name().to_lowercase();
-        let used = ui.scope_builder(place, |ui| images::unit_buttons(cx, ui, &offer, &side)).response.rect;
+        let used = ui.scope_builder(place, |ui| {
+            ui.spacing_mut().interact_size.y = 16.0;
+            ui.spacing_mut().button_padding.y = 0.0;
+            images::unit_buttons(cx, ui, &offer, &side);
+        });
+        let used = used.response.rect;
         inner.set_right(used.left() - 4.0);
     }
     ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
