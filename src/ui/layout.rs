@@ -31,7 +31,7 @@ fn shares(workspace: Workspace) -> Shares {
     match workspace {
         Workspace::Inspect => Shares { columns, middle: [0.86, 1.14], bottom, right: [1.0, 1.0] },
         Workspace::Align => Shares { columns: [0.13, 0.64, 0.23], middle: [1.15, 0.85], bottom, right: [1.2, 0.8] },
-        Workspace::Label => Shares { columns, middle: [1.25, 0.75], bottom: [1.0, 1.4, 1.0], right: [1.25, 0.75] },
+        Workspace::Label => Shares { columns, middle: [1.25, 0.75], bottom: [1.0, 1.4, 1.0], right: [1.5, 0.5] },
         Workspace::Evaluate => Shares { columns, middle: [1.2, 0.9], bottom, right: [1.0, 1.0] },
     }
 }

@@ -242,9 +242,9 @@ fn probability(ui: &mut Ui, choice: &mut MaskChoice) {
 fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(2.0);
     let finger = cx.state.selection.finger;
-    ui.label(section(&format!("Correct, {} finger", cx.state.finger_name(finger)), cx.p));
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(section(&format!("Correct, {} finger", cx.state.finger_name(finger)), cx.p));
         let worked_on = cx.state.worked_on(finger);
         for source in ImprintSource::iter() {
             let there = cx.state.imprint(source, finger).ready().is_some();

@@ -146,6 +146,11 @@ pub struct Plan {
     drawn: BTreeSet<(String, PadId)>,
 }
 
+/// A number of things in words: `1 mask`, `3 masks`.
+fn counted(n: usize, thing: &str) -> String {
+    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+}
+
 impl Plan {
     /// All masks.
     pub fn total(&self) -> usize {
@@ -159,13 +164,13 @@ impl Plan {
             if self.by_hand < self.total() { format!(", {} drawn by hand", self.by_hand) } else { String::new() };
         let held_out = match self.held_out {
             0 => String::new(),
-            n => format!(", {n} pairs of them because the data set keeps them for tests"),
+            n => format!(", of them {} that the data set keeps for tests", counted(n, "pair")),
         };
         let mut lines = vec![
-            format!("{} masks{by_hand}", self.total()),
+            format!("{}{by_hand}", counted(self.total(), "mask")),
             format!("{train} to {}, {val} to {}, {test} to {}{held_out}", PARTS[0], PARTS[1], PARTS[2]),
         ];
-        lines.extend(self.left_out.iter().map(|(why, n)| format!("left out: {n} pairs {}", why.text())));
+        lines.extend(self.left_out.iter().map(|(why, n)| format!("left out: {} {}", counted(*n, "pair"), why.text())));
         lines
     }
 }
@@ -242,7 +247,7 @@ pub fn export_masks(
     let (entries, drawn) = (&plan.entries, &plan.drawn);
     if entries.is_empty() {
         let left_out: Vec<String> =
-            plan.left_out.iter().map(|(why, n)| format!("; {n} pairs {}", why.text())).collect();
+            plan.left_out.iter().map(|(why, n)| format!("; {} {}", counted(*n, "pair"), why.text())).collect();
         let place = masks.labels.folder().map_or(String::new(), |f| format!(" (they would lie in {})", f.display()));
         return Err(TaskError::new(WHAT, format!("there is no mask to export{place}{}", left_out.concat())).with_hint(
             "Correct masks in the studio and mark their pairs \"done\", or export those in progress (--pairs begun) or \

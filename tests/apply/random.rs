@@ -648,12 +648,15 @@ proptest! {
         let places: Vec<MaskPlace> = gestures.flat_map(|g| g.edits.iter().filter_map(|e| e.place().cloned())).collect();
         let touch2touch::app::state::State { history, document, .. } = &mut bench.state;
         let names: Vec<String> = document.labels.keys().cloned().collect();
+        let mut undone = Vec::new();
         for name in &names {
-            while history.undo(document, name, &places).is_some() {}
+            while history.undo(document, name, &places).is_some() {
+                undone.push(name);
+            }
         }
         prop_assert_eq!(said(document), Said::new());
-        for name in &names {
-            while history.redo(document, name, &places).is_some() {}
+        for name in undone.into_iter().rev() {
+            prop_assert!(history.redo(document, name, &places).is_some());
         }
         prop_assert_eq!(said(document), end);
     }

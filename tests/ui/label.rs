@@ -62,7 +62,7 @@ fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
     rig.send(SettingsCommand::DismissHint);
     rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
     rig.send(ViewCommand::ShowBothFingers(true));
-    let picture = |rig: &Rig, finger: &str| rig.harness.get_by_label(&format!("Measured {finger}")).rect();
+    let picture = |rig: &Rig, finger: &str| rig.harness.get_by_label(&format!("Measured imprint {finger}")).rect();
     let right = picture(&rig, "right");
     // The first click on the other finger makes it the active one.
     let left = picture(&rig, "left");
@@ -124,8 +124,8 @@ fn an_export_says_what_goes_where_before_it_writes() {
     rig.harness.step();
     rig.settle();
     let said = rig.plan();
-    assert_eq!(said[0], "1 masks");
-    assert!(said.iter().any(|line| line.contains("1 pairs begun")) && said.iter().any(|line| line.contains("skip")));
+    assert_eq!(said[0], "1 mask");
+    assert!(said.iter().any(|line| line.contains("1 pair begun")) && said.iter().any(|line| line.contains("skip")));
     rig.shoot("export-masks");
     // What is marked beside the form is in the next plan.
     rig.send(LabelsCommand::SetReview(Review::Done));
@@ -151,7 +151,7 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(SettingsCommand::DismissHint);
     rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
-    let picture = |rig: &Rig| rig.harness.get_by_label("Measured right").rect();
+    let picture = |rig: &Rig| rig.harness.get_by_label("Measured imprint right").rect();
     let mut masks = vec![rig.mask(lab::RIGHT)];
     for way in [[[0.2, 0.2], [0.4, 0.3]], [[0.6, 0.6], [0.8, 0.7]], [[0.5, 0.1], [0.9, 0.1]]] {
         let rect = picture(&rig);

@@ -58,7 +58,6 @@ fn beyond(rig: &Rig) -> Vec<String> {
 }
 
 #[test]
-#[ignore = "the last rows that were made to wrap were not yet held against it"]
 fn no_control_is_cut_off_in_a_window_of_1024_by_700() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     rig.send(SettingsCommand::DismissHint);

@@ -471,7 +471,7 @@ mod tests {
         assert_eq!((plan.total(), &plan.left_out), (0, &BTreeMap::from([(LeftOut::NotDone, 1)])));
         assert!(source.export_masks(&changed, done, &out, &cx).unwrap_err().why.contains("not marked \"done\""));
         let line = source.export_masks(&changed, begun, &out, &cx).unwrap();
-        assert!(line.contains("1 masks"), "{line}");
+        assert!(line.contains("1 mask"), "{line}");
         labels.review = Review::Done;
         let changed = BTreeMap::from([(name.clone(), labels.clone())]);
         assert!(source.export_masks(&changed, done, &out, &cx).is_ok());
