@@ -12,6 +12,7 @@
 //! * [`job`], [`error`]: how work is watched, stopped, and how it fails.
 
 pub mod adapt;
+pub mod agreement;
 pub mod bundles;
 pub(crate) mod canvas;
 pub mod case;

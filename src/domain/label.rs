@@ -2,6 +2,7 @@
 //!
 //! Everything is a function of masks; who may edit what, and where masks are stored, is decided elsewhere.
 
+mod agreement;
 mod clean_up;
 mod drawing;
 mod gate;
@@ -13,6 +14,7 @@ use glam::DVec2;
 
 use super::grid::Mask;
 
+pub use agreement::{Agreement, agreement};
 pub use clean_up::{CleanKind, CleanUp};
 pub use drawing::{DrawTool, Drawing, Ground};
 pub use gate::Gate;

@@ -1,4 +1,4 @@
-//! `touch2touch masks export`: contact masks as training folders.
+//! `touch2touch masks`: contact masks as training folders, and how far those of two people agree.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -15,6 +15,7 @@ use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::io::export_unet::ExportReport;
+use crate::work::agreement::{Agreements, compare_labels};
 use crate::work::error::TaskError;
 use crate::work::export::{Automatic, ExportChoice, ExportSetup, HandMasks, LeftOut, Which, export_masks, plan};
 use crate::work::labels::Labels;
@@ -26,6 +27,73 @@ use crate::work::tool::Tools;
 pub(super) enum MasksVerb {
     /// Write images and masks for training a mask UNet, and check what was written by the loader's rules.
     Export(ExportArgs),
+    /// Compare the masks of two people, the worst first.
+    Compare(CompareMasksArgs),
+}
+
+/// Arguments of `masks compare`.
+#[derive(Debug, Args)]
+pub(super) struct CompareMasksArgs {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// The other person's folder of labels (a `touch2touch_masks`), of the same data set.
+    #[arg(long)]
+    with: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What `masks compare` answers.
+#[derive(Serialize)]
+struct Comparison {
+    folders: [PathBuf; 2],
+    mean_iou: Option<f64>,
+    mean_dice: Option<f64>,
+    mean_edge_mm: Option<f64>,
+    #[serde(flatten)]
+    found: Agreements,
+}
+
+fn compare(args: &CompareMasksArgs) -> VerbResult {
+    let dataset = args.dataset.open()?;
+    let output = Output::new(args.common, "comparing", 1);
+    if !args.with.is_dir() {
+        anyhow::bail!("there is no folder {}; name the other person's touch2touch_masks", args.with.display());
+    }
+    let (own, other) = (Labels::of(&dataset), Labels::in_folder(&dataset, &args.with));
+    let found = compare_labels(&dataset, &own, &other)?;
+    if found.masks.is_empty() {
+        anyhow::bail!(
+            "no mask was drawn by both: {} only here, {} only in {}",
+            found.only[0],
+            found.only[1],
+            args.with.display()
+        );
+    }
+    let [mean_iou, mean_dice, mean_edge_mm] = found.means();
+    let folders = [own.folder()?.to_owned(), args.with.clone()];
+    let report = Comparison { folders, mean_iou, mean_dice, mean_edge_mm, found };
+    output.finish(&report, || {
+        let mm = |edge: Option<f64>| edge.map_or_else(|| "-".to_owned(), |mm| format!("{mm:.2}"));
+        let mut lines = vec![format!("{:>6} {:>6} {:>8}  pair, finger", "IoU", "Dice", "edge mm")];
+        for one in &report.found.masks {
+            let a = &one.agreement;
+            let edge = mm(a.edge_mm);
+            lines.push(format!("{:6.3} {:6.3} {edge:>8}  {}, {}", a.iou, a.dice, one.pair, one.finger));
+        }
+        let mean = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
+        lines.push(format!(
+            "mean of {} masks: IoU {}, Dice {}, edges {} mm apart; drawn here alone {}, there alone {}",
+            report.found.masks.len(),
+            mean(mean_iou),
+            mean(mean_dice),
+            mm(mean_edge_mm),
+            report.found.only[0],
+            report.found.only[1]
+        ));
+        lines.join("\n")
+    })?;
+    Ok(true)
 }
 
 /// Arguments of `masks export`.
@@ -96,7 +164,10 @@ struct Written {
 }
 
 pub(super) fn run(verb: &MasksVerb) -> VerbResult {
-    let MasksVerb::Export(args) = verb;
+    let args = match verb {
+        MasksVerb::Export(args) => args,
+        MasksVerb::Compare(args) => return compare(args),
+    };
     let Format::Unet = args.format;
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let ids = args.limit.spread(dataset.index.pairs.len());

@@ -221,6 +221,12 @@ impl MaskStore {
         Self { folder, also_read: None, rig: Rig::lab() }
     }
 
+    /// The same folder, for other sensors.
+    #[must_use]
+    pub fn of_rig(self, rig: Arc<Rig>) -> Self {
+        Self { rig, ..self }
+    }
+
     /// Where files are written.
     pub fn folder(&self) -> &Path {
         &self.folder

@@ -269,6 +269,12 @@ impl Labels {
         Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: Arc::default() }
     }
 
+    /// Those in a folder that another program or person wrote, of the same sensors.
+    pub fn in_folder(dataset: &Dataset, folder: &Path) -> Self {
+        let store = MaskStore::in_folder(folder.to_owned()).of_rig(dataset.rig.clone());
+        Self { store: Arc::new(Ok(store)), saved: Arc::default() }
+    }
+
     /// The same of a data set that grew: what was written since the opening stays known.
     #[must_use]
     pub fn continued(&self, dataset: &Dataset) -> Self {

@@ -79,6 +79,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch case check", How::Run(&[], "", &[0])),
     ("touch2touch label", How::Run(&[], "", &[0])),
     ("touch2touch masks export", How::Run(&[], "", &[0])),
+    ("touch2touch masks compare", How::Run(&[], "", &[0])),
     ("touch2touch basin", How::Run(&[], "", &[0])),
     ("touch2touch bench registration", How::Run(&[], "--limit 2 --no-peers", &[0])),
     ("touch2touch bench generator", How::Run(&[], "--grasps 1 --steps 1 --engine rten --bundle SMALL", &[0])),
@@ -128,6 +129,7 @@ impl Stage {
         let stored = StoredMask { mask, base: "Threshold 5.00 mm".into(), person: "test".into(), saved_unix_s: 1 };
         let store = MaskStore::for_dataset(&dataset).unwrap();
         store.save(&name, lab::RIGHT, Some(&stored)).unwrap();
+        MaskStore::in_folder(dir.path().join("other")).save(&name, lab::RIGHT, Some(&stored)).unwrap();
         store.save_review(&name, &StoredReview { review: "done".into(), ..StoredReview::default() }).unwrap();
         let robot = dir.path().join("robot");
         std::fs::create_dir(&robot).unwrap();
@@ -146,6 +148,7 @@ impl Stage {
             let to = match (word, before.as_str()) {
                 ("PATH", _) => at("set"),
                 ("NAME", _) => self.name.clone(),
+                ("OTHER", _) => at("other"),
                 ("TOOL.stl", _) => at("set/tools_stls/pattern_36.stl"),
                 ("DIR", "--out") => at(&format!("out {number}")),
                 ("DIR", "--cases") => at("known"),
