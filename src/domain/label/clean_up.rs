@@ -117,7 +117,9 @@ impl CleanUp {
 /// Each pixel as most of those within `radius_px`, those outside the image not counted; it stays as it is at a tie.
 fn smooth(mask: &Mask, radius_px: f64) -> Mask {
     let (width, height) = (mask.width(), mask.height());
-    let reach = if radius_px.is_finite() { radius_px.clamp(0.0, (width + height) as f64).floor() as usize } else { 0 };
+    // Beyond the diagonal everything is reached.
+    let radius = radius_px.max(0.0).min((width + height) as f64);
+    let reach = radius.floor() as usize;
     // Running sums along rows: a disc is then one subtraction per row.
     let sums: Vec<u32> = (0..height)
         .flat_map(|y| {
@@ -129,7 +131,7 @@ fn smooth(mask: &Mask, radius_px: f64) -> Mask {
         })
         .collect();
     let half: Vec<usize> =
-        (0..=reach).map(|dy| (radius_px * radius_px - (dy * dy) as f64).max(0.0).sqrt() as usize).collect();
+        (0..=reach).map(|dy| (radius * radius - (dy * dy) as f64).max(0.0).sqrt() as usize).collect();
     Mask::from_fn(width, height, |x, y| {
         let (mut on, mut all) = (0, 0);
         for ny in y.saturating_sub(reach)..=(y + reach).min(height - 1) {
