@@ -24,7 +24,7 @@ pub(super) struct SweepArgs {
     /// What it is turned to, separated by commas (default: a usual range).
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     values: Vec<String>,
-    /// Take only this many pairs, spread evenly over the dataset.
+    /// Take only this many pairs, spread evenly over the data set.
     #[arg(long, visible_alias = "limit", value_name = "N", value_parser = at_least_one::<usize>)]
     pairs: Option<usize>,
     /// Leave the predictions out: measured imprints only.

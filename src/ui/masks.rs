@@ -30,8 +30,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ScrollArea::vertical().id_salt("masks").show(ui, |ui| {
             tools(cx, ui);
             source(cx, ui);
-            clean_ups(cx, ui);
+            correct(cx, ui);
             review(cx, ui);
+            clean_ups(cx, ui);
             look(cx, ui);
         });
     });
@@ -109,7 +110,7 @@ fn wand(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn gate(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut new = cx.state.settings.mask.clone();
     let gate = &mut new.gate;
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
         ui.label(caption("Only", cx.p));
         let mut by_depth = gate.depth_m.is_some();
@@ -239,7 +240,7 @@ fn probability(ui: &mut Ui, choice: &mut MaskChoice) {
     });
 }
 
-fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
+fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(2.0);
     let finger = cx.state.selection.finger;
     ui.horizontal_wrapped(|ui| {
@@ -262,34 +263,6 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
         cx.action_button(ui, Action::AdoptAutomatic, "Take automatic");
         cx.action_button(ui, Action::TakeOver, "Other's mask");
         cx.action_button(ui, Action::ResetMask, "Remove");
-    });
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
-        for (action, text) in [
-            (Action::FillHoles, "Fill holes"),
-            (Action::LargestIsland, "Largest"),
-            (Action::ClearBorder, "No border"),
-            (Action::DropSmall, "Drop small"),
-            (Action::OpenMask, "Open"),
-            (Action::CloseMask, "Close"),
-            (Action::SmoothMask, "Smooth"),
-            (Action::GrowMask, "Grow"),
-            (Action::ShrinkMask, "Shrink"),
-        ] {
-            cx.action_button(ui, action, text);
-        }
-    });
-    ui.horizontal(|ui| {
-        ui.label(caption("by", cx.p));
-        let mut new = cx.state.settings.mask.clone();
-        ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
-        let slider = egui::Slider::new(&mut new.clean_mm, CLEAN_MM).logarithmic(true).fixed_decimals(2).suffix(" mm");
-        let slider = ui.add(slider).accessible_name("Clean-up size");
-        let tip =
-            "Of Drop small (across), Open, Close, Smooth, Grow and Shrink (radius). Less than a pixel changes nothing";
-        if slider.on_hover_text(tip).changed() {
-            cx.push(SettingsCommand::SetMask(new));
-        }
     });
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
@@ -342,6 +315,39 @@ pub(super) fn save_state(cx: &Cx<'_>, ui: &mut Ui) {
         ui.label(RichText::new(text).size(SMALL).color(color))
             .on_hover_text("Labels are written after every change, to a file beside the old one that then replaces it");
     }
+}
+
+fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.add_space(2.0);
+    ui.label(section("Clean up", cx.p));
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        for (action, text) in [
+            (Action::FillHoles, "Fill holes"),
+            (Action::LargestIsland, "Largest"),
+            (Action::ClearBorder, "No border"),
+            (Action::DropSmall, "Drop small"),
+            (Action::OpenMask, "Open"),
+            (Action::CloseMask, "Close"),
+            (Action::SmoothMask, "Smooth"),
+            (Action::GrowMask, "Grow"),
+            (Action::ShrinkMask, "Shrink"),
+        ] {
+            cx.action_button(ui, action, text);
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.label(caption("by", cx.p));
+        let mut new = cx.state.settings.mask.clone();
+        ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
+        let slider = egui::Slider::new(&mut new.clean_mm, CLEAN_MM).logarithmic(true).fixed_decimals(2).suffix(" mm");
+        let slider = ui.add(slider).accessible_name("Clean-up size");
+        let tip =
+            "Of Drop small (across), Open, Close, Smooth, Grow and Shrink (radius). Less than a pixel changes nothing";
+        if slider.on_hover_text(tip).changed() {
+            cx.push(SettingsCommand::SetMask(new));
+        }
+    });
 }
 
 fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
