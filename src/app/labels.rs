@@ -432,7 +432,8 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
 }
 
 /// Writes the labels of a pair of the open data set.
-fn save_pair(state: &mut State, name: &str, deed: Deed, effects: &mut Vec<Effect>) {
+fn save_pair(state: &mut State, name: &str, mut deed: Deed, effects: &mut Vec<Effect>) {
+    deed.person = Some(state.settings.person.trim().to_owned()).filter(|person| !person.is_empty());
     let Some(open) = &state.library.open else { return };
     let revision = state.document.next_revision();
     let Some(labels) = state.document.labels.get(name) else { return };

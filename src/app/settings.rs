@@ -54,6 +54,8 @@ pub enum SettingsCommand {
     SetPoseEngine(RegistrationChoice),
     /// The model runtime.
     SetRuntime(EngineChoice),
+    /// Who labels; empty: whom the system says.
+    SetPerson(String),
     /// What kept predictions may take on the disk, MiB.
     SetCacheBudget(u32),
     /// Whether the 3D views move together.
@@ -119,6 +121,7 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
         SettingsCommand::SetFootprintVisible(visible) => settings.footprint_visible = visible,
         SettingsCommand::SetPoseEngine(engine) => settings.pose_engine = engine,
         SettingsCommand::SetRuntime(runtime) => settings.runtime = runtime,
+        SettingsCommand::SetPerson(person) => settings.person = person,
         SettingsCommand::SetCacheBudget(mib) => settings.cache_mib = mib,
         SettingsCommand::SetCamerasLinked(linked) => settings.cameras_linked = linked,
         SettingsCommand::SetScene(look) => settings.scene = look.validated(),

@@ -39,7 +39,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
         let before = stored.clone();
         change(args, &dataset, id, &mut stored)?;
         if stored != before {
-            labels.save(&entry.name, &stored, &Deed::named("label"))?;
+            labels.save(&entry.name, &stored, &Deed { person: args.person.clone(), ..Deed::named("label") })?;
         }
         pairs.push(Stored::new(&entry.name, &stored, &dataset));
     } else {

@@ -112,8 +112,8 @@ pub fn now_unix_s() -> u64 {
 }
 
 /// The user's name as the system knows it, for [`StoredMask::person`].
-pub fn person() -> String {
-    ["USER", "LOGNAME", "USERNAME"].iter().find_map(|v| std::env::var(v).ok()).unwrap_or_else(|| "unknown".into())
+pub fn person() -> Option<String> {
+    ["USER", "LOGNAME", "USERNAME"].iter().find_map(|v| std::env::var(v).ok()).filter(|name| !name.is_empty())
 }
 
 /// The file of one mask.

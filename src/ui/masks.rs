@@ -14,6 +14,7 @@ use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, 
 use crate::app::state::Lookup;
 use crate::domain::rig::PadId;
 use crate::domain::units;
+use crate::work::labels::system_person;
 
 /// Nothing is kept between frames.
 pub(super) type Memory = ();
@@ -30,6 +31,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ScrollArea::vertical().id_salt("masks").show(ui, |ui| {
             tools(cx, ui);
             source(cx, ui);
+            if system_person().is_none() {
+                super::settings_pane::person(cx, ui);
+            }
             correct(cx, ui);
             review(cx, ui);
             clean_ups(cx, ui);

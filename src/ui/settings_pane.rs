@@ -9,6 +9,7 @@ use crate::app::action::Action;
 use crate::app::command::{Command, Pane, SettingsCommand};
 use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
 use crate::infer::engine::EngineChoice;
+use crate::work::labels::system_person;
 
 /// Nothing is kept between frames.
 pub(super) type Memory = ();
@@ -18,6 +19,20 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("settings").show(ui, |ui| body(cx, ui));
+    });
+}
+
+/// Who labels.
+pub(super) fn person(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Your name").color(cx.p.weak));
+        let mut name = cx.state.settings.person.clone();
+        let hint = system_person().unwrap_or_default();
+        let edit = egui::TextEdit::singleline(&mut name).hint_text(hint).desired_width(f32::INFINITY);
+        let edit = ui.add(edit).accessible_name("Your name");
+        if edit.on_hover_text("Stands with every mask and in the journal of every pair").changed() {
+            cx.push(SettingsCommand::SetPerson(name));
+        }
     });
 }
 
@@ -93,6 +108,8 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
             "What predictions kept on the disk may take; the least recently used go first. 0 keeps none. Default 512 MiB",
         );
     });
+    ui.label(section("Labels", cx.p));
+    person(cx, ui);
     if let Ok(device) = cx.device {
         ui.label(caption(format!("Graphics: {}", device.adapter()), cx.p));
     }

@@ -193,6 +193,11 @@ pub struct HandMask {
     pub base: String,
 }
 
+/// Whom the system says the person is.
+pub fn system_person() -> Option<String> {
+    masks::person()
+}
+
 /// Where a mask comes from that was taken over from another imprint, whose own mask is `label`.
 pub fn taken_over(from: ImprintSource, label: &str) -> String {
     format!("the {} imprint's mask ({label})", from.name().to_lowercase())
@@ -370,11 +375,12 @@ impl Labels {
         let fail = |err: StoreError| store_error(&what, &err);
         let before = lock(&self.saved).get(name).cloned().unwrap_or_default();
         let change = Change::between(&before, labels);
+        let person = deed.person.clone().or_else(masks::person).unwrap_or_default();
         for (place, [_, new]) in &change.masks {
             let stored = new.as_ref().map(|hand| StoredMask {
                 mask: (*hand.mask).clone(),
                 base: hand.base.clone(),
-                person: masks::person(),
+                person: person.clone(),
                 saved_unix_s: masks::now_unix_s(),
             });
             match &place.of {
@@ -389,7 +395,7 @@ impl Labels {
         }
         lock(&self.saved).insert(name.to_owned(), labels.clone());
         if !change.is_empty() {
-            let line = journal::Line::new(deed, &change, store.rig(), masks::person(), masks::now_unix_s());
+            let line = journal::Line::new(deed, &change, store.rig(), person, masks::now_unix_s());
             store.append_journal(name, &line).map_err(fail)?;
         }
         Ok(())

@@ -160,6 +160,7 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
     rig.send(SettingsCommand::DismissHint);
     rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
     with_nothing_automatic(&mut rig);
+    rig.send(SettingsCommand::SetPerson("Anna".into()));
     let picture = |rig: &Rig| rig.harness.get_by_label("Measured imprint right").rect();
     let mut masks = vec![rig.mask(lab::RIGHT)];
     for way in [[[0.2, 0.2], [0.4, 0.3]], [[0.6, 0.6], [0.8, 0.7]], [[0.5, 0.1], [0.9, 0.1]]] {
@@ -171,6 +172,13 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
     masks.push(rig.mask(lab::RIGHT));
     rig.send(LabelsCommand::Undo);
     assert!(masks.windows(2).all(|pair| pair[0] != pair[1]));
+    // Who did it stands in the file and in the journal.
+    let store = MaskStore::for_dataset(&Dataset::open(&rig.data).unwrap()).unwrap();
+    let name = rig.harness.state().state().pair_name().to_owned();
+    assert_eq!(store.load(&name, lab::RIGHT).unwrap().unwrap().person, "Anna");
+    let journal = String::from_utf8(store.journal(&name).unwrap()).unwrap();
+    assert_eq!(journal.lines().filter(|line| line.contains("\"person\":\"Anna\"")).count(), 5, "{journal}");
+    assert!(journal.lines().next().unwrap().contains("\"tool\":\"brush\""));
     rig.restart(SIZE);
     assert_eq!(rig.mask(lab::RIGHT), masks[3]);
     let names = |rig: &Rig| -> Vec<String> {

@@ -64,6 +64,8 @@ pub struct Settings {
     pub runtime: EngineChoice,
     /// What the predictions kept on the disk may take, MiB; 0 keeps none.
     pub cache_mib: u32,
+    /// Who labels; empty: whom the system says.
+    pub person: String,
     /// Whether the 3D views of prediction and measurement move together.
     pub cameras_linked: bool,
     /// How the 3D views look.
@@ -127,6 +129,7 @@ impl Default for Settings {
             pose_engine: RegistrationChoice::default(),
             runtime: EngineChoice::default(),
             cache_mib: 512,
+            person: String::new(),
             cameras_linked: true,
             scene: SceneLook::default(),
             versus: std::collections::BTreeMap::new(),
@@ -155,6 +158,7 @@ impl Settings {
             recent: person.recent.clone(),
             bundle_folders: person.bundle_folders.clone(),
             cache_mib: person.cache_mib,
+            person: person.person.clone(),
             hint_dismissed: person.hint_dismissed,
             keys: person.keys.clone(),
             last: person.last.clone(),
@@ -176,6 +180,7 @@ impl Settings {
         self.mask = self.mask.validated();
         self.scene = self.scene.validated();
         self.cache_mib = self.cache_mib.min(MAX_CACHE_MIB);
+        self.person = self.person.chars().filter(|c| !c.is_control()).take(80).collect();
         self.recent.truncate(MAX_RECENT);
         self
     }

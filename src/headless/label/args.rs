@@ -72,6 +72,9 @@ pub(in super::super) struct LabelArgs {
     /// Remove the corrected mask: the automatic source is in force again.
     #[arg(long, requires = "pair")]
     pub(super) remove_mask: bool,
+    /// Who labels; else whom the system says.
+    #[arg(long, requires = "pair")]
+    pub(super) person: Option<String>,
     /// Whose mask is changed: the name of one, or `both`.
     #[arg(long, default_value = "both")]
     pub(super) finger: FingerArg,

@@ -35,6 +35,8 @@ pub struct Deed {
     pub name: Cow<'static, str>,
     /// The tool with its numbers, where there is one.
     pub how: Option<serde_json::Value>,
+    /// Who did it; `None`: whom the system says.
+    pub person: Option<String>,
 }
 
 impl Deed {
