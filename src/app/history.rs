@@ -114,7 +114,7 @@ pub struct Gesture {
 
 impl Gesture {
     /// The way back of a change that was made before the labels of `pair` were read.
-    fn back(pair: &str, name: &Cow<'static, str>, change: &Change) -> Self {
+    fn back(pair: &str, name: Cow<'static, str>, change: &Change) -> Self {
         let pair = || pair.to_owned();
         let mut edits = Vec::new();
         for (place, [before, after]) in &change.masks {
@@ -132,7 +132,7 @@ impl Gesture {
         for (source, accepted) in ImprintSource::iter().zip(change.accepted) {
             edits.extend(accepted.map(|[before, _]| Edit::Pose { pair: pair(), source, pose: before }));
         }
-        Self { name: name.clone(), edits }
+        Self { name, edits }
     }
 
     /// The pair's name.
@@ -201,8 +201,8 @@ impl History {
         if self.done.iter().chain(&self.undone).any(|gesture| gesture.pair() == pair) {
             return;
         }
-        let back = |past: &Past| Gesture::back(pair, &past.name, &past.change);
-        let forth = |past: &Past| Gesture::back(pair, &past.name, &past.change.clone().inverse());
+        let back = |past: &Past| Gesture::back(pair, past.name.clone(), &past.change);
+        let forth = |past: &Past| Gesture::back(pair, past.name.clone(), &past.change.clone().inverse());
         // Older than what was done in this run: the first to go where the budget ends.
         self.done.splice(0..0, done.iter().map(back));
         self.undone.splice(0..0, undone.iter().map(forth));

