@@ -117,7 +117,7 @@ pub(in crate::ui) fn error_color(p: &Palette, error_rad: f64) -> Color32 {
 
 /// How long a registration took. On a line of its own: no other text wraps elsewhere because a machine was busy.
 pub(in crate::ui) fn pose_time(pose: &PoseResult) -> String {
-    format!("in {:.0} ms", pose.ms)
+    if pose.ms < 9.95 { format!("in {:.1} ms", pose.ms) } else { format!("in {:.0} ms", pose.ms) }
 }
 
 /// Points, residual, stop reason.
