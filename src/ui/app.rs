@@ -546,7 +546,9 @@ impl StudioApp {
             // The status bar was drawn before the pane under the pointer: once more, with the number in it.
             ctx.request_repaint();
         }
-        if !ctx.input(|i| i.pointer.any_down()) && self.panes.memories.images.lift_pen() {
+        // What is made of clicks goes on while no button is down.
+        let by_clicks = self.state.document.stroke.as_ref().is_some_and(|stroke| stroke.drawing.is_by_clicks());
+        if !by_clicks && !ctx.input(|i| i.pointer.any_down()) && self.panes.memories.images.lift_pen() {
             out.push(Command::Labels(LabelsCommand::EndStroke));
         }
     }
