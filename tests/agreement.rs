@@ -110,9 +110,9 @@ fn how(action: Action) -> How {
             "--pair",
             "a",
             "--draw",
-            r#"{"tool": "lasso", "add": true, "points": [[9, 9], [30, 9], [9, 30]]}"#,
+            r#"{"tool": "lasso", "paint": "contact", "points": [[9, 9], [30, 9], [9, 30]]}"#,
         ]),
-        A::PanTool | A::LastTool | A::BrushSmaller | A::BrushLarger => Window,
+        A::PanTool | A::LastTool | A::PaintIgnore | A::BrushSmaller | A::BrushLarger => Window,
         A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger => Window,
         A::PoseTool | A::SixDof | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
         A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
@@ -561,8 +561,8 @@ fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     assert_eq!(stored(), drawn, "on the disk");
     let begun = ["label", path, "--pair", &name, "--finger", "right", "--mask", "threshold"];
     json(&[&begun[..], &["--remove-mask"]].concat(), home.path());
-    let polygon = r#"{"tool": "polygon", "add": true, "points": [[20, 20], [60.5, 25], [50, 70], [50, 70]]}"#;
-    let wand = r#"{"tool": "wand", "tolerance_m": 0.0004, "add": false, "points": [[87, 70], [99, 70]]}"#;
+    let polygon = r#"{"tool": "polygon", "paint": "contact", "points": [[20, 20], [60.5, 25], [50, 70], [50, 70]]}"#;
+    let wand = r#"{"tool": "wand", "tolerance_m": 0.0004, "paint": "free", "points": [[87, 70], [99, 70]]}"#;
     let draw = ["--draw", polygon, "--draw", wand, "--clean", "smooth=1.5"];
     json(&[&begun[..], &draw[..]].concat(), home.path());
     assert_eq!(stored(), drawn, "by the verb");
@@ -575,5 +575,5 @@ fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     let labels = Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap();
     let taken = labels.masks.iter().find(|(place, _)| place.of.source() == ImprintSource::Predicted).unwrap();
     assert_eq!(taken.1.mask, drawn);
-    assert!(taken.1.base.contains("measured"), "{}", taken.1.base);
+    assert!(taken.1.base().contains("measured"), "{}", taken.1.base());
 }

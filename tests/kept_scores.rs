@@ -13,6 +13,7 @@ use touch2touch::domain::catalog;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::evaluation::Figure;
 use touch2touch::domain::grid::Mask;
+use touch2touch::domain::label::Provenance;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim;
 use touch2touch::infer::bundle::Origin;
@@ -162,7 +163,7 @@ fn what_was_changed_or_damaged_is_computed_again() {
     let labels = Labels::of(&dataset);
     let name = dataset.index.pairs[0].name.clone();
     let mask = Arc::new(Mask::from_fn(175, 140, |x, y| (40..140).contains(&x) && (60..80).contains(&y)));
-    let drawn = HandMask { mask, revision: Revision(1), base: "Threshold".into() };
+    let drawn = HandMask { revision: Revision(1), ..HandMask::new(mask, Provenance::told("Threshold")) };
     let mut drawn_on = PairLabels::default();
     drawn_on.draw(&MaskPlace::measured(lab::RIGHT), Some(drawn));
     labels.save(&name, &drawn_on, &Deed::default()).unwrap();

@@ -19,7 +19,7 @@ use super::settings::state::{ColorRange, MaskTool, Theme, Workspace};
 use super::state::{Absent, State};
 use super::workbench::state::{Layer, SceneTool, Section};
 use crate::domain::hand::HandAxis;
-use crate::domain::label::CleanKind;
+use crate::domain::label::{CleanKind, Paint};
 
 /// The next or previous of a fixed set, going round.
 fn next_of<T: IntoEnumIterator + PartialEq>(current: &T) -> Option<T> {
@@ -131,6 +131,10 @@ impl Action {
             Self::RectangleTool => does(SettingsCommand::SetMaskTool(MaskTool::Rectangle)),
             Self::Wand => does(SettingsCommand::SetMaskTool(MaskTool::Wand)),
             Self::PanTool => does(SettingsCommand::SetMaskTool(MaskTool::Pan)),
+            Self::PaintIgnore => {
+                let on = settings.mask.paint == Paint::Ignore;
+                does(SettingsCommand::SetPaint(if on { Paint::Contact } else { Paint::Ignore }))
+            }
             Self::LastTool => does(SettingsCommand::LastMaskTool),
             Self::BrushSmaller => does(SettingsCommand::SetBrushRadius(settings.mask.radius_px / BRUSH_STEP)),
             Self::BrushLarger => does(SettingsCommand::SetBrushRadius(settings.mask.radius_px * BRUSH_STEP)),

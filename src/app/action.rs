@@ -130,6 +130,7 @@ actions! {
     RectangleTool, Mask, "Rectangle", "Adds a rectangle; the right button removes", [plain(K::R)];
     Wand, Mask, "Wand", "Adds what is connected with the point and about as deep; drag to the right for more", [plain(K::M)];
     PanTool, Mask, "Move the image", "The pointer moves the image instead of drawing", [plain(K::Num8)];
+    PaintIgnore, Mask, "Paint ignored pixels", "Tools mark pixels that count neither as contact nor as free of it, or paint contact again", [shift(K::B)];
     LastTool, Mask, "Last tool", "Goes back to the tool before", [plain(K::Q)];
     BrushSmaller, Mask, "Smaller brush", "Makes the brush smaller", [plain(K::OpenBracket)];
     BrushLarger, Mask, "Larger brush", "Makes the brush larger", [plain(K::CloseBracket)];
@@ -252,6 +253,7 @@ impl Action {
             Self::NextShift => "depth offset gain millimeters scale",
             Self::Refit => "statistics mean deviation shift",
             Self::AdoptAutomatic => "use copy automatic mask",
+            Self::PaintIgnore => "unknown unsure void class",
             Self::TakeOver => "copy mask across measured predicted",
             Self::ResetMask => "clear delete mask",
             Self::Undo => "revert back",

@@ -4,32 +4,48 @@ use std::borrow::Cow;
 
 use strum::IntoEnumIterator as _;
 
-use super::keys::ImprintSource;
+use super::keys::{ImprintSource, Revision};
 use super::labels::state::{Document, HandMask, MaskPlace, Review};
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::Patch;
+use crate::domain::label::PackedMask;
 use crate::work::labels::{Change, Past};
+
+/// A corrected mask in few bytes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeptMask {
+    packed: PackedMask,
+    /// `None`: of an earlier run, so that it gets a new one.
+    revision: Option<Revision>,
+}
+
+impl KeptMask {
+    /// One of this run.
+    pub fn of(hand: &HandMask) -> Self {
+        Self { packed: hand.pack(), revision: Some(hand.revision) }
+    }
+
+    fn of_earlier_run(hand: &HandMask) -> Self {
+        Self { packed: hand.pack(), revision: None }
+    }
+
+    fn unpack(&self, doc: &mut Document) -> Option<HandMask> {
+        let revision = self.revision.unwrap_or_else(|| doc.next_revision());
+        // It was packed from a mask, so that it can be read; where it cannot, nothing is put in its place.
+        HandMask::unpack(&self.packed, revision).ok()
+    }
+}
 
 /// One reversible change of the document.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Edit {
-    /// Replaces the pixels under a patch of a corrected mask.
-    Patch {
-        /// The pair's name.
-        pair: String,
-        /// What the mask is of.
-        place: MaskPlace,
-        /// The pixels.
-        patch: Patch,
-    },
-    /// Replaces a whole corrected mask; `None` = the automatic source is in force.
-    HandMask {
+    /// Replaces a corrected mask; `None` = the automatic source is in force.
+    Mask {
         /// The pair's name.
         pair: String,
         /// What the mask is of.
         place: MaskPlace,
         /// The mask.
-        mask: Option<HandMask>,
+        mask: Option<KeptMask>,
     },
     /// Replaces the review state.
     Review {
@@ -53,19 +69,10 @@ impl Edit {
     /// Exchanges the value held here with the one in `doc`; afterwards `self` is the inverse edit.
     pub fn swap(&mut self, doc: &mut Document) {
         match self {
-            Self::Patch { pair, place, patch } => {
-                let revision = doc.next_revision();
-                let hand = doc.labels.get_mut(pair).and_then(|l| l.masks.get_mut(place));
-                // The edits of a gesture are swapped in order, so the mask is there and as large as it was.
-                let Some(hand) = hand else { return };
-                if patch.swap(std::sync::Arc::make_mut(&mut hand.mask)).is_err() {
-                    return;
-                }
-                hand.revision = revision;
-            }
-            Self::HandMask { pair, place, mask } => {
+            Self::Mask { pair, place, mask } => {
+                let new = mask.take().and_then(|kept| kept.unpack(doc));
                 let labels = doc.labels.entry(pair.clone()).or_default();
-                *mask = labels.put(place, mask.take());
+                *mask = labels.put(place, new).as_ref().map(KeptMask::of);
             }
             Self::Review { pair, review } => *review = doc.set_review(pair, *review),
             Self::Pose { pair, source, pose } => {
@@ -78,17 +85,14 @@ impl Edit {
     /// The pair's name.
     pub fn pair(&self) -> &str {
         match self {
-            Self::Patch { pair, .. }
-            | Self::HandMask { pair, .. }
-            | Self::Review { pair, .. }
-            | Self::Pose { pair, .. } => pair,
+            Self::Mask { pair, .. } | Self::Review { pair, .. } | Self::Pose { pair, .. } => pair,
         }
     }
 
     /// What the mask is of, if it concerns one.
     pub fn place(&self) -> Option<&MaskPlace> {
         match self {
-            Self::Patch { place, .. } | Self::HandMask { place, .. } => Some(place),
+            Self::Mask { place, .. } => Some(place),
             Self::Review { .. } | Self::Pose { .. } => None,
         }
     }
@@ -96,8 +100,7 @@ impl Edit {
     fn bytes(&self) -> usize {
         std::mem::size_of::<Self>()
             + match self {
-                Self::Patch { patch, .. } => patch.bytes(),
-                Self::HandMask { mask, .. } => mask.as_ref().map_or(0, |m| m.mask.len()),
+                Self::Mask { mask, .. } => mask.as_ref().map_or(0, |kept| kept.packed.bytes()),
                 Self::Review { .. } | Self::Pose { .. } => 0,
             }
     }
@@ -117,16 +120,9 @@ impl Gesture {
     fn back(pair: &str, name: Cow<'static, str>, change: &Change) -> Self {
         let pair = || pair.to_owned();
         let mut edits = Vec::new();
-        for (place, [before, after]) in &change.masks {
-            let place = place.clone();
-            let patch = match (before, after) {
-                (Some(a), Some(b)) if a.base == b.base => Patch::between(&b.mask, &a.mask),
-                _ => None,
-            };
-            edits.push(match patch {
-                Some(patch) => Edit::Patch { pair: pair(), place, patch },
-                None => Edit::HandMask { pair: pair(), place, mask: before.clone() },
-            });
+        for (place, [before, _]) in &change.masks {
+            let mask = before.as_ref().map(KeptMask::of_earlier_run);
+            edits.push(Edit::Mask { pair: pair(), place: place.clone(), mask });
         }
         edits.extend(change.review.map(|[before, _]| Edit::Review { pair: pair(), review: before }));
         for (source, accepted) in ImprintSource::iter().zip(change.accepted) {
@@ -175,7 +171,7 @@ pub struct History {
 
 impl Default for History {
     fn default() -> Self {
-        // A stroke over a whole 175 x 140 mask holds 25 kB: some 2500 of the largest, tens of thousands of usual ones.
+        // A usual mask of 175 x 140 takes one to three kilobytes, the most ragged one 150.
         Self::new(64 << 20)
     }
 }
@@ -264,33 +260,27 @@ impl History {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use super::super::keys::Revision;
     use super::*;
     use crate::domain::grid::Mask;
+    use crate::domain::label::Provenance;
     use crate::domain::rig::{PadId, lab};
     use crate::work::labels::ImprintOf;
 
     fn hand(doc: &mut Document, pair: &str, finger: PadId) -> HandMask {
-        let hand = HandMask { mask: Arc::new(Mask::filled(8, 4, false)), revision: Revision(0), base: String::new() };
+        let hand = HandMask::new(Mask::filled(8, 4, false), Provenance::Nothing);
         doc.labels.entry(pair.into()).or_default().put(&MaskPlace::measured(finger), Some(hand.clone()));
         hand
     }
 
-    /// The edit that sets 2 x 2 pixels from `(x, 1)` on.
-    fn edit(pair: &str, finger: PadId, x: usize) -> Edit {
-        let empty = Mask::filled(8, 4, false);
+    /// The edit that makes 2 x 2 pixels from `(x, 1)` on the contact.
+    fn edit(doc: &mut Document, pair: &str, finger: PadId, x: usize) -> Edit {
         let full = Mask::from_fn(8, 4, |px, py| (x..x + 2).contains(&px) && (1..3).contains(&py));
-        Edit::Patch {
-            pair: pair.into(),
-            place: MaskPlace::measured(finger),
-            patch: Patch::between(&empty, &full).unwrap(),
-        }
+        let hand = HandMask { revision: doc.next_revision(), ..HandMask::new(full, Provenance::Nothing) };
+        Edit::Mask { pair: pair.into(), place: MaskPlace::measured(finger), mask: Some(KeptMask::of(&hand)) }
     }
 
-    fn patch(doc: &mut Document, history: &mut History, pair: &str, finger: PadId, x: usize) {
-        let mut edit = edit(pair, finger, x);
+    fn paint(doc: &mut Document, history: &mut History, pair: &str, finger: PadId, x: usize) {
+        let mut edit = edit(doc, pair, finger, x);
         edit.swap(doc);
         history.record(Gesture { name: "stroke".into(), edits: vec![edit] });
     }
@@ -298,19 +288,21 @@ mod tests {
     #[test]
     fn swapping_twice_changes_nothing() {
         let mut doc = Document::default();
-        let before = hand(&mut doc, "a", lab::RIGHT).mask;
-        let mut edit = edit("a", lab::RIGHT, 6);
+        let place = MaskPlace::measured(lab::RIGHT);
+        let before = hand(&mut doc, "a", lab::RIGHT);
+        let mut edit = edit(&mut doc, "a", lab::RIGHT, 6);
         let copy = edit.clone();
         edit.swap(&mut doc);
-        assert!(doc.hand_mask("a", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(7, 2)]);
-        assert!(!before[(7, 2)], "the mask that others hold is not changed under them");
+        let there = doc.hand_mask("a", &place).unwrap();
+        assert!(there.mask[(7, 2)] && there.revision > before.revision);
         edit.swap(&mut doc);
-        assert_eq!(doc.hand_mask("a", &MaskPlace::measured(lab::RIGHT)).unwrap().mask, before);
+        assert_eq!(doc.hand_mask("a", &place), Some(&before), "with its revision: results of it are still good");
         assert_eq!(edit, copy);
-        assert!(
-            doc.hand_mask("a", &MaskPlace::measured(lab::RIGHT)).unwrap().revision > Revision(1),
-            "revisions are never reused"
-        );
+        // A mask of an earlier run gets a revision that nothing has.
+        let mut edit =
+            Edit::Mask { pair: "a".into(), place: place.clone(), mask: Some(KeptMask::of_earlier_run(&before)) };
+        edit.swap(&mut doc);
+        assert_eq!(doc.hand_mask("a", &place).unwrap().revision.0, doc.last_revision);
     }
 
     #[test]
@@ -319,7 +311,7 @@ mod tests {
         let mut history = History::default();
         for (pair, finger) in [("a", lab::RIGHT), ("a", lab::LEFT), ("b", lab::RIGHT)] {
             hand(&mut doc, pair, finger);
-            patch(&mut doc, &mut history, pair, finger, 0);
+            paint(&mut doc, &mut history, pair, finger, 0);
         }
         assert!(history.undo(&mut doc, "c", &lab::PADS.map(MaskPlace::measured)).is_none());
         assert!(history.undo(&mut doc, "a", &[MaskPlace::measured(lab::RIGHT)]).is_some());
@@ -329,15 +321,15 @@ mod tests {
         assert!(doc.hand_mask("b", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(0, 1)]);
         // A prediction that is not on screen is not touched either.
         let predicted = MaskPlace { pad: lab::RIGHT, of: ImprintOf::Predicted("a prediction".into()) };
-        let mut edit = Edit::HandMask { pair: "a".into(), place: predicted.clone(), mask: None };
+        let mut edit = Edit::Mask { pair: "a".into(), place: predicted.clone(), mask: None };
         edit.swap(&mut doc);
         history.record(Gesture { name: "stroke".into(), edits: vec![edit] });
         assert!(history.next_undo("a", &[MaskPlace::measured(lab::RIGHT)]).is_none());
         assert!(history.undo(&mut doc, "a", &[predicted]).is_some());
         // A new stroke on the other finger does not take the redo of this one away; one on this finger does.
-        patch(&mut doc, &mut history, "a", lab::LEFT, 4);
+        paint(&mut doc, &mut history, "a", lab::LEFT, 4);
         assert!(history.next_redo("a", &[MaskPlace::measured(lab::RIGHT)]).is_some());
-        patch(&mut doc, &mut history, "a", lab::RIGHT, 4);
+        paint(&mut doc, &mut history, "a", lab::RIGHT, 4);
         assert!(history.next_redo("a", &[MaskPlace::measured(lab::RIGHT)]).is_none());
     }
 
@@ -345,9 +337,10 @@ mod tests {
     fn the_budget_drops_the_oldest() {
         let mut doc = Document::default();
         hand(&mut doc, "a", lab::RIGHT);
-        let mut history = History::new(3 * (std::mem::size_of::<Edit>() + 4));
+        let one = edit(&mut doc, "a", lab::RIGHT, 2).bytes();
+        let mut history = History::new(3 * one + one / 2);
         for x in 0..6 {
-            patch(&mut doc, &mut history, "a", lab::RIGHT, x);
+            paint(&mut doc, &mut history, "a", lab::RIGHT, x);
         }
         let mut undone = 0;
         while history.undo(&mut doc, "a", &lab::PADS.map(MaskPlace::measured)).is_some() {

@@ -5,20 +5,19 @@ pub mod state;
 pub use state::{Changed, Document, HandMask, MaskPlace, PairLabels, Review, Stored, Stroke};
 
 use std::borrow::Cow;
-use std::sync::Arc;
 
 use super::effect::{Effect, LabelsToSave};
-use super::history::{Edit, Gesture};
+use super::history::{Edit, Gesture, KeptMask};
 use super::keys::ImprintSource;
 use super::settings;
 use super::state::{Lookup, State};
 use super::tasks::state::Level;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{CleanUp, DrawTool, Drawing, Ground, Patch};
+use crate::domain::label::{CleanUp, DrawTool, Drawing, Paint, Provenance};
 use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
-use crate::work::labels::{Act, Deed, taken_over};
+use crate::work::labels::{Act, Deed, system_person};
 
 /// What can happen to the document.
 #[derive(Clone, Debug)]
@@ -72,10 +71,7 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         LabelsCommand::CancelStroke => cancel_stroke(state),
         LabelsCommand::Corner(at_px) => corner(state, at_px),
         LabelsCommand::CleanUp(clean_up) => {
-            let px_per_mm = state.rig().depth().map_or(f64::NAN, |sensor| sensor.px_per_m * 1e-3);
-            let how = serde_json::to_value(clean_up).ok();
-            let deed = Deed { how, ..Deed::named(clean_up.kind.name()) };
-            replace(state, deed, effects, |mask| clean_up.apply(mask, px_per_mm));
+            clean(state, clean_up, effects);
         }
         LabelsCommand::AdoptAutomatic => adopt_automatic(state, effects),
         LabelsCommand::TakeOver => take_over(state, effects),
@@ -108,27 +104,32 @@ pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
     false
 }
 
-/// The mask in force and where it comes from; an empty one where none can be had.
+/// The mask in force as a hand takes it up; an empty one where none can be had.
 ///
 /// `None` while it is being computed: a correction must not start from something else than what is shown.
-fn start_from(state: &State, source: ImprintSource, finger: PadId) -> Option<(Arc<Mask>, String)> {
-    match state.mask_in_force(source, finger) {
-        Ok(mask) => {
-            let base = match state.hand_mask(source, finger) {
-                Some(hand) if Arc::ptr_eq(&hand.mask, mask.mask) => hand.base.clone(),
-                _ => mask.label,
-            };
-            Some((mask.mask.clone(), base))
+fn start_from(state: &State, source: ImprintSource, finger: PadId) -> Option<HandMask> {
+    if let Some(hand) = state.hand_mask(source, finger) {
+        return Some(hand.clone());
+    }
+    match (state.automatic_mask(source, finger), state.mask_recipe(finger)) {
+        (Lookup::Ready(mask), Ok(recipe)) => {
+            Some(HandMask::new(mask.clone(), state.automatic_provenance(source, finger, &recipe)))
         }
-        Err(Lookup::Waiting | Lookup::Stale(_) | Lookup::Ready(_)) => None,
-        Err(Lookup::Failed(_) | Lookup::Absent(_)) => {
-            let size = state.imprint(source, finger).ready()?.size();
-            Some((Arc::new(Mask::filled(size[0], size[1], false)), String::new()))
+        (Lookup::Waiting | Lookup::Stale(_), Ok(_)) => None,
+        _ => {
+            let [width, height] = state.imprint(source, finger).ready()?.size();
+            Some(HandMask::new(Mask::filled(width, height, false), Provenance::Nothing))
         }
     }
 }
 
 impl State {
+    /// Who labels: the name in the preferences, else whom the system says; empty where nobody knows.
+    pub fn person(&self) -> String {
+        let named = Some(self.settings.person.trim()).filter(|name| !name.is_empty());
+        named.map(str::to_owned).or_else(system_person).unwrap_or_default()
+    }
+
     /// The imprint whose mask the clean-ups work on: the one chosen, else the one that is there.
     pub fn worked_on(&self, finger: PadId) -> ImprintSource {
         let chosen = self.selection.imprint;
@@ -146,11 +147,11 @@ fn begin_stroke(
     effects: &mut Vec<Effect>,
 ) {
     end_stroke(state, effects);
-    let Some((tool, adds)) = state.settings.mask.drawing() else { return };
+    let Some((tool, paint)) = state.settings.mask.drawing() else { return };
     if !state.fingers().contains(&finger) || !check_editable(state, "Correct the mask") {
         return;
     }
-    let Some((pixels, base)) = start_from(state, source, finger) else {
+    let Some(mut start) = start_from(state, source, finger) else {
         let err = TaskError::new("Correct the mask", "the mask is still being computed").with_hint("Try again.");
         return state.log.error(&err);
     };
@@ -161,12 +162,15 @@ fn begin_stroke(
     let Some(place) = state.mask_place(source, finger) else { return };
     state.selection.imprint = source;
     let pair = state.pair_name().to_owned();
-    let revision = state.document.next_revision();
+    start.revision = state.document.next_revision();
     let labels = state.document.labels.entry(pair.clone()).or_default();
-    let before = labels.put(&place, Some(HandMask { mask: pixels.clone(), revision, base }));
-    let drawing = Drawing::begin(tool, at_px, adds != erase);
-    let angle = angle(state, source);
-    state.document.stroke = Some(Stroke { pair, place, source, drawing, allowed, angle, before, pixels });
+    let before = labels.put(&place, Some(start.clone()));
+    let drawing = Drawing::begin(tool, at_px, if erase { paint.reversed() } else { paint });
+    let [width, height] = start.mask.size();
+    let touched = Mask::filled(width, height, false);
+    let (angle, by) = (angle(state, source), Provenance::hand(state.person()));
+    let stroke = Stroke { pair, place, source, drawing, allowed, proposed: None, angle, before, start, touched, by };
+    state.document.stroke = Some(stroke);
     redraw(state, 0);
 }
 
@@ -186,28 +190,17 @@ fn corner(state: &mut State, at_px: [f32; 2]) {
 
 /// Draws the stroke on its mask: what a brush did since its first `from` points, anything else anew.
 fn redraw(state: &mut State, from: usize) {
-    let Some(stroke) = &state.document.stroke else { return };
-    let Some(imprint) = state.imprint(stroke.source, stroke.place.pad).ready().cloned() else { return };
-    let doc = &mut state.document;
-    let Some(stroke) = &doc.stroke else { return };
-    let hand = doc.labels.get_mut(&stroke.pair).and_then(|labels| labels.masks.get_mut(&stroke.place));
-    let Some(hand) = hand else { return };
-    let ground = Ground { imprint: &imprint, allowed: stroke.allowed.as_ref() };
-    let changed = if matches!(stroke.drawing.tool, DrawTool::Brush { .. }) {
-        stroke.drawing.apply(Arc::make_mut(&mut hand.mask), ground, from).is_some()
-    } else {
-        let mut mask = (*stroke.pixels).clone();
-        stroke.drawing.apply(&mut mask, ground, 0);
-        let changed = mask != *hand.mask;
-        if changed {
-            hand.mask = Arc::new(mask);
+    // Out of the document while it is drawn on, so that the imprint can be looked at where it lies.
+    let Some(mut stroke) = state.document.stroke.take() else { return };
+    let labels = state.document.labels.get_mut(&stroke.pair);
+    if let Some(mut hand) = labels.and_then(|labels| labels.masks.remove(&stroke.place)) {
+        let imprint = state.imprint(stroke.source, stroke.place.pad).ready();
+        if imprint.is_some_and(|imprint| stroke.draw_on(&mut hand, imprint, from)) {
+            hand.revision = state.document.next_revision();
         }
-        changed
-    };
-    if changed {
-        doc.last_revision += 1;
-        hand.revision = super::keys::Revision(doc.last_revision);
+        state.document.labels.entry(stroke.pair.clone()).or_default().put(&stroke.place, Some(hand));
     }
+    state.document.stroke = Some(stroke);
 }
 
 pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
@@ -215,19 +208,15 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     let Some(stroke) = doc.stroke.take() else { return };
     let labels = doc.labels.entry(stroke.pair.clone()).or_default();
     let Some(now) = labels.masks.get(&stroke.place) else { return };
-    // The patch that leads back: what undo needs.
-    let Some(patch) = Patch::between(&now.mask, &stroke.pixels) else {
+    if now.is_same(&stroke.start) {
         labels.put(&stroke.place, stroke.before);
         return;
-    };
+    }
     let (pair, place) = (stroke.pair, stroke.place);
-    let edit = match stroke.before {
-        Some(before) if before.mask.size() == now.mask.size() => Edit::Patch { pair: pair.clone(), place, patch },
-        before => Edit::HandMask { pair: pair.clone(), place, mask: before },
-    };
-    let name = match (stroke.drawing.tool, stroke.drawing.add) {
-        (DrawTool::Brush { .. }, true) => "brush stroke",
-        (DrawTool::Brush { .. }, false) => "eraser stroke",
+    let edit = Edit::Mask { pair: pair.clone(), place, mask: stroke.before.as_ref().map(KeptMask::of) };
+    let name = match (stroke.drawing.tool, stroke.drawing.paint) {
+        (DrawTool::Brush { .. }, Paint::Free) => "eraser stroke",
+        (DrawTool::Brush { .. }, _) => "brush stroke",
         (DrawTool::Lasso, _) => "lasso",
         (DrawTool::Polygon, _) => "polygon",
         (DrawTool::Rectangle, _) => "rectangle",
@@ -263,39 +252,32 @@ fn record(state: &mut State, pair: &str, deed: Deed, edit: Edit, effects: &mut V
     save_pair(state, pair, deed, effects);
 }
 
-/// Replaces the active finger's mask by `f` of the mask in force.
-fn replace(state: &mut State, deed: Deed, effects: &mut Vec<Effect>, f: impl FnOnce(&Mask) -> Mask) {
+/// Cleans the mask in force of the active finger up.
+fn clean(state: &mut State, clean_up: CleanUp, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
-    let what: &str = &deed.name;
+    let what = clean_up.kind.name();
     if !check_editable(state, what) {
         return;
     }
     let finger = state.selection.finger;
     let source = state.worked_on(finger);
-    let (Some((pixels, base)), Some(place)) = (start_from(state, source, finger), state.mask_place(source, finger))
-    else {
+    let (Some(mut hand), Some(place)) = (start_from(state, source, finger), state.mask_place(source, finger)) else {
         return state.log.error(&TaskError::new(what, "there is no mask to work on yet"));
     };
-    let mask = f(&pixels);
-    if mask == *pixels {
+    if !hand.clean(clean_up, &state.rig()) {
         return state.log.info(format!("{what}: nothing to change"));
     }
-    set_hand_mask(state, deed, place, Some((Arc::new(mask), base)), effects);
+    let deed = Deed { how: serde_json::to_value(clean_up).ok(), ..Deed::named(what) };
+    set_hand_mask(state, deed, place, Some(hand), effects);
 }
 
-fn set_hand_mask(
-    state: &mut State,
-    deed: Deed,
-    place: MaskPlace,
-    mask: Option<(Arc<Mask>, String)>,
-    effects: &mut Vec<Effect>,
-) {
+fn set_hand_mask(state: &mut State, deed: Deed, place: MaskPlace, mask: Option<HandMask>, effects: &mut Vec<Effect>) {
     let pair = state.pair_name().to_owned();
     let revision = state.document.next_revision();
-    let mask = mask.map(|(mask, base)| HandMask { mask, revision, base });
+    let mask = mask.map(|mask| KeptMask::of(&HandMask { revision, ..mask }));
     let (source, name) = (place.of.source(), deed.name.clone());
     let before = angle(state, source);
-    let mut edit = Edit::HandMask { pair: pair.clone(), place, mask };
+    let mut edit = Edit::Mask { pair: pair.clone(), place, mask };
     edit.swap(&mut state.document);
     state.document.changed = Some(Changed { pair: pair.clone(), source, name, before });
     record(state, &pair, deed, edit, effects);
@@ -312,7 +294,7 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
     let Some(place) = state.mask_place(source, finger) else { return };
     match (state.automatic_mask(source, finger), state.mask_recipe(finger)) {
         (Lookup::Ready(mask), Ok(recipe)) => {
-            let adopted = (mask.clone(), state.automatic_label(source, finger, &recipe));
+            let adopted = HandMask::new(mask.clone(), state.automatic_provenance(source, finger, &recipe));
             set_hand_mask(state, Deed::named("automatic mask taken over"), place, Some(adopted), effects);
         }
         (Lookup::Failed(err), _) => {
@@ -345,20 +327,15 @@ fn take_over(state: &mut State, effects: &mut Vec<Effect>) {
     let to = state.worked_on(finger);
     let from = to.other();
     let size = state.imprint(to, finger).ready().map(|imprint| imprint.size());
-    let (Some((mask, base)), Some(place)) = (start_from(state, from, finger), state.mask_place(to, finger)) else {
+    let (Some(other), Some(place)) = (start_from(state, from, finger), state.mask_place(to, finger)) else {
         let why = format!("there is no mask on the {} imprint", from.key());
         return state.log.error(&TaskError::new(WHAT, why));
     };
-    if Some(mask.size()) != size {
+    if Some(other.mask.size()) != size {
         return state.log.error(&TaskError::new(WHAT, "the imprints are not of one size"));
     }
-    set_hand_mask(
-        state,
-        Deed::named("mask of the other imprint taken over"),
-        place,
-        Some((mask, taken_over(from, &base))),
-        effects,
-    );
+    let copy = other.copied(from);
+    set_hand_mask(state, Deed::named("mask of the other imprint taken over"), place, Some(copy), effects);
 }
 
 pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Effect>) {
@@ -433,7 +410,7 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
 
 /// Writes the labels of a pair of the open data set.
 fn save_pair(state: &mut State, name: &str, mut deed: Deed, effects: &mut Vec<Effect>) {
-    deed.person = Some(state.settings.person.trim().to_owned()).filter(|person| !person.is_empty());
+    deed.person = Some(state.person()).filter(|person| !person.is_empty());
     let Some(open) = &state.library.open else { return };
     let revision = state.document.next_revision();
     let Some(labels) = state.document.labels.get(name) else { return };

@@ -13,6 +13,7 @@ use super::action::{Action, Shortcut};
 use super::effect::Effect;
 use super::keys::{ImprintSource, RegistrationChoice, ShiftMode};
 use super::state::State;
+use crate::domain::label::Paint;
 use crate::infer::engine::EngineChoice;
 
 /// What can happen to the preferences.
@@ -36,6 +37,8 @@ pub enum SettingsCommand {
     SetMask(MaskSettings),
     /// The tool in hand.
     SetMaskTool(MaskTool),
+    /// What the tools make of pixels.
+    SetPaint(Paint),
     /// The tool before.
     LastMaskTool,
     /// The automatic source.
@@ -112,6 +115,7 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
         }
         SettingsCommand::SetMask(mask) => settings.mask = mask,
         SettingsCommand::SetMaskTool(tool) => set_tool(settings, tool),
+        SettingsCommand::SetPaint(paint) => settings.mask.paint = paint,
         SettingsCommand::LastMaskTool => set_tool(settings, settings.mask.last_tool),
         SettingsCommand::SetMaskSource(source) => settings.mask.choice.source = source,
         SettingsCommand::SetBrushRadius(radius_px) => settings.mask.radius_px = radius_px,

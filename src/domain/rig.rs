@@ -237,6 +237,11 @@ impl Rig {
         self.sensor(self.first(SensorKind::Depth)?)
     }
 
+    /// Pixels to the millimeter of depth images; NaN where there is no such sensor, so that a size in millimeters says nothing.
+    pub fn depth_px_per_mm(&self) -> f64 {
+        self.depth().map_or(f64::NAN, |sensor| sensor.px_per_m * 1e-3)
+    }
+
     /// Where `of` looks in the picture of `within`, if the rig says.
     pub fn window(&self, pad: PadId, of: SensorId, within: SensorId) -> Option<&Window> {
         self.windows.iter().find(|w| (w.pad, w.of, w.within) == (pad, of, within))

@@ -3,8 +3,6 @@
 mod args;
 mod report;
 
-use std::sync::Arc;
-
 use super::output::says;
 use super::predict::Predictor;
 use super::{Output, VerbResult, find_pair};
@@ -13,12 +11,12 @@ use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::Ground;
+use crate::domain::label::{Ground, Provenance};
 use crate::domain::pose::ToolModel;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::work::job::JobCx;
-use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, Revision, taken_over};
+use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, system_person};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
 use crate::work::tool::load_tool;
@@ -108,27 +106,29 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
             labels.draw(&place(pad), None);
         }
         if !args.remove_mask {
+            let by = || Provenance::hand(args.person.clone().or_else(system_person).unwrap_or_default());
             let found = touch.contact(args.from.unwrap_or(args.imprint), (!args.adopt).then_some(&*labels))?;
             for pad in pads {
                 let Some(one) = &found.masks[pad] else { continue };
-                let made = || one.basis.label(&found.recipe.label(found.model.as_deref().unwrap_or_default()));
-                let base = match (labels.masks.get(&place(pad)), one.basis, args.from) {
-                    (_, _, Some(from)) => taken_over(from, &made()),
-                    (Some(hand), MaskBasis::Hand, None) => hand.base.clone(),
-                    _ => made(),
+                let drawn = match args.from {
+                    Some(from) => labels.masks.get(&MaskPlace { pad, of: touch.predictor.of(from)? }),
+                    None => labels.masks.get(&place(pad)),
                 };
-                let mut mask = one.mask.clone();
+                let model = found.model.as_deref().unwrap_or_default();
+                let start = match drawn.filter(|_| one.basis == MaskBasis::Hand) {
+                    Some(hand) => hand.clone(),
+                    None => HandMask::new(one.mask.clone(), found.recipe.provenance(model, one.basis)),
+                };
+                let mut hand = args.from.map_or_else(|| start.clone(), |from| start.copied(from));
                 if let Some(imprint) = &found.imprints[pad] {
                     for drawing in &args.draw {
-                        drawing.apply(&mut mask, Ground { imprint, allowed: None }, 0);
+                        hand.draw(drawing, Ground::new(imprint), by());
                     }
                 }
-                let px_per_mm = dataset.rig.depth().map_or(f64::NAN, |sensor| sensor.px_per_m * 1e-3);
                 for clean_up in &args.clean {
-                    mask = clean_up.apply(&mask, px_per_mm);
+                    hand.clean(*clean_up, &dataset.rig);
                 }
-                if args.adopt || args.from.is_some() || mask != one.mask {
-                    let hand = HandMask { mask: Arc::new(mask), revision: Revision::default(), base };
+                if args.adopt || args.from.is_some() || !hand.is_same(&start) {
                     labels.draw(&place(pad), Some(hand));
                 }
             }

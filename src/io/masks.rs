@@ -19,7 +19,7 @@ use super::{atomic, files, folders, names};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{decode_runs, encode_runs};
+use crate::domain::label::{Marks, PackedMask};
 use crate::domain::rig::{PadId, Rig};
 
 /// Name of the folder beside a data set.
@@ -28,6 +28,8 @@ const JOURNAL_SUFFIX: &str = ".journal.jsonl";
 const FORMAT: &str = "touch2touch-mask";
 const REVIEW_FORMAT: &str = "touch2touch-review";
 const VERSION: u32 = 1;
+/// Masks that say where each pixel comes from: an older program would lose that.
+const MASK_VERSION: u32 = 2;
 /// Reviews whose accepted poses were set by hand or leave the plane; others are written as version 1.
 const HAND_VERSION: u32 = 2;
 const MASK_SUFFIX: &str = ".mask.json";
@@ -86,10 +88,10 @@ impl StoreError {
 /// A stored mask with where it came from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoredMask {
-    /// The pixels, raw bubble orientation, as large as the imprint.
+    /// The contact, raw bubble orientation, as large as the imprint.
     pub mask: Mask,
-    /// What it was made from, e.g. `Threshold 5.00 mm`.
-    pub base: String,
+    /// Where each pixel comes from, and which are ignored.
+    pub marks: Marks,
     /// Who saved it.
     pub person: String,
     /// When, seconds since 1970 (UTC); see [`now_unix_s`].
@@ -123,14 +125,12 @@ struct MaskFile {
     version: u32,
     pair: String,
     finger: String,
-    width: usize,
-    height: usize,
-    base: String,
     person: String,
     saved_unix_s: u64,
     /// Pixels in contact: checked against the runs.
     contact_px: usize,
-    runs: Vec<u32>,
+    #[serde(flatten)]
+    mask: PackedMask,
 }
 
 /// The masks of one finger that were drawn on predictions, each with the prediction that it belongs to.
@@ -146,12 +146,10 @@ struct PredictedFile {
 #[derive(Serialize, Deserialize)]
 struct PredictedMask {
     of: String,
-    width: usize,
-    height: usize,
-    base: String,
     person: String,
     saved_unix_s: u64,
-    runs: Vec<u32>,
+    #[serde(flatten)]
+    mask: PackedMask,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -275,16 +273,13 @@ impl MaskStore {
         };
         let content = MaskFile {
             format: FORMAT.into(),
-            version: VERSION,
+            version: MASK_VERSION,
             pair: pair.into(),
             finger: self.rig.pad_key(finger).into(),
-            width: stored.mask.width(),
-            height: stored.mask.height(),
-            base: stored.base.clone(),
             person: stored.person.clone(),
             saved_unix_s: stored.saved_unix_s,
-            contact_px: stored.mask.as_slice().iter().filter(|&&v| v).count(),
-            runs: encode_runs(&stored.mask),
+            contact_px: contact_px(&stored.mask),
+            mask: PackedMask::pack(&stored.mask, &stored.marks),
         };
         self.write(&file, &content)
     }
@@ -301,13 +296,13 @@ impl MaskStore {
         let Some((file, bytes)) = self.find(&self.predicted_name(pair, finger))? else { return Ok(Vec::new()) };
         let damaged = |reason: String| StoreError::Damaged { file: file.clone(), reason };
         let content: PredictedFile = serde_json::from_slice(&bytes).map_err(|err| damaged(err.to_string()))?;
-        check_format(&file, &content.format, PREDICTED_FORMAT, content.version, VERSION)?;
+        check_format(&file, &content.format, PREDICTED_FORMAT, content.version, MASK_VERSION)?;
         if content.pair != pair || content.finger != self.rig.pad_key(finger) {
             return Err(damaged(format!("it belongs to the {} finger of {}", content.finger, content.pair)));
         }
         let one = |m: PredictedMask| {
-            let mask = decode_runs(m.width, m.height, &m.runs).map_err(|err| damaged(err.to_string()))?;
-            Ok((m.of, StoredMask { mask, base: m.base, person: m.person, saved_unix_s: m.saved_unix_s }))
+            let (mask, marks) = m.mask.unpack().map_err(|err| damaged(err.to_string()))?;
+            Ok((m.of, StoredMask { mask, marks, person: m.person, saved_unix_s: m.saved_unix_s }))
         };
         content.masks.into_iter().map(one).collect()
     }
@@ -332,16 +327,13 @@ impl MaskStore {
         }
         let one = |(of, stored): (String, StoredMask)| PredictedMask {
             of,
-            width: stored.mask.width(),
-            height: stored.mask.height(),
-            runs: encode_runs(&stored.mask),
-            base: stored.base,
+            mask: PackedMask::pack(&stored.mask, &stored.marks),
             person: stored.person,
             saved_unix_s: stored.saved_unix_s,
         };
         let content = PredictedFile {
             format: PREDICTED_FORMAT.into(),
-            version: VERSION,
+            version: MASK_VERSION,
             pair: pair.into(),
             finger: self.rig.pad_key(finger).into(),
             masks: all.into_iter().map(one).collect(),
@@ -512,16 +504,20 @@ fn read(file: &Path) -> Result<Vec<u8>, StoreError> {
 fn parse_mask(file: &Path, bytes: &[u8], pair: &str, finger: &str) -> Result<StoredMask, StoreError> {
     let damaged = |reason: String| StoreError::Damaged { file: file.to_owned(), reason };
     let content: MaskFile = serde_json::from_slice(bytes).map_err(|err| damaged(err.to_string()))?;
-    check_format(file, &content.format, FORMAT, content.version, VERSION)?;
+    check_format(file, &content.format, FORMAT, content.version, MASK_VERSION)?;
     if content.pair != pair || content.finger != finger {
         return Err(damaged(format!("it belongs to the {} finger of {}", content.finger, content.pair)));
     }
-    let mask = decode_runs(content.width, content.height, &content.runs).map_err(|err| damaged(err.to_string()))?;
-    let contact = mask.as_slice().iter().filter(|&&v| v).count();
+    let (mask, marks) = content.mask.unpack().map_err(|err| damaged(err.to_string()))?;
+    let contact = contact_px(&mask);
     if contact != content.contact_px {
         return Err(damaged(format!("it has {contact} pixels in contact and says {}", content.contact_px)));
     }
-    Ok(StoredMask { mask, base: content.base, person: content.person, saved_unix_s: content.saved_unix_s })
+    Ok(StoredMask { mask, marks, person: content.person, saved_unix_s: content.saved_unix_s })
+}
+
+fn contact_px(mask: &Mask) -> usize {
+    mask.as_slice().iter().filter(|&&v| v).count()
 }
 
 fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, StoreError> {

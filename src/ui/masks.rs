@@ -5,6 +5,7 @@ use strum::IntoEnumIterator as _;
 
 use super::browser::review_color;
 use super::cx::Cx;
+use super::images::{CONTACT, IGNORED};
 use super::theme::{SMALL, caption, section};
 use crate::app::action::Action;
 use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand, ViewCommand};
@@ -12,6 +13,7 @@ use crate::app::keys::ImprintSource;
 use crate::app::labels::Review;
 use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use crate::app::state::Lookup;
+use crate::domain::label::Paint;
 use crate::domain::rig::PadId;
 use crate::domain::units;
 use crate::work::labels::system_person;
@@ -66,7 +68,27 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
         MaskTool::Wand => wand(cx, ui),
         MaskTool::Lasso | MaskTool::Polygon | MaskTool::Rectangle | MaskTool::Pan => {}
     }
+    paints(cx, ui);
     gate(cx, ui);
+}
+
+/// What the tools make of the pixels.
+fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(caption("Paint", cx.p));
+        let now = cx.state.settings.mask.paint;
+        for (paint, text, tip) in [
+            (Paint::Contact, "contact", "The tools add contact; the right button removes it".to_owned()),
+            (Paint::Ignore, "ignore", cx.keys().help(Action::PaintIgnore)),
+        ] {
+            let color = if paint == Paint::Ignore { IGNORED } else { CONTACT };
+            let text = RichText::new(text).color(if now == paint { color } else { cx.p.text });
+            if ui.add(egui::Button::selectable(now == paint, text)).on_hover_text(tip).clicked() {
+                cx.push(SettingsCommand::SetPaint(paint));
+            }
+        }
+    });
 }
 
 fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -81,7 +103,7 @@ fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
         if response.changed() || response.double_clicked() {
             cx.push(SettingsCommand::SetBrushRadius(radius));
         }
-        let mm = f64::from(radius) / cx.state.rig().depth().map_or(f64::NAN, |sensor| sensor.px_per_m) * 1e3;
+        let mm = f64::from(radius) / cx.state.rig().depth_px_per_mm();
         ui.label(caption(format!("{mm:.2} mm"), cx.p));
         let tip = "Radius of brush and eraser, image pixels ([[brush_smaller]] and [[brush_larger]], Shift + wheel, \
                    Alt + move). Double-click resets";

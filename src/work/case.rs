@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +21,7 @@ use crate::domain::diffusion::GenerateConfig;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{decode_runs, encode_runs};
+use crate::domain::label::PackedMask;
 use crate::domain::pose::RegistrationChoice;
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::{PadId, PerPad};
@@ -70,10 +69,8 @@ pub struct CaseRecipe {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct CaseMask {
     finger: PadId,
-    size: [usize; 2],
-    /// Lengths of runs, row by row, the first one of pixels without contact.
-    runs: Vec<u32>,
-    base: String,
+    #[serde(flatten)]
+    mask: PackedMask,
     /// The imprint that it was drawn on.
     #[serde(default)]
     of: ImprintOf,
@@ -173,9 +170,7 @@ impl CaseLabels {
         let mask = |(place, hand): (&MaskPlace, &HandMask)| CaseMask {
             finger: place.pad,
             of: place.of.clone(),
-            size: hand.mask.size(),
-            runs: encode_runs(&hand.mask),
-            base: hand.base.clone(),
+            mask: hand.pack(),
         };
         Self { masks: labels.masks.iter().map(mask).collect(), review: labels.review, accepted: labels.accepted }
     }
@@ -183,9 +178,8 @@ impl CaseLabels {
     fn labels(&self) -> Result<PairLabels, TaskError> {
         let mut labels = PairLabels { review: self.review, accepted: self.accepted, ..PairLabels::default() };
         for mask in &self.masks {
-            let [width, height] = mask.size;
-            let pixels = decode_runs(width, height, &mask.runs).map_err(|err| TaskError::from_error(WHAT, &err))?;
-            let hand = HandMask { mask: Arc::new(pixels), revision: Default::default(), base: mask.base.clone() };
+            let hand =
+                HandMask::unpack(&mask.mask, Default::default()).map_err(|err| TaskError::from_error(WHAT, &err))?;
             if mask.finger.index() >= 16 {
                 return Err(TaskError::new(WHAT, "it has a mask of a finger that no gripper has"));
             }
@@ -457,6 +451,7 @@ fn compare(then: &[CaseResult], now: &[CaseResult], report: &mut CaseReport) {
 mod tests {
     use super::*;
     use crate::domain::catalog;
+    use crate::domain::label::Provenance;
     use crate::domain::rig::lab;
     use crate::domain::sim::{SimConfig, random_grasp, simulate};
     use crate::io::simulated::{Layout, write_pair, write_tools};
@@ -476,8 +471,8 @@ mod tests {
     }
 
     fn drawn() -> PairLabels {
-        let mask = Arc::new(Mask::from_fn(175, 140, |x, y| (60..110).contains(&x) && (40..90).contains(&y)));
-        let hand = HandMask { mask, revision: Default::default(), base: "Threshold".into() };
+        let mask = Mask::from_fn(175, 140, |x, y| (60..110).contains(&x) && (40..90).contains(&y));
+        let hand = HandMask::new(mask, Provenance::Threshold { min_m: 0.005 });
         let masks = [(MaskPlace::measured(lab::RIGHT), hand)].into();
         PairLabels { masks, review: Review::Flagged, ..PairLabels::default() }
     }

@@ -17,8 +17,9 @@ use crate::domain::dataset::Problem;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::hand::AcceptedPose;
+use crate::domain::label::{CleanUp, Drawing, Ground, Marks, PackError, PackedMask, Provenance};
 use crate::domain::postprocess::ShiftMode;
-use crate::domain::rig::PadId;
+use crate::domain::rig::{PadId, Rig};
 use crate::io::dataset::Dataset;
 use crate::io::masks::{self, MaskStore, StoreError, StoredMask, StoredReview};
 
@@ -185,22 +186,74 @@ pub struct Revision(pub u64);
 /// A mask that a person corrected.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandMask {
-    /// The pixels, in raw bubble orientation, as large as the imprint.
+    /// The contact, in raw bubble orientation, as large as the imprint.
     pub mask: Arc<Mask>,
+    /// Where each pixel comes from, and which are ignored.
+    pub marks: Arc<Marks>,
     /// Changes with every change of the pixels; equal revisions are equal masks.
     pub revision: Revision,
-    /// What it was before the first correction, for the label: e.g. `Threshold 5.00 mm`.
-    pub base: String,
+}
+
+impl HandMask {
+    /// A mask whose pixels are all of one provenance.
+    pub fn new(mask: impl Into<Arc<Mask>>, from: Provenance) -> Self {
+        let mask = mask.into();
+        let marks = Arc::new(Marks::all(mask.size(), from));
+        Self { mask, marks, revision: Revision::default() }
+    }
+
+    /// What it was before the first correction, in words; empty where it was nothing.
+    pub fn base(&self) -> String {
+        self.marks.base().text()
+    }
+
+    /// Draws on it, as the person `by`.
+    pub fn draw(&mut self, drawing: &Drawing, ground: Ground<'_>, by: Provenance) {
+        drawing.apply(Arc::make_mut(&mut self.mask), Arc::make_mut(&mut self.marks), ground, by);
+    }
+
+    /// Takes another mask's pixels over where they differ; see [`Marks::replace`].
+    pub fn replace(&mut self, new: &Mask, by: Provenance, keep_hand: bool) -> bool {
+        Arc::make_mut(&mut self.marks).replace(Arc::make_mut(&mut self.mask), new, by, keep_hand)
+    }
+
+    /// Cleans it up; whether anything changed. Sizes are those of the rig's depth images.
+    pub fn clean(&mut self, clean_up: CleanUp, rig: &Rig) -> bool {
+        let clean = clean_up.apply(&self.mask, rig.depth_px_per_mm());
+        self.replace(&clean, Provenance::CleanUp { what: clean_up }, false)
+    }
+
+    /// A copy of it for the other imprint of the touch, `from` being that of this one.
+    #[must_use]
+    pub fn copied(&self, from: ImprintSource) -> Self {
+        let whose = if self.marks.has_hand_work() { "By hand".into() } else { self.base() };
+        let from = format!("the {} imprint's mask ({whose})", from.name().to_lowercase());
+        Self::new(self.mask.clone(), Provenance::Copied { from, moved: None })
+    }
+
+    /// The same pixels of the same provenances, whatever the revision.
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.mask == other.mask && self.marks == other.marks
+    }
+
+    /// In few bytes.
+    pub fn pack(&self) -> PackedMask {
+        PackedMask::pack(&self.mask, &self.marks)
+    }
+
+    /// What was packed, with the revision that it had.
+    ///
+    /// # Errors
+    /// If it is damaged.
+    pub fn unpack(packed: &PackedMask, revision: Revision) -> Result<Self, PackError> {
+        let (mask, marks) = packed.unpack()?;
+        Ok(Self { mask: mask.into(), marks: marks.into(), revision })
+    }
 }
 
 /// Whom the system says the person is.
 pub fn system_person() -> Option<String> {
     masks::person()
-}
-
-/// Where a mask comes from that was taken over from another imprint, whose own mask is `label`.
-pub fn taken_over(from: ImprintSource, label: &str) -> String {
-    format!("the {} imprint's mask ({label})", from.name().to_lowercase())
 }
 
 /// What a person said about one pair.
@@ -333,8 +386,8 @@ impl Labels {
         let mut labels = PairLabels::default();
         let hand = |stored: StoredMask| HandMask {
             mask: Arc::new(stored.mask),
+            marks: Arc::new(stored.marks),
             revision: Revision::default(),
-            base: stored.base,
         };
         for pad in store.rig().pads() {
             if let Some(stored) = store.load(name, pad).map_err(fail)? {
@@ -379,7 +432,7 @@ impl Labels {
         for (place, [_, new]) in &change.masks {
             let stored = new.as_ref().map(|hand| StoredMask {
                 mask: (*hand.mask).clone(),
-                base: hand.base.clone(),
+                marks: (*hand.marks).clone(),
                 person: person.clone(),
                 saved_unix_s: masks::now_unix_s(),
             });

@@ -15,10 +15,10 @@ use super::labels::{HandMask, ImprintOf, MaskPlace, PairLabels};
 use crate::domain::bits::Bits;
 use crate::domain::contact::{self, ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
 use crate::domain::grid::DepthMap;
+use crate::domain::label::{CadPose, Provenance};
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad, Rig};
 use crate::domain::sample::{PadTouch, Sample};
-use crate::domain::units;
 
 const WHAT: &str = "Contact mask";
 
@@ -149,16 +149,25 @@ pub enum MaskRecipe {
 }
 
 impl MaskRecipe {
+    /// Where the pixels of its masks come from; `model` is the mask model's name, and `basis` what a mask is made of in the
+    /// end.
+    pub fn provenance(&self, model: &str, basis: MaskBasis) -> Provenance {
+        match (basis, self) {
+            (MaskBasis::Flat, _) => Provenance::Flat,
+            (MaskBasis::Depth(min_m), _) => Provenance::Depth { min_m, instead_of: self.label(model) },
+            (_, Self::Threshold(min_m)) => Provenance::Threshold { min_m: min_m.get() },
+            (_, Self::TopPercent(percent)) => Provenance::TopPercent { percent: percent.get() },
+            (_, Self::Cad(within_m)) => Provenance::Cad { within_m: within_m.get(), at: CadPose::Truth },
+            (_, Self::Unet(id, least)) => {
+                Provenance::Model { name: model.into(), id: id.to_string(), probability: least.map(Bits::get) }
+            }
+            (_, Self::Truth) => Provenance::Truth,
+        }
+    }
+
     /// In words, with its number; `model` is the mask model's name.
     pub fn label(&self, model: &str) -> String {
-        match self {
-            Self::Threshold(m) => format!("Threshold {}", units::text_mm(f64::from(m.get()))),
-            Self::TopPercent(percent) => format!("Top {:.1} %", percent.get()),
-            Self::Cad(m) => format!("CAD within {}", units::text_mm(f64::from(m.get()))),
-            Self::Unet(_, None) => format!("UNet {model}"),
-            Self::Unet(_, Some(least)) => format!("UNet {model}, probability {}", least.get()),
-            Self::Truth => "Simulator truth".into(),
-        }
+        self.provenance(model, MaskBasis::Source).text()
     }
 
     /// The source that it is of.
@@ -321,7 +330,7 @@ mod tests {
         let imprint = DepthMap::from_fn(175, 140, |x, _| if x < 60 { 0.008 } else { 0.0 });
         let sample = Sample::default();
         let drawn = Mask::from_fn(175, 140, |x, _| x > 170);
-        let hand = HandMask { mask: Arc::new(drawn.clone()), revision: Default::default(), base: String::new() };
+        let hand = HandMask::new(drawn.clone(), Provenance::Nothing);
         let mut labels = PairLabels::default();
         labels.draw(&MaskPlace::measured(lab::LEFT), Some(hand));
         let inputs = MaskInputs::measured(&sample, None, Some(&labels));

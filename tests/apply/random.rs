@@ -43,7 +43,7 @@ use touch2touch::domain::evaluation::Figure;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::hand::{HandAxis, HandPose};
-use touch2touch::domain::label::{CleanKind, CleanUp};
+use touch2touch::domain::label::{CleanKind, CleanUp, Paint};
 use touch2touch::domain::pose::Rejection;
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
@@ -451,6 +451,7 @@ draws! {
         1 SetMask(mask()),
         4 SetMaskTool(any_of::<MaskTool>()),
         1 LastMaskTool,
+        2 SetPaint(any_of::<Paint>()),
         2 SetMaskSource(any_of::<MaskSource>()),
         1 SetBrushRadius(number()),
         1 SetMaskVisible(any::<bool>()),

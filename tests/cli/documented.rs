@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use touch2touch::domain::label::{Marks, Provenance};
 use touch2touch::domain::rig::lab;
 use touch2touch::headless::check_command;
 use touch2touch::io::dataset::Dataset;
@@ -126,7 +127,12 @@ impl Stage {
         let sample = dataset.load(id).unwrap();
         let imprint = &sample.pad(lab::RIGHT).unwrap().depth().unwrap().imprint;
         let mask = imprint.map(|&depth| depth > 0.005);
-        let stored = StoredMask { mask, base: "Threshold 5.00 mm".into(), person: "test".into(), saved_unix_s: 1 };
+        let stored = StoredMask {
+            marks: Marks::all(mask.size(), Provenance::told("Threshold 5.00 mm")),
+            mask,
+            person: "test".into(),
+            saved_unix_s: 1,
+        };
         let store = MaskStore::for_dataset(&dataset).unwrap();
         store.save(&name, lab::RIGHT, Some(&stored)).unwrap();
         MaskStore::in_folder(dir.path().join("other")).save(&name, lab::RIGHT, Some(&stored)).unwrap();

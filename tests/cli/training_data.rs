@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::label::{Marks, Provenance};
 use touch2touch::domain::rig::lab;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::{MaskStore, StoredMask};
@@ -35,7 +36,12 @@ fn a_data_set_and_the_simulator_become_shards_of_one_folder() {
     let size = dataset.load(PairId(0)).unwrap().pad(lab::RIGHT).unwrap().depth().unwrap().imprint.clone();
     let mask = size.map(|&depth| depth > 0.006);
     let count = mask.as_slice().iter().filter(|&&on| on).count();
-    let stored = StoredMask { mask, base: "Threshold 6.00 mm".into(), person: "test".into(), saved_unix_s: 1 };
+    let stored = StoredMask {
+        marks: Marks::all(mask.size(), Provenance::told("Threshold 6.00 mm")),
+        mask,
+        person: "test".into(),
+        saved_unix_s: 1,
+    };
     MaskStore::for_dataset(&dataset).unwrap().save(&names[0], lab::RIGHT, Some(&stored)).unwrap();
     let skipped = run(&["label", set_name, "--pair", &names[3], "--review", "skip"], dir.path());
     assert!(skipped.status.success(), "{}", error_text(&skipped));

@@ -9,6 +9,7 @@ use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{Grid, Mask};
+use touch2touch::domain::label::{self, Marks};
 use touch2touch::domain::moments::Moments;
 use touch2touch::domain::postprocess::{RawPrediction, ShiftFit};
 use touch2touch::domain::rig::lab;
@@ -331,7 +332,12 @@ fn mask_file(dir: &Path) -> PathBuf {
 fn mask_seeds() -> Vec<Seed> {
     let dir = tempfile::tempdir().unwrap();
     let mask = Mask::from_fn(30, 20, |x, y| (x + y) % 3 == 0);
-    let stored = StoredMask { mask, base: "threshold".into(), person: "p".into(), saved_unix_s: 1 };
+    let stored = StoredMask {
+        marks: Marks::all(mask.size(), label::Provenance::told("threshold")),
+        mask,
+        person: "p".into(),
+        saved_unix_s: 1,
+    };
     MaskStore::in_folder(dir.path().to_owned()).save("a", lab::RIGHT, Some(&stored)).unwrap();
     let whole = std::fs::read_to_string(mask_file(dir.path())).unwrap();
     let huge = whole.replace("\"width\":30", "\"width\":4000000000").replace("\"height\":20", "\"height\":4000000000");

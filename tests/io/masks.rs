@@ -8,7 +8,7 @@ use serde_json::Value;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::Mask;
 use touch2touch::domain::hand::{AcceptedPose, HandPose};
-use touch2touch::domain::label::{Patch, paint_stroke};
+use touch2touch::domain::label::{Marks, Provenance, paint_where};
 use touch2touch::domain::rig::lab;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::{FOLDER, MaskStore, StoreError, StoredMask, StoredReview};
@@ -19,7 +19,12 @@ const STORE_VARIABLE: &str = "TOUCH2TOUCH_TEST_STROKES_INTO";
 const PAIR: &str = "pattern_31_rod/data_0";
 
 fn stored(mask: Mask) -> StoredMask {
-    StoredMask { mask, base: "Threshold 5.00 mm".into(), person: "anna".into(), saved_unix_s: 1 }
+    StoredMask {
+        marks: Marks::all(mask.size(), Provenance::told("Threshold 5.00 mm")),
+        mask,
+        person: "anna".into(),
+        saved_unix_s: 1,
+    }
 }
 
 fn entry(number: u32) -> Value {
@@ -39,7 +44,26 @@ fn stroke(number: u32) -> [DVec2; 2] {
 }
 
 fn paint(mask: &mut Mask, number: u32) {
-    paint_stroke(mask, &stroke(number), 3.0, number % 5 != 4);
+    paint_where(mask, stroke(number), 3.0, number % 5 != 4, |_, _| true);
+}
+
+#[test]
+fn a_mask_of_before_provenance_opens_and_says_what_it_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = MaskStore::in_folder(dir.path().to_owned());
+    let old = serde_json::json!({
+        "format": "touch2touch-mask", "version": 1, "pair": PAIR, "finger": "right", "width": 4, "height": 2,
+        "base": "Threshold 5.00 mm", "person": "anna", "saved_unix_s": 7, "contact_px": 3, "runs": [2, 3, 3]
+    });
+    std::fs::write(store.mask_file(PAIR, lab::RIGHT), old.to_string()).unwrap();
+    let read = store.load(PAIR, lab::RIGHT).unwrap().unwrap();
+    assert_eq!(read.mask.as_slice(), [false, false, true, true, true, false, false, false]);
+    assert_eq!(read.marks.layers(), [(&Provenance::told("Threshold 5.00 mm"), 8)]);
+    // Written again, it says where each pixel comes from.
+    store.save(PAIR, lab::RIGHT, Some(&read)).unwrap();
+    assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), Some(read));
+    let text = std::fs::read_to_string(store.mask_file(PAIR, lab::RIGHT)).unwrap();
+    assert!(text.contains("layer_runs") && text.contains("\"version\":2"), "{text}");
 }
 
 #[test]
@@ -53,9 +77,7 @@ fn what_is_saved_is_loaded_and_undo_changes_the_file() {
     store.save(PAIR, lab::RIGHT, Some(&stored(after.clone()))).unwrap();
     assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), Some(stored(after.clone())));
     assert_eq!(store.load(PAIR, lab::LEFT).unwrap(), None);
-    let mut undo = Patch::between(&after, &before).unwrap();
-    undo.swap(&mut after).unwrap();
-    store.save(PAIR, lab::RIGHT, Some(&stored(after))).unwrap();
+    store.save(PAIR, lab::RIGHT, Some(&stored(before.clone()))).unwrap();
     assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), Some(stored(before)));
     // Names that look alike do not share a file.
     for name in ["a/b", "a_b", "A/b", "../x", "ä"] {

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::super::keys::{ImprintSource, Revision};
-use crate::domain::grid::Mask;
-use crate::domain::label::Drawing;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::label::{DrawTool, Drawing, Ground, Provenance};
 use crate::work::error::TaskError;
 pub use crate::work::labels::{HandMask, MaskPlace, PairLabels, Review};
 
@@ -66,12 +66,35 @@ pub struct Stroke {
     pub drawing: Drawing,
     /// The pixels that may change; `None` = all.
     pub(in crate::app) allowed: Option<Mask>,
+    /// What is let through of a proposal.
+    pub(in crate::app) proposed: Option<Arc<Mask>>,
     /// The angle before the stroke, as [`Changed::before`].
     pub(in crate::app) angle: Option<(f64, Option<f64>)>,
     /// The hand mask before the stroke; `None` if there was none.
     pub(in crate::app) before: Option<HandMask>,
-    /// The pixels before the stroke, as large as the imprint.
-    pub(in crate::app) pixels: Arc<Mask>,
+    /// What is drawn on: the mask in force before the stroke.
+    pub(in crate::app) start: HandMask,
+    /// The pixels that were touched.
+    pub(in crate::app) touched: Mask,
+    /// Who draws.
+    pub(in crate::app) by: Provenance,
+}
+
+impl Stroke {
+    /// Draws on the mask: what a brush did since its first `from` points, anything else anew. Whether it touched anything.
+    pub(in crate::app) fn draw_on(&mut self, hand: &mut HandMask, imprint: &DepthMap, from: usize) -> bool {
+        let ground = Ground { imprint, allowed: self.allowed.as_ref(), proposed: self.proposed.as_deref() };
+        let mut undone = false;
+        if !matches!(self.drawing.tool, DrawTool::Brush { .. }) {
+            undone = !hand.is_same(&self.start);
+            *hand = HandMask { revision: hand.revision, ..self.start.clone() };
+            self.touched.as_mut_slice().fill(false);
+        }
+        let Some(rect) = self.drawing.touch(&mut self.touched, ground, from) else { return undone };
+        let (mask, marks) = (Arc::make_mut(&mut hand.mask), Arc::make_mut(&mut hand.marks));
+        marks.paint(mask, (&self.touched, rect), self.drawing.paint, ground.proposed, self.by.clone());
+        true
+    }
 }
 
 impl Document {

@@ -15,6 +15,7 @@ use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, 
 use crate::domain::bits::Bits;
 use crate::domain::contact::{ContactMask, MaskBasis};
 use crate::domain::grid::Mask;
+use crate::domain::label::Provenance;
 use crate::domain::rig::PadId;
 use crate::work::bundles::BundleKind;
 use crate::work::mask::{self, MaskInputs};
@@ -204,13 +205,14 @@ impl State {
         finger: PadId,
     ) -> Result<MaskInForce<'_>, Lookup<'_, Arc<Mask>>> {
         if let Some(hand) = self.hand_mask(source, finger) {
-            let label = if hand.base.is_empty() { "By hand".into() } else { format!("By hand, from {}", hand.base) };
+            let base = hand.base();
+            let label = if base.is_empty() { "By hand".into() } else { format!("By hand, from {base}") };
             return Ok(MaskInForce { mask: &hand.mask, version: MaskVersion::Hand(hand.revision), label });
         }
         let lookup = self.automatic_mask(source, finger);
         match (lookup, self.mask_recipe(finger)) {
             (Lookup::Ready(mask), Ok(recipe)) => {
-                let label = self.automatic_label(source, finger, &recipe);
+                let label = self.automatic_provenance(source, finger, &recipe).text();
                 Ok(MaskInForce { mask, version: MaskVersion::Auto(recipe), label })
             }
             (Lookup::Ready(_), Err(absent)) => Err(Lookup::Absent(absent)),
@@ -222,6 +224,11 @@ impl State {
     fn gate_key(&self, source: ImprintSource, finger: PadId) -> Option<MaskKey> {
         let recipe = MaskRecipe::Cad(self.settings.mask.gate.cad_m?.into());
         Some(MaskKey { imprint: self.imprint_key(source, finger).ok()?, recipe })
+    }
+
+    /// Whether what the gate needs to know of the CAD model is there.
+    pub fn gate_is_known(&self, source: ImprintSource, finger: PadId) -> bool {
+        self.gate_key(source, finger).is_none_or(|key| self.results.masks.get(&key).is_some())
     }
 
     /// The pixels that a hand may change; `None` = all.
@@ -244,21 +251,24 @@ impl State {
         Ok(Some(gate.allowed(imprint, near.map(|near| &*near.mask))))
     }
 
-    /// What an automatic mask that is there is made of, in words.
-    pub fn automatic_label(&self, source: ImprintSource, finger: PadId, recipe: &MaskRecipe) -> String {
-        let label = self.mask_label(recipe);
+    /// Where the pixels of an automatic mask come from.
+    pub fn automatic_provenance(&self, source: ImprintSource, finger: PadId, recipe: &MaskRecipe) -> Provenance {
         let key = self.imprint_key(source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
         let found = key.ok().and_then(|key| self.results.masks.get(&key));
-        found.map_or_else(|| label.clone(), |found| found.basis.label(&label))
+        recipe.provenance(self.model_of(recipe), found.map_or(MaskBasis::Source, |found| found.basis))
     }
 
     /// An automatic source in words, with its number.
     pub fn mask_label(&self, recipe: &MaskRecipe) -> String {
-        let model = match recipe {
+        recipe.label(self.model_of(recipe))
+    }
+
+    /// The name of the mask model that a recipe takes; empty where it takes none.
+    fn model_of(&self, recipe: &MaskRecipe) -> &str {
+        match recipe {
             MaskRecipe::Unet(id, _) => self.library.bundle(id).map_or("", |bundle| &bundle.name),
             _ => "",
-        };
-        recipe.label(model)
+        }
     }
 }
 

@@ -381,6 +381,7 @@ mod tests {
     use crate::domain::frames::PlanarPose;
     use crate::domain::grid::Mask;
     use crate::domain::hand::{AcceptedPose, HandPose};
+    use crate::domain::label::Provenance;
     use crate::domain::rig::lab;
     use crate::io::masks::MaskStore;
     use crate::work::export::{LeftOut, Which};
@@ -399,7 +400,7 @@ mod tests {
         PairLabels {
             masks: [(
                 MaskPlace::measured(lab::RIGHT),
-                HandMask { mask, revision: Revision(3), base: "Threshold 5.00 mm".into() },
+                HandMask { revision: Revision(3), ..HandMask::new(mask, Provenance::Threshold { min_m: 0.005 }) },
             )]
             .into(),
             review: Review::InProgress,
@@ -412,7 +413,7 @@ mod tests {
 
     fn same(a: &PairLabels, b: &PairLabels) -> bool {
         let masks = |l: &PairLabels| {
-            l.masks.iter().map(|(place, h)| (place.clone(), h.mask.clone(), h.base.clone())).collect::<Vec<_>>()
+            l.masks.iter().map(|(place, h)| (place.clone(), h.mask.clone(), h.base())).collect::<Vec<_>>()
         };
         masks(a) == masks(b) && a.review == b.review && a.accepted == b.accepted
     }

@@ -12,7 +12,7 @@ use super::super::action::Bindings;
 use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
-use crate::domain::label::{CleanKind, CleanUp, DrawTool, Gate};
+use crate::domain::label::{CleanKind, CleanUp, DrawTool, Gate, Paint};
 use crate::domain::postprocess::RefitShift;
 use crate::domain::units::clamp_or;
 use crate::infer::engine::EngineChoice;
@@ -381,6 +381,8 @@ pub struct MaskSettings {
     pub tool: MaskTool,
     /// The tool before it.
     pub last_tool: MaskTool,
+    /// What the tools make of pixels; the eraser frees them.
+    pub paint: Paint,
     /// Radius of brush and eraser, image pixels.
     pub radius_px: f32,
     /// By how much the depth may differ that the wand takes, meters.
@@ -401,6 +403,7 @@ impl Default for MaskSettings {
         Self {
             tool: MaskTool::Brush,
             last_tool: MaskTool::Eraser,
+            paint: Paint::Contact,
             radius_px: 4.0,
             wand_m: 0.0005,
             clean_mm: 1.0,
@@ -412,16 +415,16 @@ impl Default for MaskSettings {
 }
 
 impl MaskSettings {
-    /// What the tool in hand draws with, and whether it adds; `None` where it draws nothing.
-    pub fn drawing(&self) -> Option<(DrawTool, bool)> {
+    /// What the tool in hand draws with, and what it makes of the pixels; `None` where it draws nothing.
+    pub fn drawing(&self) -> Option<(DrawTool, Paint)> {
         let brush = DrawTool::Brush { radius_px: self.radius_px };
         Some(match self.tool {
-            MaskTool::Brush => (brush, true),
-            MaskTool::Eraser => (brush, false),
-            MaskTool::Lasso => (DrawTool::Lasso, true),
-            MaskTool::Polygon => (DrawTool::Polygon, true),
-            MaskTool::Rectangle => (DrawTool::Rectangle, true),
-            MaskTool::Wand => (DrawTool::Wand { tolerance_m: self.wand_m }, true),
+            MaskTool::Brush => (brush, self.paint),
+            MaskTool::Eraser => (brush, Paint::Free),
+            MaskTool::Lasso => (DrawTool::Lasso, self.paint),
+            MaskTool::Polygon => (DrawTool::Polygon, self.paint),
+            MaskTool::Rectangle => (DrawTool::Rectangle, self.paint),
+            MaskTool::Wand => (DrawTool::Wand { tolerance_m: self.wand_m }, self.paint),
             MaskTool::Pan => return None,
         })
     }

@@ -3,7 +3,10 @@
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
+use strum::{EnumIter, EnumString, IntoStaticStr};
 
+use super::marks::Marks;
+use super::provenance::Provenance;
 use super::{Rect, paint_where, region};
 use crate::domain::grid::{DepthMap, Mask};
 
@@ -30,6 +33,53 @@ pub enum DrawTool {
     },
 }
 
+/// What a drawing makes of the pixels it touches.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    EnumIter,
+    EnumString,
+    IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum Paint {
+    /// Contact.
+    #[default]
+    Contact,
+    /// Free of contact.
+    Free,
+    /// Neither: a network does not learn from them, and no score counts them.
+    Ignore,
+    /// What the proposal says that is shown over the mask.
+    LetThrough,
+}
+
+impl Paint {
+    /// The name in files and on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
+    /// What the other button of the pointer makes of them.
+    #[must_use]
+    pub fn reversed(self) -> Self {
+        match self {
+            Self::Contact => Self::Free,
+            Self::Free | Self::Ignore | Self::LetThrough => Self::Contact,
+        }
+    }
+}
+
 /// Pixels of dragging that double or halve the tolerance of the wand.
 const DOUBLES_PX: f32 = 24.0;
 
@@ -41,8 +91,9 @@ pub struct Drawing {
     pub tool: DrawTool,
     /// The pointer's way or the corners, image pixels: `(0, 0)` is the center of the first one.
     pub points: Vec<[f32; 2]>,
-    /// Whether it adds to the contact or removes from it.
-    pub add: bool,
+    /// What it makes of the pixels.
+    #[serde(default)]
+    pub paint: Paint,
 }
 
 /// What a drawing falls on.
@@ -52,14 +103,23 @@ pub struct Ground<'a> {
     pub imprint: &'a DepthMap,
     /// The pixels that may change; `None` = all.
     pub allowed: Option<&'a Mask>,
+    /// What [`Paint::LetThrough`] lets through.
+    pub proposed: Option<&'a Mask>,
+}
+
+impl<'a> Ground<'a> {
+    /// An imprint that may be drawn on everywhere.
+    pub fn new(imprint: &'a DepthMap) -> Self {
+        Self { imprint, allowed: None, proposed: None }
+    }
 }
 
 impl Drawing {
     /// A drawing that begins at a point.
-    pub fn begin(tool: DrawTool, at_px: [f32; 2], add: bool) -> Self {
+    pub fn begin(tool: DrawTool, at_px: [f32; 2], paint: Paint) -> Self {
         // A corner that follows the pointer until it is set.
         let points = if tool == DrawTool::Polygon { vec![at_px; 2] } else { vec![at_px] };
-        Self { tool, points, add }
+        Self { tool, points, paint }
     }
 
     /// Whether it is made of clicks, and not of one drag.
@@ -97,9 +157,9 @@ impl Drawing {
         Some(tolerance_m * ((last[0] - first[0]) / DOUBLES_PX).clamp(-6.0, 6.0).exp2())
     }
 
-    /// Changes the pixels; returns the rectangle that holds all changes, `None` where there are none. Of a brush only
-    /// what comes after the first `from` points: 0 draws all of it.
-    pub fn apply(&self, mask: &mut Mask, ground: Ground<'_>, from: usize) -> Option<Rect> {
+    /// Marks the pixels that it touches in `touched`; returns the rectangle that holds those not marked before, `None`
+    /// where there are none. Of a brush only what comes after the first `from` points: 0 draws all of it.
+    pub fn touch(&self, touched: &mut Mask, ground: Ground<'_>, from: usize) -> Option<Rect> {
         let allowed = |x, y| ground.allowed.is_none_or(|allowed| allowed.get(x, y) == Some(&true));
         let finite = |p: &&[f32; 2]| p.iter().all(|v| v.is_finite());
         let points: Vec<DVec2> =
@@ -109,7 +169,7 @@ impl Drawing {
             let ways = points.windows(2).skip(from.saturating_sub(1)).map(|w| [w[0], w[1]]);
             let first = points.first().filter(|_| from == 0).map(|&p| [p, p]);
             for way in first.into_iter().chain(ways) {
-                let rect = paint_where(mask, way, radius_px.into(), self.add, allowed);
+                let rect = paint_where(touched, way, radius_px.into(), true, allowed);
                 changed = match (changed, rect) {
                     (Some(a), Some(b)) => Some(a.union(b)),
                     (a, b) => a.or(b),
@@ -119,21 +179,29 @@ impl Drawing {
         }
         let (first, last) = (*points.first()?, *points.last()?);
         let region = match self.tool {
-            DrawTool::Rectangle => region::rectangle(mask.size(), first, last),
+            DrawTool::Rectangle => region::rectangle(touched.size(), first, last),
             DrawTool::Wand { .. } => region::about_as_deep(ground.imprint, first, self.tolerance_m()?.into()),
-            _ => region::enclosed(mask.size(), &points),
+            _ => region::enclosed(touched.size(), &points),
         };
         let mut changed: Option<Rect> = None;
-        for y in 0..mask.height() {
-            for x in 0..mask.width() {
-                if region.get(x, y) == Some(&true) && mask[(x, y)] != self.add && allowed(x, y) {
-                    mask[(x, y)] = self.add;
+        for y in 0..touched.height() {
+            for x in 0..touched.width() {
+                if region.get(x, y) == Some(&true) && !touched[(x, y)] && allowed(x, y) {
+                    touched[(x, y)] = true;
                     let pixel = Rect { x, y, width: 1, height: 1 };
                     changed = Some(changed.map_or(pixel, |r| r.union(pixel)));
                 }
             }
         }
         changed
+    }
+
+    /// Draws all of it on a mask and its marks, as the person `by`.
+    pub fn apply(&self, mask: &mut Mask, marks: &mut Marks, ground: Ground<'_>, by: Provenance) -> Option<Rect> {
+        let mut touched = Mask::filled(mask.width(), mask.height(), false);
+        let rect = self.touch(&mut touched, ground, 0)?;
+        marks.paint(mask, (&touched, rect), self.paint, ground.proposed, by);
+        Some(rect)
     }
 }
 
@@ -152,8 +220,16 @@ mod tests {
     }
 
     fn drawn(tool: DrawTool, points: &[[f32; 2]], add: bool, mask: &mut Mask) -> Option<Rect> {
-        let imprint = imprint();
-        Drawing { tool, points: points.to_vec(), add }.apply(mask, Ground { imprint: &imprint, allowed: None }, 0)
+        let (imprint, before) = (imprint(), mask.clone());
+        let paint = if add { Paint::Contact } else { Paint::Free };
+        let mut marks = Marks::all(mask.size(), Provenance::Nothing);
+        let ground = Ground::new(&imprint);
+        let rect =
+            Drawing { tool, points: points.to_vec(), paint }.apply(mask, &mut marks, ground, Provenance::hand(""))?;
+        let hand = marks.hand_checked();
+        let kept = |i: usize| hand.as_slice()[i] || mask.as_slice()[i] == before.as_slice()[i];
+        assert!((0..mask.len()).all(kept), "what was not painted stays");
+        Some(rect)
     }
 
     fn count(mask: &Mask) -> usize {
@@ -163,18 +239,18 @@ mod tests {
     #[test]
     fn a_brush_drawn_piece_by_piece_is_the_brush_drawn_at_once() {
         let imprint = imprint();
-        let ground = Ground { imprint: &imprint, allowed: None };
-        let mut drawing = Drawing::begin(DrawTool::Brush { radius_px: 2.5 }, [3.0, 3.0], true);
+        let ground = Ground::new(&imprint);
+        let mut drawing = Drawing::begin(DrawTool::Brush { radius_px: 2.5 }, [3.0, 3.0], Paint::Contact);
         let mut pieces = Mask::filled(40, 20, false);
-        drawing.apply(&mut pieces, ground, 0);
+        drawing.touch(&mut pieces, ground, 0);
         for to in [[9.0, 12.0], [f32::NAN, 0.0], [30.0, 2.0], [38.0, 19.0]] {
             let before = drawing.points.len();
             drawing.move_to(to);
-            drawing.apply(&mut pieces, ground, before);
+            drawing.touch(&mut pieces, ground, before);
         }
         let mut once = Mask::filled(40, 20, false);
-        drawing.apply(&mut once, ground, 0);
-        assert_eq!(once, pieces);
+        drawing.touch(&mut once, ground, 0);
+        assert!(once == pieces);
         assert!(count(&once) > 100);
     }
 
@@ -192,7 +268,8 @@ mod tests {
         assert!(count(&mask) > before);
         assert_eq!(drawn(DrawTool::Lasso, &[[1.0, 1.0]], true, &mut mask), None, "nothing is enclosed");
         assert_eq!(drawn(DrawTool::Rectangle, &[[f32::NAN, 1.0]], true, &mut mask), None);
-        assert_eq!(drawn(DrawTool::Rectangle, &[[-9e9, -9e9], [9e9, 9e9]], false, &mut mask).map(|r| r.width), Some(8));
+        let all = drawn(DrawTool::Rectangle, &[[-9e9, -9e9], [9e9, 9e9]], false, &mut mask);
+        assert_eq!((all.map(|r| r.width), count(&mask)), (Some(40), 0));
     }
 
     #[test]
@@ -211,17 +288,18 @@ mod tests {
     fn a_gate_holds_for_every_tool() {
         let imprint = imprint();
         let allowed = imprint.map(|&depth| depth > 0.01);
-        let ground = Ground { imprint: &imprint, allowed: Some(&allowed) };
+        let ground = Ground { allowed: Some(&allowed), ..Ground::new(&imprint) };
         for tool in [DrawTool::Brush { radius_px: 90.0 }, DrawTool::Rectangle, DrawTool::Wand { tolerance_m: 1.0 }] {
             let mut mask = Mask::filled(40, 20, false);
-            Drawing { tool, points: vec![[0.0, 0.0], [39.0, 19.0]], add: true }.apply(&mut mask, ground, 0);
-            assert_eq!(mask, allowed, "{tool:?}");
+            let drawing = Drawing { tool, points: vec![[0.0, 0.0], [39.0, 19.0]], paint: Paint::Contact };
+            drawing.touch(&mut mask, ground, 0);
+            assert!(mask == allowed, "{tool:?}");
         }
     }
 
     #[test]
     fn corners_follow_the_pointer_until_they_are_set_and_drawings_are_stored() {
-        let mut drawing = Drawing::begin(DrawTool::Polygon, [2.0, 2.0], true);
+        let mut drawing = Drawing::begin(DrawTool::Polygon, [2.0, 2.0], Paint::Ignore);
         drawing.move_to([9.0, 2.0]);
         drawing.corner([10.0, 2.0]);
         drawing.move_to([10.0, 8.0]);

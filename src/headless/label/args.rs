@@ -64,9 +64,9 @@ pub(in super::super) struct LabelArgs {
     /// `open=MM`, `close=MM`, `smooth=MM`, `grow=MM`, `shrink=MM`. Several are done in turn.
     #[arg(long, value_name = "WHAT[=MM]", requires = "pair", conflicts_with = "remove_mask", value_parser = parse_clean_up)]
     pub(super) clean: Vec<CleanUp>,
-    /// Draw on the mask: `{"tool": "lasso", "add": true, "points": [[X, Y], ...]}` in image pixels; tools are `brush`
-    /// (`radius_px`), `lasso`, `polygon`, `rectangle` and `wand` (`tolerance_m`). Several are done in turn, before
-    /// clean-ups.
+    /// Draw on the mask: `{"tool": "lasso", "paint": "contact", "points": [[X, Y], ...]}` in image pixels; tools are
+    /// `brush` (`radius_px`), `lasso`, `polygon`, `rectangle` and `wand` (`tolerance_m`), they paint `contact`, `free` or
+    /// `ignore`. Several are done in turn, before clean-ups.
     #[arg(long, value_name = "JSON", requires = "pair", conflicts_with = "remove_mask", value_parser = parse_drawing)]
     pub(super) draw: Vec<Drawing>,
     /// Remove the corrected mask: the automatic source is in force again.

@@ -4,12 +4,12 @@ use eframe::egui::{
     Align2, Color32, CursorIcon, Event, FontId, Key, PointerButton, Pos2, Stroke, TextureId, Ui, Vec2, vec2,
 };
 
-use super::{CONTACT, Memory};
+use super::{CONTACT, IGNORED, Memory};
 use crate::app::command::{LabelsCommand, SettingsCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, MaskVersion};
 use crate::app::pane::Pane;
 use crate::app::settings::MaskTool;
-use crate::domain::label::DrawTool;
+use crate::domain::label::{DrawTool, Paint};
 use crate::domain::rig::PadId;
 use crate::ui::cx::Cx;
 use crate::ui::widget::brush_cursor;
@@ -39,12 +39,21 @@ pub(super) fn mask(
         let texture: TextureId = picture.texture.id();
         output.paint(texture, CONTACT.gamma_multiply(settings.mask_opacity));
     }
-    if !settings.mask.gate.is_open()
-        && cx.state.selection.panes.contains(&Pane::Masks)
-        && let Ok(Some(allowed)) = cx.state.allowed(source, finger)
-    {
-        let key = (serde_json::to_string(&settings.mask.gate).unwrap_or_default(), key.1.clone());
-        let segments = memory.outlines.get(&("gate", source, finger), &key, || outline(&allowed));
+    if let Some(ignored) = cx.state.hand_mask(source, finger).and_then(|hand| hand.marks.ignored()) {
+        let slot = ("ignored", source, finger);
+        let veil = || (mask_image(ignored, Color32::WHITE), None);
+        let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, veil);
+        output.paint(picture.texture.id(), IGNORED.gamma_multiply(settings.mask_opacity));
+        let segments = memory.outlines.get(&("ignored", source, finger), &key, || outline(ignored));
+        output.segments(segments, IGNORED, 1.25);
+    }
+    if !settings.mask.gate.is_open() && cx.state.selection.panes.contains(&Pane::Masks) {
+        let gate = serde_json::to_string(&settings.mask.gate).unwrap_or_default();
+        let key = (gate, key.1.clone(), cx.state.gate_is_known(source, finger));
+        let allowed = || cx.state.allowed(source, finger).ok().flatten();
+        let segments = memory
+            .outlines
+            .get(&("gate", source, finger), &key, || allowed().map(|allowed| outline(&allowed)).unwrap_or_default());
         output.segments(segments, Color32::from_gray(190), 1.0);
     }
     let mask = in_force.mask;
@@ -144,7 +153,11 @@ fn way(cx: &Cx<'_>, output: &CanvasOutput, (source, finger): (ImprintSource, Pad
     let drawn = cx.state.document.stroke.as_ref().filter(|s| s.source == source && s.place.pad == finger);
     let Some(drawing) = drawn.map(|stroke| &stroke.drawing) else { return };
     let at = |p: &[f32; 2]| output.map.to_screen(*p);
-    let color = if drawing.add { Color32::WHITE } else { Color32::from_rgb(255, 120, 90) };
+    let color = match drawing.paint {
+        Paint::Contact | Paint::LetThrough => Color32::WHITE,
+        Paint::Free => Color32::from_rgb(255, 120, 90),
+        Paint::Ignore => IGNORED,
+    };
     let mut line: Vec<Pos2> = match (drawing.tool, drawing.points.as_slice()) {
         (DrawTool::Lasso | DrawTool::Polygon, points) => points.iter().map(at).collect(),
         (DrawTool::Rectangle, [a, .., b]) => [*a, [b[0], a[1]], *b, [a[0], b[1]]].iter().map(at).collect(),

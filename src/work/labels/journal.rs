@@ -3,14 +3,12 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use super::{HandMask, ImprintOf, MaskPlace, PairLabels, Review, Revision};
-use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{decode_runs, encode_runs};
+use crate::domain::label::PackedMask;
 use crate::domain::rig::Rig;
 
 /// What kind of act changed the labels.
@@ -61,7 +59,7 @@ pub struct Change {
 fn same(a: Option<&HandMask>, b: Option<&HandMask>) -> bool {
     match (a, b) {
         (None, None) => true,
-        (Some(a), Some(b)) => a.mask == b.mask && a.base == b.base,
+        (Some(a), Some(b)) => a.is_same(b),
         _ => false,
     }
 }
@@ -123,32 +121,13 @@ pub struct Past {
     pub change: Change,
 }
 
-/// A mask in a line.
-#[derive(Serialize, Deserialize)]
-struct Pixels {
-    size: [usize; 2],
-    runs: Vec<u32>,
-    base: String,
-}
-
-impl Pixels {
-    fn of(hand: &HandMask) -> Self {
-        Self { size: hand.mask.size(), runs: encode_runs(&hand.mask), base: hand.base.clone() }
-    }
-
-    fn hand(self) -> Option<HandMask> {
-        let mask: Mask = decode_runs(self.size[0], self.size[1], &self.runs).ok()?;
-        Some(HandMask { mask: Arc::new(mask), revision: Revision::default(), base: self.base })
-    }
-}
-
 /// A mask that changed.
 #[derive(Serialize, Deserialize)]
 struct MaskLine {
     finger: String,
     of: ImprintOf,
-    before: Option<Pixels>,
-    after: Option<Pixels>,
+    before: Option<PackedMask>,
+    after: Option<PackedMask>,
 }
 
 /// A line of the journal.
@@ -173,8 +152,8 @@ impl Line {
         let mask = |(place, [before, after]): (&MaskPlace, &[Option<HandMask>; 2])| MaskLine {
             finger: rig.pad_key(place.pad).into_owned(),
             of: place.of.clone(),
-            before: before.as_ref().map(Pixels::of),
-            after: after.as_ref().map(Pixels::of),
+            before: before.as_ref().map(HandMask::pack),
+            after: after.as_ref().map(HandMask::pack),
         };
         Self {
             unix_s,
@@ -195,7 +174,7 @@ impl Line {
             let pad = rig.pads().find(|pad| rig.pad_key(*pad) == line.finger)?;
             let mut pair = [None, None];
             for (hand, pixels) in pair.iter_mut().zip([line.before, line.after]) {
-                *hand = pixels.map(|pixels| pixels.hand().ok_or(())).transpose().ok()?;
+                *hand = pixels.map(|pixels| HandMask::unpack(&pixels, Revision::default())).transpose().ok()?;
             }
             masks.insert(MaskPlace { pad, of: line.of }, pair);
         }
