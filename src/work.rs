@@ -34,6 +34,7 @@ pub mod models;
 pub mod pair_files;
 pub mod pose;
 pub mod prediction;
+pub mod propose;
 pub mod statistics;
 pub mod subject;
 pub mod sweep;

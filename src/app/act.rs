@@ -15,7 +15,7 @@ use super::labels::state::Review;
 use super::library::state::Place;
 use super::settings::state::scene::{LayerLook, SceneLayer, SceneLook};
 use super::settings::state::versus::{Versus, VersusMode};
-use super::settings::state::{ColorRange, MaskTool, Theme, Workspace};
+use super::settings::state::{ColorRange, MaskSettings, MaskTool, Theme, Workspace};
 use super::state::{Absent, State};
 use super::workbench::state::{Layer, SceneTool, Section};
 use crate::domain::hand::HandAxis;
@@ -101,6 +101,8 @@ impl Action {
             Self::CancelJobs => {
                 if state.document.stroke.is_some() {
                     does(LabelsCommand::CancelStroke)
+                } else if state.proposes() {
+                    does(ViewCommand::Propose(false))
                 } else if let Some(command) = escape(state) {
                     does(command)
                 } else if state.tasks.demanded.iter().any(|r| matches!(r, Request::Basin(_))) {
@@ -134,6 +136,16 @@ impl Action {
             Self::PaintIgnore => {
                 let on = settings.mask.paint == Paint::Ignore;
                 does(SettingsCommand::SetPaint(if on { Paint::Contact } else { Paint::Ignore }))
+            }
+            Self::Propose => when(selected, ViewCommand::Propose(!state.selection.proposing)),
+            Self::NextProposal => {
+                let next = next_of(&settings.mask.proposal).unwrap_or_default();
+                does(SettingsCommand::SetMask(MaskSettings { proposal: next, ..settings.mask.clone() }))
+            }
+            Self::LetThrough => {
+                let on = settings.mask.paint == Paint::LetThrough;
+                let paint = if on { Paint::Contact } else { Paint::LetThrough };
+                when(on || state.proposes(), SettingsCommand::SetPaint(paint))
             }
             Self::LastTool => does(SettingsCommand::LastMaskTool),
             Self::BrushSmaller => does(SettingsCommand::SetBrushRadius(settings.mask.radius_px / BRUSH_STEP)),
@@ -183,7 +195,8 @@ impl Action {
             Self::TurnLeft => nudge(state, HandAxis::Theta, -1.0),
             Self::TurnRight => nudge(state, HandAxis::Theta, 1.0),
             Self::IcpFromHere => when(in_hand(state), WorkbenchCommand::StartIcp),
-            Self::AcceptHand => when(editable && state.workbench.hand.is_some(), WorkbenchCommand::AcceptHand),
+            Self::Accept if state.proposes() => when(editable, LabelsCommand::AcceptProposal),
+            Self::Accept => when(editable && state.workbench.hand.is_some(), WorkbenchCommand::AcceptHand),
             Self::RevertHand => when(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand),
             Self::StepBack => inspect(state, |s| s.at > 0, InspectCommand::By(-1)),
             Self::StepForward => inspect(state, |s| !s.is_last(), InspectCommand::By(1)),

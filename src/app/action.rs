@@ -119,7 +119,7 @@ actions! {
     PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [];
     TurnDial, Generate, "Turn the dial", "Poses many pairs with every value of the chosen dial (mask threshold, probability, gate, trim, shift)", [];
     ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [];
-    CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke", [plain(K::Escape)];
+    CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke, rejects a proposal", [plain(K::Escape)];
     NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)];
     Refit, Generate, "Refit on this data set", "Computes shift statistics of this data set's predictions and measurements, and uses them", [];
 
@@ -144,6 +144,9 @@ actions! {
     ShrinkMask, Mask, "Shrink the mask", "Removes what lies within the clean-up size of the outside", [];
     ClearBorder, Mask, "Clear the border", "Removes islands that touch the edge of the image", [];
     AdoptAutomatic, Mask, "Threshold to mask", "Makes the mask of the chosen automatic source the corrected one", [plain(K::T)];
+    Propose, Mask, "Propose a mask", "Shows the mask of the chosen source over the one in force, to accept or to let through by brush; nothing changes before", [plain(K::G)];
+    NextProposal, Mask, "Next proposal source", "Goes through what proposes masks: the automatic source, CAD distance, strokes, other masks", [shift(K::G)];
+    LetThrough, Mask, "Let the proposal through", "Tools let what is proposed through where they paint, or paint contact again", [shift(K::L)];
     TakeOver, Mask, "Take the other imprint's mask", "Copies the mask of the measured imprint to the predicted one, or the other way round; each keeps its own", [];
     ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)];
     Undo, Mask, "Undo", "Takes back the last change of what is on screen", [ctrl(K::Z)];
@@ -169,7 +172,7 @@ actions! {
     TurnLeft, Pose, "Turn -", "Turns the tool by -0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt(K::ArrowLeft), alt_shift(K::ArrowLeft), ctrl_shift(K::ArrowLeft)];
     TurnRight, Pose, "Turn +", "Turns the tool by 0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt(K::ArrowRight), alt_shift(K::ArrowRight), ctrl_shift(K::ArrowRight)];
     IcpFromHere, Pose, "Start ICP from here", "Registers from the pose set by hand, with the chosen registration", [shift(K::Z)];
-    AcceptHand, Pose, "Accept the pose by hand", "Stores the pose set by hand with the pair", [plain(K::Enter)];
+    Accept, Pose, "Accept", "Makes the proposal that is shown the mask, or stores the pose set by hand with the pair", [plain(K::Enter)];
     RevertHand, Pose, "Revert the pose by hand", "Gives the pose set by hand up", [];
     MeasureDistance, Pose, "Measure distance", "Measures between two points clicked in 3D", [plain(K::Y)];
     MeasureAngle, Pose, "Measure angle", "Measures the angle at the second of three points clicked in 3D", [shift(K::Y)];
@@ -254,6 +257,8 @@ impl Action {
             Self::Refit => "statistics mean deviation shift",
             Self::AdoptAutomatic => "use copy automatic mask",
             Self::PaintIgnore => "unknown unsure void class",
+            Self::Propose | Self::NextProposal => "prelabel pre-label suggest auto cad",
+            Self::Accept => "confirm take yes",
             Self::TakeOver => "copy mask across measured predicted",
             Self::ResetMask => "clear delete mask",
             Self::Undo => "revert back",

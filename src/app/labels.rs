@@ -18,6 +18,7 @@ use crate::domain::label::{CleanUp, DrawTool, Drawing, Paint, Provenance};
 use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
 use crate::work::labels::{Act, Deed, system_person};
+use crate::work::propose::accepted;
 
 /// What can happen to the document.
 #[derive(Clone, Debug)]
@@ -47,6 +48,8 @@ pub enum LabelsCommand {
     AdoptAutomatic,
     /// Makes a copy of the other imprint's mask the corrected one.
     TakeOver,
+    /// Makes the proposal that is shown the corrected mask; what was painted by hand stays, unless the preferences say.
+    AcceptProposal,
     /// Removes the corrected mask: the automatic source is in force again.
     ResetMask,
     /// Takes back the last change of what is on screen.
@@ -75,6 +78,7 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         }
         LabelsCommand::AdoptAutomatic => adopt_automatic(state, effects),
         LabelsCommand::TakeOver => take_over(state, effects),
+        LabelsCommand::AcceptProposal => accept_proposal(state, effects),
         LabelsCommand::ResetMask => reset(state, effects),
         LabelsCommand::Undo => undo(state, effects),
         LabelsCommand::Redo => redo(state, effects),
@@ -160,6 +164,11 @@ fn begin_stroke(
         Err(why) => return state.log.error(&TaskError::new("Paint within limits", why)),
     };
     let Some(place) = state.mask_place(source, finger) else { return };
+    let proposed = state.shown_proposal(source, finger).cloned();
+    if paint == Paint::LetThrough && proposed.is_none() {
+        let err = TaskError::new("Let the proposal through", "no proposal is shown here");
+        return state.log.error(&err.with_hint("Propose a mask first, or paint contact."));
+    }
     state.selection.imprint = source;
     let pair = state.pair_name().to_owned();
     start.revision = state.document.next_revision();
@@ -169,7 +178,7 @@ fn begin_stroke(
     let [width, height] = start.mask.size();
     let touched = Mask::filled(width, height, false);
     let (angle, by) = (angle(state, source), Provenance::hand(state.person()));
-    let stroke = Stroke { pair, place, source, drawing, allowed, proposed: None, angle, before, start, touched, by };
+    let stroke = Stroke { pair, place, source, drawing, allowed, proposed, angle, before, start, touched, by };
     state.document.stroke = Some(stroke);
     redraw(state, 0);
 }
@@ -303,6 +312,43 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
         }
         (Lookup::Absent(absent), _) | (_, Err(absent)) => state.log.error(&TaskError::new(WHAT, absent.text())),
         _ => state.log.error(&TaskError::new(WHAT, "it is still being computed").with_hint("Try again.")),
+    }
+}
+
+/// Makes the proposal on screen the mask. It is looked at no more: with the mask what it was made of may have changed.
+fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
+    const WHAT: &str = "Accept the proposal";
+    end_stroke(state, effects);
+    if !state.proposes() || !check_editable(state, WHAT) {
+        return;
+    }
+    let finger = state.selection.finger;
+    let source = state.worked_on(finger);
+    let (Some(start), Some(place)) = (start_from(state, source, finger), state.mask_place(source, finger)) else {
+        return state.log.error(&TaskError::new(WHAT, "there is no mask to work on yet"));
+    };
+    let proposal = match state.proposal(source, finger) {
+        Lookup::Ready(proposal) => proposal.clone(),
+        Lookup::Failed(err) => {
+            let err = err.clone();
+            return state.log.error(&err);
+        }
+        Lookup::Absent(absent) => return state.log.error(&TaskError::new(WHAT, absent.text())),
+        Lookup::Waiting | Lookup::Stale(_) => {
+            let err = TaskError::new(WHAT, "it is still being computed").with_hint("Try again.");
+            return state.log.error(&err);
+        }
+    };
+    state.selection.proposing = false;
+    let was_hand = state.hand_mask(source, finger).is_some();
+    match accepted(&start, &proposal, state.settings.mask.over_hand) {
+        None if was_hand => state.log.info(format!("{WHAT}: the mask is so already")),
+        accepted => {
+            let hand = accepted.unwrap_or_else(|| HandMask::new(start.mask.clone(), proposal.provenance.clone()));
+            let how = serde_json::to_value(&proposal.provenance).ok();
+            let deed = Deed { how, ..Deed::named("proposal accepted") };
+            set_hand_mask(state, deed, place, Some(hand), effects);
+        }
     }
 }
 

@@ -33,6 +33,7 @@ pub mod picture;
 pub mod pose;
 pub mod prediction;
 pub mod preview;
+pub mod proposal;
 pub mod run;
 pub mod sample;
 pub mod scores;
@@ -253,6 +254,10 @@ results! {
     Mask(mask::MaskKey) in masks, 32 * MIB;
     /// What an export of masks would write where.
     MaskPlan(mask_plan::MaskPlanKey) in mask_plans, MIB;
+    /// The distances of an imprint's points from the CAD model.
+    Distances(proposal::DistancesKey) in distances, 32 * MIB;
+    /// A mask that is proposed.
+    Proposal(proposal::ProposalKey) in proposals, 16 * MIB;
     /// A cloud.
     Cloud(cloud::CloudKey) in clouds, 128 * MIB;
     /// A pose.

@@ -6,7 +6,7 @@ pub use state::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
 pub use state::versus::{Versus, VersusMode};
 pub use state::{
     BRUSH_RADIUS_PX, CLEAN_MM, ColorMap, ColorRange, GenerateSettings, Last, MAX_CACHE_MIB, MAX_RECENT, MaskChoice,
-    MaskSettings, MaskSource, MaskTool, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
+    MaskSettings, MaskSource, MaskTool, ProposalSource, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
 };
 
 use super::action::{Action, Shortcut};

@@ -244,6 +244,12 @@ pub enum Absent {
     NoClassifier,
     /// The mask has too few contact points.
     NoContact,
+    /// No pose was set by hand.
+    NoHandPose,
+    /// Nothing was painted by hand on the mask.
+    NoStrokes,
+    /// Nobody worked on another pair of the tool.
+    NoOtherMask,
 }
 
 impl Absent {
@@ -269,6 +275,11 @@ impl Absent {
             Self::NoSuchGenerator => "The model that was chosen here is not there any more: choose another.",
             Self::NoClassifier => "No tool classifier was found.",
             Self::NoContact => "The mask has too few contact points for a pose.",
+            Self::NoHandPose => "No pose was set by hand: move the tool with the pose tool first.",
+            Self::NoStrokes => {
+                "Nothing to grow from: paint a short stroke of contact, and with the right button one that is free."
+            }
+            Self::NoOtherMask => "Nobody worked on another pair of this tool yet.",
         }
     }
 }

@@ -22,6 +22,8 @@ pub enum ViewCommand {
     SelectFinger(PadId),
     /// Makes an imprint the one whose mask clean-ups work on.
     SelectImprint(ImprintSource),
+    /// Shows a proposal over the mask, or no longer: nothing else changes.
+    Propose(bool),
     /// Shows both fingers, or only the active one.
     ShowBothFingers(bool),
     /// The pixel under the pointer, shared by all images.
@@ -51,6 +53,10 @@ pub(super) fn step(state: &mut State, command: ViewCommand, effects: &mut Vec<Ef
         ViewCommand::SelectImprint(source) => {
             labels::end_stroke(state, effects);
             state.selection.imprint = source;
+        }
+        ViewCommand::Propose(shown) => {
+            labels::end_stroke(state, effects);
+            state.selection.proposing = shown;
         }
         ViewCommand::ShowBothFingers(both) => {
             labels::end_stroke(state, effects);

@@ -35,6 +35,7 @@ impl State {
         let both = self.workbench.both_clouds && self.needs(Need::Scene(other));
         let scene = layers || both || self.needs(Need::Scene(source)) || self.needs(Need::Poses);
         let inspected = self.inspect.source == source && (self.needs(Need::Steps) || self.needs(Need::Basin));
+        let scene = scene || self.proposes_at_pose(source);
         (scene, scene || inspected)
     }
 }
@@ -116,6 +117,7 @@ impl Wanted<'_> {
                 self.basin();
             }
         }
+        self.proposal();
         self.predictions_ahead();
         if state.needs(Need::Ledger) {
             self.ledger(pair.finger(state.selection.finger));

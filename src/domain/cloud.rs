@@ -121,7 +121,7 @@ pub(super) fn check(imprint: &DepthMap, camera: &DepthCamera) -> Result<(), Clou
     Ok(())
 }
 
-fn same_size(what: &'static str, size: [usize; 2], imprint: &DepthMap) -> Result<(), CloudError> {
+pub(super) fn same_size(what: &'static str, size: [usize; 2], imprint: &DepthMap) -> Result<(), CloudError> {
     if size == imprint.size() { Ok(()) } else { Err(CloudError::Size { what, size, imprint: imprint.size() }) }
 }
 

@@ -1,6 +1,9 @@
 //! Contact masks from depth (threshold, top percent) and from the CAD model at a known pose, and the mask
 //! network's input image. Masks drawn by hand and by the network come from elsewhere.
 
+use glam::DAffine3;
+use rayon::prelude::*;
+
 use super::cloud::{self, CloudError};
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Grid, Mask};
@@ -49,12 +52,29 @@ pub fn cad_signed_distance(
     object_from_grasp: PlanarPose,
     max_m: f64,
 ) -> Result<Mask, CloudError> {
+    Ok(signed_distances(imprint, camera, tool, object_from_grasp.to_affine(), max_m)?.map(|d| *d <= max_m))
+}
+
+/// The signed distance of each pixel's point to the CAD model at the given pose, meters, negative inside: those at most
+/// `limit_m` away, the others are infinitely far. NaN for pixels without a usable depth.
+///
+/// # Errors
+/// As [`cad_signed_distance`], which is a threshold of it.
+pub fn signed_distances(
+    imprint: &DepthMap,
+    camera: &DepthCamera,
+    tool: &MeshDistance,
+    object_from_grasp: DAffine3,
+    limit_m: f64,
+) -> Result<Grid<f64>, CloudError> {
     cloud::check(imprint, camera)?;
-    let object_from_grasp = object_from_grasp.to_affine();
-    Ok(Mask::from_fn(imprint.width(), imprint.height(), |x, y| {
-        cloud::lift_pixel(imprint, camera, x, y)
-            .is_some_and(|p| tool.within(object_from_grasp.transform_point3(p), max_m))
-    }))
+    let (width, height) = (imprint.width(), imprint.height());
+    let pixel = |i: usize| {
+        let point = cloud::lift_pixel(imprint, camera, i % width, i / width);
+        point.map_or(f64::NAN, |p| tool.signed_within(object_from_grasp.transform_point3(p), limit_m))
+    };
+    let distances: Vec<f64> = (0..imprint.len()).into_par_iter().with_min_len(512).map(pixel).collect();
+    Ok(Grid::from_vec(width, height, distances).unwrap_or_else(|_| Grid::filled(width, height, f64::NAN)))
 }
 
 /// Side of the squares whose medians [`rise`] compares, as a share of the imprint's width: 7 px of 175.

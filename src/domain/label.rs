@@ -3,9 +3,11 @@
 //! Everything is a function of masks; who may edit what, and where masks are stored, is decided elsewhere.
 
 mod agreement;
+mod carry;
 mod clean_up;
 mod drawing;
 mod gate;
+mod grow;
 mod marks;
 mod morphology;
 mod packed;
@@ -18,9 +20,11 @@ use glam::DVec2;
 use super::grid::Mask;
 
 pub use agreement::{Agreement, agreement};
+pub use carry::{Carried, Surface, across, carry};
 pub use clean_up::{CleanKind, CleanUp};
 pub use drawing::{DrawTool, Drawing, Ground, Paint};
 pub use gate::Gate;
+pub use grow::grow_from;
 pub use marks::Marks;
 pub use morphology::{fill_holes, grow, islands, largest_island, remove_islands, shrink};
 pub use packed::{PackError, PackedMask};

@@ -10,15 +10,17 @@ use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
-use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{Ground, Provenance};
+use crate::domain::hand::{AcceptedPose, HandPose};
+use crate::domain::label::{CadPose, Ground, Provenance};
 use crate::domain::pose::ToolModel;
+use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::work::job::JobCx;
 use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, system_person};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
+use crate::work::propose::{self, Proposal, ProposalSource, Side, accepted};
 use crate::work::tool::load_tool;
 
 pub(super) use args::LabelArgs;
@@ -93,12 +95,91 @@ impl<'a> Touch<'a> {
     }
 }
 
+impl Touch<'_> {
+    /// What `--propose` asks for, for a pad of the pair `id`; `found` has the imprints with the masks in force.
+    fn proposal(
+        &mut self,
+        (dataset, id): (&Dataset, PairId),
+        found: &Contact,
+        pad: PadId,
+        labels: &PairLabels,
+    ) -> anyhow::Result<Proposal> {
+        let args = self.args;
+        let imprint = found.imprints[pad].as_ref().ok_or_else(|| anyhow::anyhow!("there is no imprint"))?;
+        let to = Side { sample: &self.sample, pad, imprint };
+        let near_cad = |at: CadPose, pose: HandPose| -> anyhow::Result<Proposal> {
+            let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
+            let distances = propose::cad_distances(imprint, propose::camera_of(&self.sample, pad)?, tool, pose)?;
+            Ok(propose::near_cad(&distances, args.mask.choice().cad_distance_m, at))
+        };
+        Ok(match args.propose.unwrap_or_default() {
+            ProposalSource::Automatic => {
+                let made = self.contact(args.imprint, None)?;
+                let one = made.masks[pad].as_ref().ok_or_else(|| anyhow::anyhow!("there is no mask"))?;
+                let provenance = made.recipe.provenance(made.model.as_deref().unwrap_or_default(), one.basis);
+                Proposal { mask: one.mask.clone(), provenance, note: one.basis.note().unwrap_or_default() }
+            }
+            ProposalSource::CadTruth => {
+                let truth = self.sample.grasp_from_object;
+                let truth = truth.ok_or_else(|| anyhow::anyhow!("the true pose of this pair is not known"))?;
+                near_cad(CadPose::Truth, truth.into())?
+            }
+            ProposalSource::CadHand => {
+                let pose = args.pose.ok_or_else(|| anyhow::anyhow!("name the pose with --pose DEG,MM,MM"))?;
+                near_cad(CadPose::Nudged(pose.into()), pose.into())?
+            }
+            ProposalSource::CadRegistered => {
+                let pose = self.pose(args.imprint, labels)?;
+                let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
+                let camera = propose::camera_of(&self.sample, pad)?;
+                let distances = propose::cad_distances(imprint, camera, tool, pose.into())?;
+                propose::near_cad(&distances, args.mask.choice().cad_distance_m, CadPose::Registered(pose))
+            }
+            ProposalSource::Grow => {
+                let of = self.predictor.of(args.imprint)?;
+                propose::grown(imprint, labels.drawn(&MaskPlace { pad, of }, imprint))?
+            }
+            ProposalSource::Carry => {
+                let from = match &args.carry_from {
+                    Some(name) => find_pair(dataset, name)?,
+                    None => carried_from(dataset, id).ok_or_else(|| {
+                        anyhow::anyhow!("nobody worked on another pair of this tool yet: name one with --carry-from")
+                    })?,
+                };
+                let name = &dataset.index.pairs[from.0 as usize].name;
+                let (sample, labels) = (dataset.load(from)?, Labels::of(dataset).load(name)?);
+                propose::carried_from_pair(name, (&sample, &labels), to)?
+            }
+            ProposalSource::OtherFinger => {
+                let other = dataset.rig.pads().find(|other| *other != pad);
+                let other = other.ok_or_else(|| anyhow::anyhow!("there is no other finger"))?;
+                let (Some(imprint), Some(mask)) = (&found.imprints[other], &found.masks[other]) else {
+                    anyhow::bail!("the other finger has no mask");
+                };
+                let from = Side { sample: &self.sample, pad: other, imprint };
+                propose::carried_across(&dataset.rig.pad_key(other), (from, &mask.mask), to)?
+            }
+        })
+    }
+}
+
+/// The pair whose mask is carried to another: the nearest of the same tool that somebody worked on.
+fn carried_from(dataset: &Dataset, to: PairId) -> Option<PairId> {
+    let (reviews, _) = Labels::of(dataset).reviews();
+    let begun = |name: &str| reviews.get(name).is_some_and(|review| propose::is_begun(*review));
+    let tool = dataset.index.pairs[to.0 as usize].tool.as_ref()?;
+    let pairs = dataset.index.pairs.iter().enumerate();
+    let pairs = pairs.filter(|(_, other)| other.tool.as_ref() == Some(tool) && begun(&other.name));
+    propose::nearest_before(to.0 as usize, pairs.map(|(at, _)| (at, PairId(at as u32))))
+}
+
 /// Makes the changes that the arguments name, masks first: an accepted pose is then of the new ones. The pair itself is
 /// only read where something is made from it.
 fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabels) -> anyhow::Result<()> {
     let pads = args.finger.fingers(&dataset.rig)?;
     let mut touch = None;
-    if args.remove_mask || args.adopt || args.from.is_some() || !(args.clean.is_empty() && args.draw.is_empty()) {
+    let makes = args.adopt || args.from.is_some() || args.propose.is_some();
+    if args.remove_mask || makes || !(args.clean.is_empty() && args.draw.is_empty()) {
         let touch = touch.insert(Touch::load(args, dataset, id)?);
         let of = touch.predictor.of(args.imprint)?;
         let place = |pad| MaskPlace { pad, of: of.clone() };
@@ -120,6 +201,10 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
                     None => HandMask::new(one.mask.clone(), found.recipe.provenance(model, one.basis)),
                 };
                 let mut hand = args.from.map_or_else(|| start.clone(), |from| start.copied(from));
+                if args.propose.is_some() {
+                    let proposal = touch.proposal((dataset, id), &found, pad, labels)?;
+                    hand = accepted(&start, &proposal, args.over_hand).unwrap_or(hand);
+                }
                 if let Some(imprint) = &found.imprints[pad] {
                     for drawing in &args.draw {
                         hand.draw(drawing, Ground::new(imprint), by());
@@ -128,7 +213,7 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
                 for clean_up in &args.clean {
                     hand.clean(*clean_up, &dataset.rig);
                 }
-                if args.adopt || args.from.is_some() || !hand.is_same(&start) {
+                if makes || !hand.is_same(&start) {
                     labels.draw(&place(pad), Some(hand));
                 }
             }

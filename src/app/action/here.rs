@@ -32,7 +32,7 @@ impl Action {
             Kind::Form => match pane {
                 Pane::Browser => self.group() == Group::Navigate,
                 Pane::Generate => self.group() == Group::Generate,
-                Pane::Masks => self.group() == Group::Mask,
+                Pane::Masks => self.group() == Group::Mask || self == A::Accept,
                 _ => false,
             },
             Kind::Color => picture,
@@ -53,7 +53,7 @@ impl Action {
             || matches!(self, A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera)
             || matches!(self, A::LinkCameras | A::NextLayer | A::AnimateWeakest | A::BothClouds);
         look || self.is_nudge()
-            || matches!(self, A::PoseTool | A::SixDof | A::IcpFromHere | A::AcceptHand | A::RevertHand)
+            || matches!(self, A::PoseTool | A::SixDof | A::IcpFromHere | A::Accept | A::RevertHand)
             || matches!(self, A::MeasureDistance | A::MeasureAngle | A::PlaySteps)
     }
 

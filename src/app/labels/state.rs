@@ -9,6 +9,7 @@ use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::label::{DrawTool, Drawing, Ground, Provenance};
 use crate::work::error::TaskError;
 pub use crate::work::labels::{HandMask, MaskPlace, PairLabels, Review};
+use crate::work::propose::Proposal;
 
 /// What happened when the stored labels of a pair were read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -67,7 +68,7 @@ pub struct Stroke {
     /// The pixels that may change; `None` = all.
     pub(in crate::app) allowed: Option<Mask>,
     /// What is let through of a proposal.
-    pub(in crate::app) proposed: Option<Arc<Mask>>,
+    pub(in crate::app) proposed: Option<Arc<Proposal>>,
     /// The angle before the stroke, as [`Changed::before`].
     pub(in crate::app) angle: Option<(f64, Option<f64>)>,
     /// The hand mask before the stroke; `None` if there was none.
@@ -83,7 +84,8 @@ pub struct Stroke {
 impl Stroke {
     /// Draws on the mask: what a brush did since its first `from` points, anything else anew. Whether it touched anything.
     pub(in crate::app) fn draw_on(&mut self, hand: &mut HandMask, imprint: &DepthMap, from: usize) -> bool {
-        let ground = Ground { imprint, allowed: self.allowed.as_ref(), proposed: self.proposed.as_deref() };
+        let ground =
+            Ground { imprint, allowed: self.allowed.as_ref(), proposed: self.proposed.as_ref().map(|p| &p.mask) };
         let mut undone = false;
         if !matches!(self.drawing.tool, DrawTool::Brush { .. }) {
             undone = !hand.is_same(&self.start);
@@ -92,7 +94,8 @@ impl Stroke {
         }
         let Some(rect) = self.drawing.touch(&mut self.touched, ground, from) else { return undone };
         let (mask, marks) = (Arc::make_mut(&mut hand.mask), Arc::make_mut(&mut hand.marks));
-        marks.paint(mask, (&self.touched, rect), self.drawing.paint, ground.proposed, self.by.clone());
+        let proposed = self.proposed.as_ref().map(|proposal| &proposal.mask);
+        marks.paint(mask, (&self.touched, rect), self.drawing.paint, proposed, self.by.clone());
         true
     }
 }

@@ -264,7 +264,7 @@ impl State {
     }
 
     /// The name of the mask model that a recipe takes; empty where it takes none.
-    fn model_of(&self, recipe: &MaskRecipe) -> &str {
+    pub(crate) fn model_of(&self, recipe: &MaskRecipe) -> &str {
         match recipe {
             MaskRecipe::Unet(id, _) => self.library.bundle(id).map_or("", |bundle| &bundle.name),
             _ => "",

@@ -18,6 +18,7 @@ use crate::domain::units::clamp_or;
 use crate::infer::engine::EngineChoice;
 use crate::work::bundles::BundleInfo;
 pub use crate::work::mask::{MaskChoice, MaskSource};
+pub use crate::work::propose::ProposalSource;
 use scene::SceneLook;
 use versus::Versus;
 
@@ -391,6 +392,10 @@ pub struct MaskSettings {
     pub clean_mm: f32,
     /// Where a hand may change a mask.
     pub gate: Gate,
+    /// What proposes masks.
+    pub proposal: ProposalSource,
+    /// Whether accepting a proposal replaces what was painted by hand as well.
+    pub over_hand: bool,
     /// What is in force where no mask was drawn by hand.
     #[serde(flatten)]
     pub choice: MaskChoice,
@@ -408,6 +413,8 @@ impl Default for MaskSettings {
             wand_m: 0.0005,
             clean_mm: 1.0,
             gate: Gate::default(),
+            proposal: ProposalSource::default(),
+            over_hand: false,
             choice: MaskChoice::default(),
             bundle: None,
         }

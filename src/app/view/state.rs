@@ -19,6 +19,8 @@ pub struct Selection {
     pub finger: PadId,
     /// The imprint whose mask clean-ups work on.
     pub imprint: ImprintSource,
+    /// Whether a proposal is shown over the mask.
+    pub proposing: bool,
     /// Whether both fingers are shown, or only the active one.
     pub both_fingers: bool,
     /// The pixel under the pointer: the cross-hair of all images.

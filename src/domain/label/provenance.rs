@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::clean_up::CleanUp;
 use crate::domain::frames::PlanarPose;
+use crate::domain::hand::HandPose;
 use crate::domain::units::{text_deg, text_mm};
 
 /// Which pose of the tool a CAD distance was measured at. Poses are `grasp_from_object`.
@@ -15,7 +16,7 @@ pub enum CadPose {
     /// The one that a registration answered.
     Registered(PlanarPose),
     /// One that a person moved there.
-    Nudged(PlanarPose),
+    Nudged(HandPose),
 }
 
 impl CadPose {
@@ -28,7 +29,7 @@ impl CadPose {
         match self {
             Self::Truth => "the true pose".into(),
             Self::Registered(at) => format!("the registered pose ({})", pose(at)),
-            Self::Nudged(at) => format!("a pose moved by hand ({})", pose(at)),
+            Self::Nudged(at) => format!("a pose moved by hand ({})", pose(at.planar)),
         }
     }
 }

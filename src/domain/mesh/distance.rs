@@ -129,13 +129,23 @@ impl MeshDistance {
         (solid_angle / (4.0 * PI)).abs() > 0.5
     }
 
-    /// Whether the signed distance is at most `limit_m` (meters, not negative): near the surface, or inside.
+    /// The signed distance (meters, negative inside) of a point that is at most `limit_m` (not negative) from the surface,
+    /// or inside; infinity for all others. NaN for a point that is not finite.
     ///
-    /// Much cheaper than [`Self::signed`] for points far away. `false` for a point that is not finite.
-    pub fn within(&self, p: DVec3, limit_m: f64) -> bool {
+    /// Much cheaper than [`Self::signed`] for points far away. How deep a point is that lies further inside than the limit is
+    /// not said: minus the limit.
+    pub fn signed_within(&self, p: DVec3, limit_m: f64) -> f64 {
+        if !p.is_finite() {
+            return f64::NAN;
+        }
         // One part in 10^9 up, so that a distance of exactly the limit counts.
         let limit_squared = limit_m * limit_m * (1.0 + 1e-9);
-        p.is_finite() && (self.nearest_below(p, limit_squared) < limit_squared || self.contains(p))
+        let squared = self.nearest_below(p, limit_squared);
+        match (squared < limit_squared, self.contains(p)) {
+            (true, inside) => squared.sqrt().min(limit_m) * if inside { -1.0 } else { 1.0 },
+            (false, true) => -limit_m,
+            (false, false) => f64::INFINITY,
+        }
     }
 
     fn leaf(&self, node: &Node) -> &[[DVec3; 3]] {
@@ -300,7 +310,9 @@ mod tests {
             let p = DVec3::new(x, y, z);
             let exact = cuboid_distance(c, h, p);
             prop_assert!((distance.signed(p) - exact).abs() < 1e-12, "{} for {exact}", distance.signed(p));
-            prop_assert_eq!(distance.within(p, 0.001), exact <= 0.001);
+            let near = distance.signed_within(p, 0.001);
+            prop_assert_eq!(near <= 0.001, exact <= 0.001);
+            prop_assert!(exact.abs() > 0.001 || (near - exact).abs() < 1e-12);
             let (foot, normal) = distance.closest(p, f64::INFINITY).unwrap();
             prop_assert!((foot.distance(p) - exact.abs()).abs() < 1e-12);
             prop_assert!(exact_axis(normal) && distance.closest(p, 0.5 * exact.abs()).is_none());
@@ -342,6 +354,6 @@ mod tests {
         assert_eq!(MeshDistance::new(&flat).unwrap_err(), MeshError::Empty);
         let distance = MeshDistance::new(&cuboid(DVec3::ZERO, DVec3::splat(0.01))).unwrap();
         assert!(distance.signed(DVec3::NAN).is_nan());
-        assert!(!distance.within(DVec3::INFINITY, 0.001) && !distance.contains(DVec3::NAN));
+        assert!(distance.signed_within(DVec3::INFINITY, 0.001).is_nan() && !distance.contains(DVec3::NAN));
     }
 }

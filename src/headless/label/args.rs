@@ -12,6 +12,7 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::label::{CleanKind, CleanUp, Drawing};
 use crate::domain::pose::RegistrationChoice;
 use crate::work::labels::{ImprintSource, Review};
+use crate::work::propose::ProposalSource;
 
 fn parse_clean_up(text: &str) -> Result<CleanUp, String> {
     let (kind, size) = text.split_once('=').map_or((text, None), |(kind, size)| (kind, Some(size)));
@@ -48,8 +49,9 @@ pub(in super::super) struct LabelArgs {
     /// Accept the pose of this imprint: what the registration answers, or `--pose`.
     #[arg(long, value_name = "IMPRINT", requires = "pair", value_parser = keyed::<ImprintSource>())]
     pub(super) accept: Option<ImprintSource>,
-    /// The pose to accept instead: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as `10,0,-2`.
-    #[arg(long, value_name = "DEG,MM,MM", requires = "accept", value_parser = parse_start, allow_hyphen_values = true)]
+    /// The pose to accept instead, or that of `--propose cad_hand`: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as
+    /// `10,0,-2`.
+    #[arg(long, value_name = "DEG,MM,MM", requires = "pair", value_parser = parse_start, allow_hyphen_values = true)]
     pub(super) pose: Option<PlanarPose>,
     /// Withdraw the accepted pose of this imprint.
     #[arg(long, value_name = "IMPRINT", requires = "pair", value_parser = keyed::<ImprintSource>())]
@@ -60,6 +62,16 @@ pub(in super::super) struct LabelArgs {
     /// Take the mask of this imprint over to that of `--imprint`.
     #[arg(long, value_name = "IMPRINT", requires = "pair", conflicts_with_all = ["adopt", "remove_mask"], value_parser = keyed::<ImprintSource>())]
     pub(super) from: Option<ImprintSource>,
+    /// Propose a mask and accept it: what was painted by hand stays, unless `--over-hand`. Distances to the CAD model are
+    /// those of `--cad-mm`.
+    #[arg(long, value_name = "SOURCE", requires = "pair", conflicts_with_all = ["adopt", "from", "remove_mask"], value_parser = keyed::<ProposalSource>())]
+    pub(super) propose: Option<ProposalSource>,
+    /// Let the proposal replace what was painted by hand as well.
+    #[arg(long, requires = "propose")]
+    pub(super) over_hand: bool,
+    /// The pair whose mask is carried; else the nearest one before of the same tool that somebody worked on.
+    #[arg(long, value_name = "PAIR", requires = "propose")]
+    pub(super) carry_from: Option<String>,
     /// Clean the mask up: `fill_holes`, `largest_island`, `clear_border`, or with a size in millimeters `drop_small=MM`,
     /// `open=MM`, `close=MM`, `smooth=MM`, `grow=MM`, `shrink=MM`. Several are done in turn.
     #[arg(long, value_name = "WHAT[=MM]", requires = "pair", conflicts_with = "remove_mask", value_parser = parse_clean_up)]

@@ -96,7 +96,7 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
                 let busy = hand.as_ref().is_some_and(|hand| hand.icp.is_some());
                 let icp = if busy { "Registering…" } else { "ICP from here" };
                 for (action, text) in
-                    [(Action::IcpFromHere, icp), (Action::AcceptHand, "Accept"), (Action::RevertHand, "Revert")]
+                    [(Action::IcpFromHere, icp), (Action::Accept, "Accept"), (Action::RevertHand, "Revert")]
                 {
                     small_button(cx, ui, action, text, source, false);
                 }

@@ -1,0 +1,310 @@
+//! Proposals: masks that are shown over the one in force, to be accepted or not.
+
+use std::sync::Arc;
+
+use super::super::keys::{MaskRecipe, Revision};
+use super::super::labels::state::{MaskPlace, Stored};
+use super::super::pane::Need;
+use super::imprint::ImprintKey;
+use super::mask::{MaskKey, MaskVersion};
+use super::pose::PoseKey;
+use super::tool::ToolKey;
+use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State, Wanted};
+use crate::domain::bits::Bits;
+use crate::domain::dataset::PairId;
+use crate::domain::grid::Grid;
+use crate::domain::hand::HandPose;
+use crate::domain::label::CadPose;
+use crate::domain::rig::PadId;
+use crate::work::error::TaskError;
+use crate::work::propose::{self, Proposal, ProposalSource, Side};
+
+const WHAT: &str = "Propose a mask";
+
+/// Where the CAD model lies.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum At {
+    /// At the true pose.
+    Truth,
+    /// At a registered one.
+    Registered(Box<PoseKey>),
+    /// Where a hand holds it: the bits of its six numbers.
+    Hand([u64; 6]),
+}
+
+impl At {
+    fn hand(pose: HandPose) -> Self {
+        let HandPose { planar, x_m, pitch_rad, yaw_rad } = pose;
+        Self::Hand([planar.theta_rad, planar.y_m, planar.z_m, x_m, pitch_rad, yaw_rad].map(f64::to_bits))
+    }
+
+    /// The pose, `grasp_from_object`; `None` if it is not there.
+    fn find(&self, state: &State, pair: PairKey) -> Option<(CadPose, HandPose)> {
+        Some(match self {
+            Self::Truth => (CadPose::Truth, state.results.samples.get(&pair)?.grasp_from_object?.into()),
+            Self::Registered(key) => {
+                let pose = state.results.poses.get(key)?.grasp_from_object;
+                (CadPose::Registered(pose), pose.into())
+            }
+            Self::Hand(bits) => {
+                let [theta_rad, y_m, z_m, x_m, pitch_rad, yaw_rad] = bits.map(f64::from_bits);
+                let planar = crate::domain::frames::PlanarPose { theta_rad, y_m, z_m };
+                let pose = HandPose { planar, x_m, pitch_rad, yaw_rad };
+                (CadPose::Nudged(pose), pose)
+            }
+        })
+    }
+}
+
+/// The distances of an imprint's points from the CAD model.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DistancesKey {
+    /// The imprint.
+    pub imprint: ImprintKey,
+    /// Where the model lies.
+    pub at: At,
+}
+
+/// The distances, and where the model was.
+#[derive(Clone, Debug)]
+pub struct Distances {
+    /// Meters, negative inside; see [`propose::cad_distances`].
+    pub grid: Grid<f64>,
+    /// Where the model was.
+    pub at: CadPose,
+}
+
+impl Computes for DistancesKey {
+    type Value = Distances;
+
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Distances>> {
+        let (imprint, touch) = (self.imprint.find(state)?, self.imprint.touch());
+        let (at, pose) = self.at.find(state, touch.pair)?;
+        let sample = state.results.samples.get(&touch.pair)?.clone();
+        let tool = state.library.entry(touch.pair.pair)?.tool.as_deref()?;
+        let tool = ToolKey { dataset: touch.pair.dataset, name: tool.into() };
+        let tool = state.results.tools.get(&tool)?.clone();
+        Some(Job::new(Lane::Compute, "Distances to the CAD model", move |_| {
+            let camera = propose::camera_of(&sample, touch.finger)?;
+            Ok(Distances { grid: propose::cad_distances(imprint.get()?, camera, &tool.model, pose)?, at })
+        }))
+    }
+
+    fn bytes(found: &Distances) -> usize {
+        found.grid.len() * 8
+    }
+}
+
+/// What a proposal is made of.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Ingredients {
+    /// An automatic mask.
+    Automatic(MaskRecipe),
+    /// What is within a distance of the CAD model.
+    Cad(At, Bits),
+    /// What was painted, by the revision of the mask.
+    Grow(Revision),
+    /// The mask of another pair, by its revision where it is known.
+    Carry(PairKey, Option<Revision>),
+    /// The other finger's mask in force.
+    Across(ImprintKey, MaskVersion),
+}
+
+/// A proposal for one imprint.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ProposalKey {
+    /// The imprint.
+    pub imprint: ImprintKey,
+    /// What it is made of.
+    pub of: Ingredients,
+}
+
+impl Computes for ProposalKey {
+    type Value = Proposal;
+
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Proposal>> {
+        let (imprint, touch) = (self.imprint.find(state)?, self.imprint.touch());
+        let sample = state.results.samples.get(&touch.pair)?.clone();
+        let job = |make: Box<dyn FnOnce() -> Result<Proposal, TaskError> + Send>| {
+            Some(Job::new(Lane::Compute, WHAT, move |_| make()))
+        };
+        match &self.of {
+            Ingredients::Automatic(recipe) => {
+                let found = state.results.masks.get(&self.automatic(recipe))?.clone();
+                let model = state.model_of(recipe).to_owned();
+                let provenance = recipe.provenance(&model, found.basis);
+                let note = found.basis.note().unwrap_or_default();
+                job(Box::new(move || Ok(Proposal { mask: (*found.mask).clone(), provenance, note })))
+            }
+            Ingredients::Cad(at, within) => {
+                let key = DistancesKey { imprint: self.imprint.clone(), at: at.clone() };
+                let (found, within) = (state.results.distances.get(&key)?.clone(), within.get());
+                job(Box::new(move || Ok(propose::near_cad(&found.grid, within, found.at))))
+            }
+            Ingredients::Grow(_) => {
+                let hand = state.hand_mask_on(&self.imprint).cloned();
+                job(Box::new(move || propose::grown(imprint.get()?, hand.as_ref())))
+            }
+            Ingredients::Carry(from, _) => {
+                let source = state.library.open.as_ref()?.source.clone();
+                let name = state.library.entry(from.pair)?.name.clone();
+                let known = state.document.stored.get(&name) == Some(&Stored::Loaded);
+                let labels = known.then(|| state.document.labels.get(&name).cloned()).flatten();
+                let loaded = state.results.samples.get(from).cloned();
+                let (other, pad) = (from.pair, touch.finger);
+                Some(Job::new(Lane::Files, WHAT, move |_| {
+                    let labels = labels.map_or_else(|| source.load_labels(&name), Ok)?;
+                    let from = loaded.map_or_else(|| source.load(other).map(Arc::new), Ok)?;
+                    let to = Side { sample: &sample, pad, imprint: imprint.get()? };
+                    propose::carried_from_pair(&name, (&from, &labels), to)
+                }))
+            }
+            Ingredients::Across(other, version) => {
+                let mask = version.find(state, other)?;
+                let (from, pad) = (other.find(state)?, other.touch().finger);
+                let name = state.finger_name(pad).to_lowercase();
+                job(Box::new(move || {
+                    let from = Side { sample: &sample, pad, imprint: from.get()? };
+                    let to = Side { sample: &sample, pad: touch.finger, imprint: imprint.get()? };
+                    propose::carried_across(&name, (from, &mask), to)
+                }))
+            }
+        }
+    }
+
+    fn bytes(found: &Proposal) -> usize {
+        found.mask.len()
+    }
+}
+
+impl ProposalKey {
+    fn automatic(&self, recipe: &MaskRecipe) -> MaskKey {
+        MaskKey { imprint: self.imprint.clone(), recipe: recipe.clone() }
+    }
+}
+
+impl State {
+    /// Whether a proposal is shown over the masks.
+    pub fn proposes(&self) -> bool {
+        self.selection.proposing && self.needs(Need::Masks)
+    }
+
+    /// Whether the proposal needs the pose of an imprint.
+    pub(crate) fn proposes_at_pose(&self, source: ImprintSource) -> bool {
+        self.proposes()
+            && self.settings.mask.proposal == ProposalSource::CadRegistered
+            && self.worked_on(self.selection.finger) == source
+    }
+
+    /// The pair whose mask would be carried to the selected one: the nearest of the same tool that somebody worked on.
+    pub fn carries_from(&self) -> Option<PairKey> {
+        let (open, here) = (self.library.open.as_ref()?, self.entry()?);
+        let tool = here.tool.as_deref()?;
+        let at = self.selection.pair?.0 as usize;
+        let begun = |name: &str| propose::is_begun(self.document.review(name));
+        let pairs = open.source.index().pairs.iter().enumerate();
+        let with_mask = pairs.filter(|(_, other)| other.tool.as_deref() == Some(tool) && begun(&other.name));
+        propose::nearest_before(at, with_mask.map(|(at, _)| (at, PairId(at as u32)))).map(|id| open.key(id))
+    }
+
+    /// The recipe of the proposal for one finger's imprint; `Ok(None)` while something that it takes is not there yet.
+    ///
+    /// # Errors
+    /// What is missing.
+    pub fn proposal_key(&self, source: ImprintSource, finger: PadId) -> Result<Option<ProposalKey>, Absent> {
+        let imprint = self.imprint_key(source, finger)?;
+        let within = Bits::from(self.settings.mask.choice.cad_distance_m);
+        let of = match self.settings.mask.proposal {
+            ProposalSource::Automatic => Ingredients::Automatic(self.mask_recipe(finger)?),
+            ProposalSource::CadTruth => {
+                self.tool_name()?;
+                let sample = self.sample().ready();
+                if sample.is_some_and(|sample| sample.grasp_from_object.is_none()) {
+                    return Err(Absent::NoTruth);
+                }
+                Ingredients::Cad(At::Truth, within)
+            }
+            ProposalSource::CadRegistered => match self.pose_key(source)? {
+                Some(key) => Ingredients::Cad(At::Registered(Box::new(key)), within),
+                None => return Ok(None),
+            },
+            ProposalSource::CadHand => {
+                self.tool_name()?;
+                let held = self.workbench.hand(source).map(|hand| hand.pose).or_else(|| self.by_hand(source));
+                Ingredients::Cad(At::hand(held.ok_or(Absent::NoHandPose)?), within)
+            }
+            ProposalSource::Grow => {
+                let hand = self.hand_mask(source, finger).filter(|hand| hand.marks.has_hand_work());
+                Ingredients::Grow(hand.ok_or(Absent::NoStrokes)?.revision)
+            }
+            ProposalSource::Carry => {
+                let from = self.carries_from().ok_or(Absent::NoOtherMask)?;
+                let name = self.library.entry(from.pair).map(|entry| entry.name.as_str()).unwrap_or_default();
+                let hand = self.document.hand_mask(name, &MaskPlace::measured(finger));
+                Ingredients::Carry(from, hand.map(|hand| hand.revision))
+            }
+            ProposalSource::OtherFinger => {
+                let other = self.rig().pads().find(|pad| *pad != finger).ok_or(Absent::NoFinger)?;
+                let key = self.imprint_key(source, other)?;
+                match self.mask_in_force(source, other) {
+                    Ok(mask) => Ingredients::Across(key, mask.version),
+                    Err(Lookup::Absent(absent)) => return Err(absent),
+                    Err(_) => return Ok(None),
+                }
+            }
+        };
+        Ok(Some(ProposalKey { imprint, of }))
+    }
+
+    /// The proposal for one finger's imprint.
+    pub fn proposal(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, Arc<Proposal>> {
+        if self.imprint(source, finger).ready().is_none() {
+            return self.imprint(source, finger).without();
+        }
+        self.look_or(self.proposal_key(source, finger), || None)
+    }
+
+    /// The proposal that is shown over the mask of one finger's imprint.
+    pub fn shown_proposal(&self, source: ImprintSource, finger: PadId) -> Option<&Arc<Proposal>> {
+        let here = finger == self.selection.finger && source == self.worked_on(finger);
+        self.proposal(source, finger).ready().filter(|_| here && self.proposes())
+    }
+}
+
+impl Wanted<'_> {
+    /// The proposal, where one is shown, with what it takes.
+    pub(crate) fn proposal(&mut self) {
+        let state = self.state;
+        let finger = state.selection.finger;
+        let source = state.worked_on(finger);
+        if !state.proposes() || state.document.stroke.is_some() || state.imprint(source, finger).ready().is_none() {
+            return;
+        }
+        let is_cad = state.settings.mask.proposal.is_cad();
+        if is_cad && state.tool_name().is_ok() && state.tool().ready().is_none() {
+            return self.tool();
+        }
+        if state.settings.mask.proposal == ProposalSource::OtherFinger
+            && let Some(other) = state.rig().pads().find(|pad| *pad != finger)
+        {
+            self.mask(source, other);
+        }
+        let Ok(Some(key)) = state.proposal_key(source, finger) else { return };
+        match &key.of {
+            Ingredients::Automatic(recipe) if !state.results.masks.contains(&key.automatic(recipe)) => {
+                return self.ask(key.automatic(recipe));
+            }
+            Ingredients::Cad(at, _) => {
+                let distances = DistancesKey { imprint: key.imprint.clone(), at: at.clone() };
+                if at.find(state, key.imprint.touch().pair).is_none() {
+                    return;
+                }
+                if !state.results.distances.contains(&distances) {
+                    return self.ask(distances);
+                }
+            }
+            _ => {}
+        }
+        self.ask(key);
+    }
+}

@@ -1,0 +1,267 @@
+//! Proposals: masks that a person looks at, and accepts or not. Nothing here changes a mask.
+//!
+//! Masks by threshold, share and mask model are those of [`super::mask`]; what comes here takes more than one imprint: a pose,
+//! strokes, another pair's mask.
+
+use glam::DAffine3;
+use serde::{Deserialize, Serialize};
+use strum::{EnumIter, EnumString, IntoStaticStr};
+
+use super::error::TaskError;
+use super::labels::{HandMask, MaskPlace, PairLabels, Review};
+use crate::domain::cloud::CloudError;
+use crate::domain::contact::signed_distances;
+use crate::domain::frames::PlanarPose;
+use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::hand::HandPose;
+use crate::domain::label::{CadPose, Provenance, Surface, across, carry, grow_from};
+use crate::domain::pose::ToolModel;
+use crate::domain::rig::PadId;
+use crate::domain::sample::{DepthCamera, PadTouch, Sample};
+
+const WHAT: &str = "Propose a mask";
+
+/// How far a membrane may lie from where it was in the other pair and still be in contact with the same place of the
+/// tool, meters.
+const CARRY_GATE_M: f64 = 0.0015;
+/// The same from finger to finger: tools are not the same on both sides to the tenth of a millimeter.
+const ACROSS_GATE_M: f64 = 0.003;
+
+/// The greatest distance to the CAD model that a mask can be made of, meters.
+pub const FARTHEST_M: f64 = 0.01;
+
+/// What proposes a mask.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    EnumIter,
+    EnumString,
+    IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum ProposalSource {
+    /// The automatic source as it is set.
+    #[default]
+    Automatic,
+    /// Near the CAD model at the true pose.
+    CadTruth,
+    /// Near the CAD model at the pose that the registration answers.
+    CadRegistered,
+    /// Near the CAD model at the pose set by hand.
+    CadHand,
+    /// Grown from what a person painted.
+    Grow,
+    /// Another pair's mask, moved as the tool was.
+    Carry,
+    /// The other finger's mask.
+    OtherFinger,
+}
+
+impl ProposalSource {
+    /// The name in files and on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Automatic => "Automatic source",
+            Self::CadTruth => "CAD at the true pose",
+            Self::CadRegistered => "CAD at the registered pose",
+            Self::CadHand => "CAD at the pose by hand",
+            Self::Grow => "Grow from strokes",
+            Self::Carry => "Carried from another pair",
+            Self::OtherFinger => "The other finger's mask",
+        }
+    }
+
+    /// What it does, in a line.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::Automatic => "What the automatic source below says, with its numbers",
+            Self::CadTruth => "Pixels whose membrane point lies near the CAD model at the true pose",
+            Self::CadRegistered => {
+                "Pixels whose membrane point lies near the CAD model at the pose that was registered from the mask in force"
+            }
+            Self::CadHand => "Pixels whose membrane point lies near the CAD model where the pose tool holds it",
+            Self::Grow => {
+                "From the strokes painted by hand, contact and free, to the steps of the imprint between them"
+            }
+            Self::Carry => "The mask of an earlier pair of the same tool, moved as the tool moved between the grasps",
+            Self::OtherFinger => "The other finger's mask, as the tool would press on this side",
+        }
+    }
+
+    /// Whether it measures the distance to the CAD model.
+    pub fn is_cad(self) -> bool {
+        matches!(self, Self::CadTruth | Self::CadRegistered | Self::CadHand)
+    }
+}
+
+/// A proposed mask.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// The contact, as large as the imprint.
+    pub mask: Mask,
+    /// Where it comes from.
+    pub provenance: Provenance,
+    /// What to know about it, in words; empty if there is nothing.
+    pub note: String,
+}
+
+fn fail(err: &CloudError) -> TaskError {
+    TaskError::from_error(WHAT, err)
+}
+
+/// The camera that felt a touch.
+///
+/// # Errors
+/// If there is none.
+pub fn camera_of(sample: &Sample, pad: PadId) -> Result<&DepthCamera, TaskError> {
+    let camera = sample.pad(pad).and_then(PadTouch::camera);
+    camera.ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))
+}
+
+/// The signed distance of each membrane point to the CAD model, meters, negative inside; NaN without depth. From it
+/// [`near_cad`] makes a mask of any distance at once.
+///
+/// # Errors
+/// If sizes differ or the camera's numbers cannot be right.
+pub fn cad_distances(
+    imprint: &DepthMap,
+    camera: &DepthCamera,
+    tool: &ToolModel,
+    grasp_from_object: HandPose,
+) -> Result<Grid<f64>, TaskError> {
+    let object_from_grasp = grasp_from_object.to_affine().inverse();
+    signed_distances(imprint, camera, &tool.distance, object_from_grasp, FARTHEST_M).map_err(|err| fail(&err))
+}
+
+/// The pixels within a distance of the CAD model.
+pub fn near_cad(distances: &Grid<f64>, within_m: f32, at: CadPose) -> Proposal {
+    Proposal {
+        mask: distances.map(|d| *d <= f64::from(within_m)),
+        provenance: Provenance::Cad { within_m, at },
+        note: String::new(),
+    }
+}
+
+/// Grown from what was painted by hand on the mask.
+///
+/// # Errors
+/// If nothing was painted.
+pub fn grown(imprint: &DepthMap, hand: Option<&HandMask>) -> Result<Proposal, TaskError> {
+    let nothing = || {
+        TaskError::new(WHAT, "there is nothing to grow from")
+            .with_hint("Paint a short stroke of contact, and with the right button one where there is none.")
+    };
+    let hand = hand.ok_or_else(nothing)?;
+    let painted = hand.marks.hand_checked();
+    let which = |contact: bool| {
+        let (painted, mask) = (painted.as_slice(), hand.mask.as_slice());
+        let seeds = painted.iter().zip(mask).map(|(painted, in_contact)| *painted && *in_contact == contact);
+        Mask::from_vec(imprint.width(), imprint.height(), seeds.collect())
+    };
+    let (Ok(contact), Ok(free)) = (which(true), which(false)) else {
+        return Err(TaskError::new(WHAT, "the mask is not as large as the imprint"));
+    };
+    let mask = grow_from(imprint, &contact, &free).ok_or_else(nothing)?;
+    let note =
+        if free.as_slice().contains(&true) { "" } else { "no stroke says what is free: the edge of the image is" };
+    Ok(Proposal { mask, provenance: Provenance::Grown, note: note.into() })
+}
+
+/// One finger of a pair with a mask to carry from.
+#[derive(Clone, Copy, Debug)]
+pub struct Side<'a> {
+    /// The pair.
+    pub sample: &'a Sample,
+    /// The finger.
+    pub pad: PadId,
+    /// Its imprint, meters.
+    pub imprint: &'a DepthMap,
+}
+
+impl<'a> Side<'a> {
+    fn surface(self) -> Result<Surface<'a>, TaskError> {
+        Ok(Surface { imprint: self.imprint, camera: camera_of(self.sample, self.pad)? })
+    }
+}
+
+fn carried(
+    (from, mask): (Side<'_>, &Mask),
+    to: Side<'_>,
+    from_to: DAffine3,
+    gate_m: f64,
+    provenance: Provenance,
+) -> Result<Proposal, TaskError> {
+    let found = carry(from.surface()?, mask, to.surface()?, from_to, gate_m).map_err(|err| fail(&err))?;
+    let note = match found.drift_m {
+        Some(drift) => format!("the membranes lie {:.2} mm apart (median)", drift * 1e3),
+        None => "nothing of it is in contact here".into(),
+    };
+    Ok(Proposal { mask: found.mask, provenance, note })
+}
+
+/// Another pair's mask, moved as the tool moved between the two grasps, whose true poses are known. `name` is the other
+/// pair's.
+///
+/// # Errors
+/// If there is no such mask, a pose or a camera is not known, or sizes differ.
+pub fn carried_from_pair(name: &str, from: (&Sample, &PairLabels), to: Side<'_>) -> Result<Proposal, TaskError> {
+    let (sample, labels) = from;
+    let measured = sample.pad(to.pad).and_then(PadTouch::depth).map(|depth| &depth.imprint);
+    let hand = measured.and_then(|imprint| labels.drawn(&MaskPlace::measured(to.pad), imprint));
+    let (Some(imprint), Some(hand)) = (measured, hand) else {
+        return Err(TaskError::new(WHAT, format!("nobody painted this finger's mask of {name}")));
+    };
+    let from = (Side { sample, pad: to.pad, imprint }, &*hand.mask);
+    let pose = |sample: &Sample, whose: &str| {
+        let why = || TaskError::new(WHAT, format!("the true pose of {whose} is not known, so its move is not either"));
+        sample.grasp_from_object.ok_or_else(why)
+    };
+    let (a, b) = (pose(sample, name)?, pose(to.sample, "this pair")?);
+    let moved = PlanarPose { theta_rad: b.theta_rad - a.theta_rad, y_m: b.y_m - a.y_m, z_m: b.z_m - a.z_m };
+    let provenance = Provenance::Copied { from: format!("the mask of {name}"), moved: Some(moved) };
+    carried(from, to, a.to_affine() * b.to_affine().inverse(), CARRY_GATE_M, provenance)
+}
+
+/// The other finger's mask of the same grasp. `name` is that finger's.
+///
+/// # Errors
+/// If a camera is not known, or sizes differ.
+pub fn carried_across(name: &str, from: (Side<'_>, &Mask), to: Side<'_>) -> Result<Proposal, TaskError> {
+    let provenance = Provenance::Copied { from: format!("the {name} finger's mask"), moved: None };
+    carried(from, to, across(), ACROSS_GATE_M, provenance)
+}
+
+/// Whether somebody worked on a pair, so that its masks can be carried to others.
+pub fn is_begun(review: Review) -> bool {
+    !matches!(review, Review::Todo | Review::Skip)
+}
+
+/// Of pairs that have a mask drawn by hand, the one to carry from to the pair at `here`: the nearest before it in the
+/// order, else the nearest behind it. All are places in one order.
+pub fn nearest_before<T: Copy>(here: usize, with_mask: impl Iterator<Item = (usize, T)>) -> Option<T> {
+    let distance = |at: usize| if at < here { (0, here - at) } else { (1, at - here) };
+    with_mask.filter(|(at, _)| *at != here).min_by_key(|(at, _)| distance(*at)).map(|(_, pair)| pair)
+}
+
+/// A proposal as the hand mask that accepting it whole makes, over the mask in force: what a person painted stays unless
+/// `over_hand`. `None` if it changes nothing.
+#[must_use]
+pub fn accepted(start: &HandMask, proposal: &Proposal, over_hand: bool) -> Option<HandMask> {
+    let mut hand = start.clone();
+    hand.replace(&proposal.mask, proposal.provenance.clone(), !over_hand).then_some(hand)
+}
