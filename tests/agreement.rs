@@ -1,5 +1,7 @@
 //! The studio and the command line are one program: what a button does, a verb does, and with the same numbers.
 
+mod proposals;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -33,6 +33,8 @@ use link::Link;
 
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
 pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
+/// The color of proposals.
+pub(super) const PROPOSED: Color32 = Color32::from_rgb(0x4a, 0xd9, 0xff);
 /// The color of ignored pixels.
 pub(super) const IGNORED: Color32 = Color32::from_rgb(0xff, 0xc8, 0x3d);
 

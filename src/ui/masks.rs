@@ -1,11 +1,13 @@
 //! The mask tools: brush, eraser, automatic sources with live preview, clean-ups, undo, review state.
 
+mod proposal;
+
 use eframe::egui::{self, RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::browser::review_color;
 use super::cx::Cx;
-use super::images::{CONTACT, IGNORED};
+use super::images::{CONTACT, IGNORED, PROPOSED};
 use super::theme::{SMALL, caption, section};
 use crate::app::action::Action;
 use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand, ViewCommand};
@@ -33,6 +35,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ScrollArea::vertical().id_salt("masks").show(ui, |ui| {
             tools(cx, ui);
             source(cx, ui);
+            proposal::show(cx, ui);
             if system_person().is_none() {
                 super::settings_pane::person(cx, ui);
             }
@@ -78,11 +81,14 @@ fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(caption("Paint", cx.p));
         let now = cx.state.settings.mask.paint;
-        for (paint, text, tip) in [
-            (Paint::Contact, "contact", "The tools add contact; the right button removes it".to_owned()),
-            (Paint::Ignore, "ignore", cx.keys().help(Action::PaintIgnore)),
+        for (paint, text, tip, color) in [
+            (Paint::Contact, "contact", "The tools add contact; the right button removes it".to_owned(), CONTACT),
+            (Paint::Ignore, "ignore", cx.keys().help(Action::PaintIgnore), IGNORED),
+            (Paint::LetThrough, "let proposal through", cx.keys().help(Action::LetThrough), PROPOSED),
         ] {
-            let color = if paint == Paint::Ignore { IGNORED } else { CONTACT };
+            if paint == Paint::LetThrough && now != paint && !cx.state.proposes() {
+                continue;
+            }
             let text = RichText::new(text).color(if now == paint { color } else { cx.p.text });
             if ui.add(egui::Button::selectable(now == paint, text)).on_hover_text(tip).clicked() {
                 cx.push(SettingsCommand::SetPaint(paint));

@@ -4,7 +4,7 @@ use eframe::egui::{
     Align2, Color32, CursorIcon, Event, FontId, Key, PointerButton, Pos2, Stroke, TextureId, Ui, Vec2, vec2,
 };
 
-use super::{CONTACT, IGNORED, Memory};
+use super::{CONTACT, IGNORED, Memory, PROPOSED};
 use crate::app::command::{LabelsCommand, SettingsCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, MaskVersion};
 use crate::app::pane::Pane;
@@ -55,6 +55,16 @@ pub(super) fn mask(
             .outlines
             .get(&("gate", source, finger), &key, || allowed().map(|allowed| outline(&allowed)).unwrap_or_default());
         output.segments(segments, Color32::from_gray(190), 1.0);
+    }
+    if let Some(proposal) = cx.state.shown_proposal(source, finger) {
+        let key = cx.state.proposal_key(source, finger).ok();
+        let slot = ("proposal", source, finger);
+        let veil = || (mask_image(&proposal.mask, Color32::WHITE), None);
+        let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, veil);
+        output.paint(picture.texture.id(), PROPOSED.gamma_multiply(0.6 * settings.mask_opacity));
+        let segments = memory.outlines.get(&slot, &key, || outline(&proposal.mask));
+        output.segments(segments, Color32::from_black_alpha(110), 2.5);
+        output.segments(segments, PROPOSED, 1.25);
     }
     let mask = in_force.mask;
     let segments = memory.outlines.get(&("mask", source, finger), &key, || outline(mask));
@@ -154,7 +164,8 @@ fn way(cx: &Cx<'_>, output: &CanvasOutput, (source, finger): (ImprintSource, Pad
     let Some(drawing) = drawn.map(|stroke| &stroke.drawing) else { return };
     let at = |p: &[f32; 2]| output.map.to_screen(*p);
     let color = match drawing.paint {
-        Paint::Contact | Paint::LetThrough => Color32::WHITE,
+        Paint::Contact => Color32::WHITE,
+        Paint::LetThrough => PROPOSED,
         Paint::Free => Color32::from_rgb(255, 120, 90),
         Paint::Ignore => IGNORED,
     };

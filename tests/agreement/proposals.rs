@@ -1,0 +1,145 @@
+//! Proposals: nothing changes before they are accepted, hand work stays, and the verb makes the same masks.
+
+use touch2touch::app::command::ViewCommand;
+use touch2touch::app::labels::HandMask;
+use touch2touch::domain::label::{Paint, Provenance};
+use touch2touch::work::propose::ProposalSource;
+
+use super::*;
+
+const MEASURED: ImprintSource = ImprintSource::Measured;
+
+/// Strokes of contact and of what is free, by hand.
+fn strokes(studio: &mut Studio) {
+    for (from, to, erase) in [([80.0, 60.0], [95.0, 80.0], false), ([5.0, 5.0], [40.0, 5.0], true)] {
+        studio.send(LabelsCommand::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px: from, erase }.into());
+        studio.send(LabelsCommand::StrokeTo(to).into());
+        studio.send(LabelsCommand::EndStroke.into());
+    }
+}
+
+fn hand(studio: &Studio) -> Option<HandMask> {
+    studio.state.hand_mask(MEASURED, lab::RIGHT).cloned()
+}
+
+#[test]
+fn what_is_proposed_is_the_same_on_the_screen_and_by_verb() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let path = folder.to_str().unwrap();
+    let listed = json(&["pose", path], home.path());
+    let (name, other) = (name_of(&listed, 1), name_of(&listed, 0));
+    // The pair before has a mask that can be carried.
+    let adopt = ["label", path, "--pair", &other, "--adopt", "--mask", "truth", "--review", "done"];
+    json(&adopt, home.path());
+    let stored = || {
+        let labels = Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap();
+        labels.measured(lab::RIGHT).cloned()
+    };
+    let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
+    for source in [
+        ProposalSource::Automatic,
+        ProposalSource::CadTruth,
+        ProposalSource::CadRegistered,
+        ProposalSource::Grow,
+        ProposalSource::Carry,
+        ProposalSource::OtherFinger,
+    ] {
+        let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
+        let at = studio.state.library.open.as_ref().unwrap().source.index().pairs.iter().position(|p| p.name == name);
+        studio.send(LibraryCommand::Select(PairId(at.unwrap() as u32)).into());
+        let mask = MaskSettings { proposal: source, choice, radius_px: 3.0, ..MaskSettings::default() };
+        studio.send(SettingsCommand::SetMask(mask).into());
+        if source == ProposalSource::Grow {
+            strokes(&mut studio);
+        }
+        let before = hand(&studio);
+        studio.send(ViewCommand::Propose(true).into());
+        let proposal = studio.state.shown_proposal(MEASURED, lab::RIGHT).cloned();
+        let proposal = proposal.unwrap_or_else(|| panic!("{source:?}: {:?}", studio.state.log.entries));
+        assert!(proposal.mask.as_slice().contains(&true), "{source:?}");
+        assert_eq!(hand(&studio), before, "{source:?}: looking changes nothing");
+        // Nor does going elsewhere and back.
+        studio.send(LibraryCommand::Step(-1).into());
+        studio.send(LibraryCommand::Step(1).into());
+        assert_eq!(hand(&studio), before, "{source:?}: navigation accepts nothing");
+        studio.send(LabelsCommand::AcceptProposal.into());
+        let made = hand(&studio).unwrap();
+        assert!(!studio.state.proposes());
+        if source != ProposalSource::Automatic {
+            assert!(made.marks.layers().iter().any(|(by, px)| **by == proposal.provenance && *px > 0), "{source:?}");
+        }
+        drop(studio);
+        assert!(stored().is_some_and(|stored| stored.is_same(&made)), "{source:?} on the disk");
+        json(&["label", path, "--pair", &name, "--remove-mask", "--finger", "right"], home.path());
+        assert_eq!(stored(), None);
+        let mut verb = vec!["label", path, "--pair", &name, "--finger", "right", "--mask", "threshold"];
+        if source == ProposalSource::Grow {
+            let drawn = verb.clone();
+            let contact = r#"{"tool": "brush", "radius_px": 3, "points": [[80, 60], [95, 80]]}"#;
+            let free = r#"{"tool": "brush", "radius_px": 3, "paint": "free", "points": [[5, 5], [40, 5]]}"#;
+            json(&[&drawn[..], &["--draw", contact, "--draw", free]].concat(), home.path());
+        }
+        verb.extend(["--propose", source.key()]);
+        json(&verb, home.path());
+        assert!(stored().is_some_and(|stored| stored.is_same(&made)), "{source:?} by the verb");
+        json(&["label", path, "--pair", &name, "--remove-mask"], home.path());
+    }
+}
+
+#[test]
+fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let mut studio = Studio::open(Place::Path(folder), home.path());
+    let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
+    let proposal = ProposalSource::CadTruth;
+    let mask = MaskSettings { proposal, choice, radius_px: 3.0, ..MaskSettings::default() };
+    studio.send(SettingsCommand::SetMask(mask.clone()).into());
+    strokes(&mut studio);
+    let painted = hand(&studio).unwrap();
+    let checked = painted.marks.hand_checked();
+    let accept = |studio: &mut Studio| {
+        studio.send(ViewCommand::Propose(true).into());
+        let proposed = studio.state.shown_proposal(MEASURED, lab::RIGHT).unwrap().mask.clone();
+        studio.send(LabelsCommand::AcceptProposal.into());
+        proposed
+    };
+    let proposed = accept(&mut studio);
+    let kept = hand(&studio).unwrap();
+    for (i, by_hand) in checked.as_slice().iter().enumerate() {
+        let from = if *by_hand { &painted.mask } else { &proposed };
+        assert_eq!(kept.mask.as_slice()[i], from.as_slice()[i], "pixel {i}");
+    }
+    studio.send(SettingsCommand::SetMask(MaskSettings { over_hand: true, ..mask.clone() }).into());
+    accept(&mut studio);
+    assert!(*hand(&studio).unwrap().mask == proposed);
+    for _ in 0..2 {
+        studio.send(LabelsCommand::Undo.into());
+    }
+    assert!(hand(&studio).unwrap().is_same(&painted), "undo gives pixels and their provenance back");
+    // By brush: only there, and as the person's own.
+    studio.send(SettingsCommand::SetMask(MaskSettings { paint: Paint::LetThrough, ..mask }).into());
+    let begin = LabelsCommand::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px: [60.0, 70.0], erase: false };
+    let said = studio.state.log.entries.len();
+    studio.send(begin.clone().into());
+    assert!(
+        studio.state.document.stroke.is_none() && studio.state.log.entries.len() > said,
+        "nothing is shown to let through"
+    );
+    studio.send(ViewCommand::Propose(true).into());
+    studio.send(begin.into());
+    studio.send(LabelsCommand::StrokeTo([110.0, 70.0]).into());
+    studio.send(LabelsCommand::EndStroke.into());
+    let through = hand(&studio).unwrap();
+    let mine = |hand: &HandMask, i: usize| {
+        matches!(hand.marks.at(i % 175, i / 175), Some(Provenance::Hand { .. })) && !checked.as_slice()[i]
+    };
+    let mut touched = 0;
+    for i in 0..through.mask.len() {
+        let from = if mine(&through, i) { &proposed } else { &painted.mask };
+        touched += usize::from(mine(&through, i));
+        assert!(checked.as_slice()[i] || through.mask.as_slice()[i] == from.as_slice()[i], "pixel {i}");
+    }
+    assert!(touched > 200, "{touched}");
+}
