@@ -77,6 +77,30 @@ pub fn signed_distances(
     Ok(Grid::from_vec(width, height, distances).unwrap_or_else(|_| Grid::filled(width, height, f64::NAN)))
 }
 
+/// The imprint without the grain of its pixels: of each the median of what was measured within `radius_px` of it in
+/// either direction. An edge stays where it is; a pixel that was dropped gets what lies around it, and NaN where
+/// nothing was measured there.
+pub fn without_grain(imprint: &DepthMap, radius_px: usize) -> DepthMap {
+    let (width, height) = (imprint.width(), imprint.height());
+    let row = |y: usize| {
+        let mut values: Vec<f32> = Vec::new();
+        let mut medians = Vec::with_capacity(width);
+        for x in 0..width {
+            values.clear();
+            for row in y.saturating_sub(radius_px)..height.min(y + radius_px + 1) {
+                let pixels = &imprint.row(row)[x.saturating_sub(radius_px)..width.min(x + radius_px + 1)];
+                values.extend(pixels.iter().copied().filter(|d| d.is_finite()));
+            }
+            let middle = values.len() / 2;
+            let median = (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1);
+            medians.push(median.unwrap_or(f32::NAN));
+        }
+        medians
+    };
+    let rows: Vec<Vec<f32>> = (0..height).into_par_iter().map(row).collect();
+    DepthMap::from_vec(width, height, rows.concat()).unwrap_or_else(|_| imprint.clone())
+}
+
 /// Side of the squares whose medians [`rise`] compares, as a share of the imprint's width: 7 px of 175.
 const SQUARES_ACROSS: usize = 25;
 /// Share of the squares that lie lower than the imprint's rest, and of those that lie higher than its top.
@@ -298,6 +322,21 @@ mod tests {
         }
         let deep = settled(&bump(0.0, 0.008), all.clone());
         assert_eq!((deep.mask, deep.basis), (all, MaskBasis::Source));
+    }
+
+    #[test]
+    fn grain_goes_and_edges_stay() {
+        let clean = DepthMap::from_fn(40, 30, |x, _| if x < 20 { 0.001 } else { 0.009 });
+        let mut grainy = clean.clone();
+        for i in (0..grainy.len()).step_by(7) {
+            grainy.as_mut_slice()[i] = [0.0, f32::NAN, 0.03][i % 3];
+        }
+        let found = without_grain(&grainy, 2);
+        let wrong = found.as_slice().iter().zip(clean.as_slice()).filter(|(a, b)| a != b).count();
+        assert_eq!(wrong, 0);
+        assert!(without_grain(&DepthMap::filled(9, 9, f32::NAN), 2).as_slice().iter().all(|d| d.is_nan()));
+        assert_eq!(without_grain(&clean, 0), clean);
+        assert_eq!(without_grain(&DepthMap::filled(0, 0, 0.0), 3).len(), 0);
     }
 
     #[test]

@@ -109,7 +109,7 @@ impl Touch<'_> {
         let to = Side { sample: &self.sample, pad, imprint };
         let near_cad = |at: CadPose, pose: HandPose| -> anyhow::Result<Proposal> {
             let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
-            let distances = propose::cad_distances(imprint, propose::camera_of(&self.sample, pad)?, tool, pose)?;
+            let distances = propose::cad_distances((imprint, args.imprint), (&self.sample, pad), tool, pose)?;
             Ok(propose::near_cad(&distances, args.mask.choice().cad_distance_m, at))
         };
         Ok(match args.propose.unwrap_or_default() {
@@ -131,8 +131,8 @@ impl Touch<'_> {
             ProposalSource::CadRegistered => {
                 let pose = self.pose(args.imprint, labels)?;
                 let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
-                let camera = propose::camera_of(&self.sample, pad)?;
-                let distances = propose::cad_distances(imprint, camera, tool, pose.into())?;
+                let at = (&self.sample, pad);
+                let distances = propose::cad_distances((imprint, args.imprint), at, tool, pose.into())?;
                 propose::near_cad(&distances, args.mask.choice().cad_distance_m, CadPose::Registered(pose))
             }
             ProposalSource::Grow => {

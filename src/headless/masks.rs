@@ -114,6 +114,9 @@ pub(super) struct ExportArgs {
     /// Divides pairs that the data set keeps for tests (test_only) like the rest; else they go to test.
     #[arg(long)]
     test_in_train: bool,
+    /// Count only pixels that a person painted: all others are ignored, in `ignore/` beside the masks.
+    #[arg(long)]
+    hand_checked: bool,
     /// Sends all pairs of a tool to the same part.
     #[arg(long)]
     by_tool: bool,
@@ -177,6 +180,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         choice: ExportChoice {
             which: args.pairs,
             test_in_train: args.test_in_train,
+            hand_checked: args.hand_checked,
             by_tool: args.by_tool,
             seed: args.split_seed,
         },

@@ -2,7 +2,9 @@
 //!
 //! * image: 8-bit gray, `(imprint + 0.0116) / 0.0341 * 255`, cut to whole numbers, limited to 0..255;
 //! * mask: 8-bit gray, 0 and 255;
-//! * per image exactly one mask of the same stem and size, nothing else in the folders.
+//! * per image exactly one mask of the same stem and size, nothing else in the folders;
+//! * where pixels are ignored, beside them `ignore/<stem>.png`: 255 where the mask says nothing. The lab's loader does not
+//!   look there: such pixels are free of contact to it.
 //!
 //! Source: `utils/data_loading.py` lines 22-30, 111-126 and 253-296 of the lab's UNet repository, and
 //! `ICP_dataset_cal.py` lines 641-676 for the scale.
@@ -34,6 +36,8 @@ pub const IMAGE_LO_M: f64 = -0.0116;
 pub const IMAGE_HI_M: f64 = 0.0225;
 /// Names of the parts, in the order of [`ExportReport::counts`].
 pub const PARTS: [&str; 3] = ["train", "val", "test"];
+/// The folder of the pixels of which masks say nothing.
+pub const IGNORED: &str = "ignore";
 /// The file that marks a folder as a previous export and lists what it wrote.
 pub const MANIFEST: &str = "touch2touch_export.json";
 
@@ -166,6 +170,8 @@ pub struct ExportReport {
     pub counts: [usize; 3],
     /// Pixels below or above the range of the image; they were limited to it.
     pub out_of_range_px: usize,
+    /// Pixels of which their masks say nothing.
+    pub ignored_px: usize,
     /// Pixels without measurement; they were written as an imprint of 0.
     pub unmeasured_px: usize,
     /// Parts without any image: the lab's trainer refuses those.
@@ -221,6 +227,17 @@ impl<E: std::fmt::Display> From<E> for LoadFailure {
     }
 }
 
+/// What is written of one entry; all are of one size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Content {
+    /// Meters, raw orientation.
+    pub imprint: DepthMap,
+    /// The contact.
+    pub mask: Mask,
+    /// Pixels of which the mask says nothing; `None` = it speaks of all.
+    pub ignored: Option<Mask>,
+}
+
 /// How many of `entries` go to each of [`PARTS`].
 ///
 /// # Errors
@@ -231,7 +248,7 @@ pub fn counts(entries: &[ExportEntry], config: &ExportConfig) -> Result<[usize; 
     Ok(counts)
 }
 
-/// Writes `entries` to `folder`; `load(i)` gives the imprint (meters, raw orientation) and mask of `entries[i]`.
+/// Writes `entries` to `folder`; `load(i)` gives the content of `entries[i]`.
 ///
 /// Everything is written and checked in a new folder beside `folder` and put in its place only when it is right; a
 /// previous export there is replaced. Same entries, config and content: same bytes.
@@ -242,7 +259,7 @@ pub fn export(
     folder: &Path,
     entries: &[ExportEntry],
     config: &ExportConfig,
-    mut load: impl FnMut(usize) -> Result<(DepthMap, Mask), LoadFailure>,
+    mut load: impl FnMut(usize) -> Result<Content, LoadFailure>,
 ) -> Result<ExportReport, ExportError> {
     if entries.is_empty() {
         return Err(ExportError::Nothing);
@@ -274,7 +291,7 @@ pub fn export(
     let mut mismatches = Vec::new();
     let mut failures = Vec::new();
     for (i, (stem, &part)) in stems.iter().zip(&parts).enumerate() {
-        let (imprint, mask) = match load(i) {
+        let Content { imprint, mask, ignored } = match load(i) {
             Ok(content) => content,
             Err(LoadFailure::Bad(reason)) => {
                 failures.push((place(&entries[i], &config.rig), reason));
@@ -286,13 +303,22 @@ pub fn export(
         if !failures.is_empty() {
             continue;
         }
-        if imprint.size() != mask.size() {
-            return Err(ExportError::Size { stem: stem.clone(), mask: mask.size(), imprint: imprint.size() });
+        for mask in std::iter::once(&mask).chain(&ignored) {
+            if imprint.size() != mask.size() {
+                return Err(ExportError::Size { stem: stem.clone(), mask: mask.size(), imprint: imprint.size() });
+            }
         }
         let image = image_from_imprint(&imprint, &mut report);
-        let mask = mask.map(|&v| if v { 255u8 } else { 0 });
+        let gray = |mask: &Mask| mask.map(|&v| if v { 255u8 } else { 0 });
         report.counts[part] += 1;
-        for (kind, picture) in [("imgs", &image), ("masks", &mask)] {
+        let mut pictures = vec![("imgs", image), ("masks", gray(&mask))];
+        if let Some(ignored) = ignored.filter(|ignored| ignored.as_slice().contains(&true)) {
+            report.ignored_px += ignored.as_slice().iter().filter(|v| **v).count();
+            let path = root.join(PARTS[part]).join(IGNORED);
+            std::fs::create_dir_all(&path).map_err(|s| io(&path, "make the folder", s))?;
+            pictures.push((IGNORED, gray(&ignored)));
+        }
+        for (kind, picture) in &pictures {
             let relative = format!("{}/{kind}/{stem}.png", PARTS[part]);
             let path = root.join(&relative);
             images::write_gray8(&path, picture)?;

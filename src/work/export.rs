@@ -9,13 +9,13 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::error::TaskError;
 use super::job::JobCx;
-use super::labels::{Labels, PairLabels, Review};
+use super::labels::{HandMask, Labels, PairLabels, Review};
 use crate::domain::dataset::{PairId, Split};
 use crate::domain::grid::Mask;
 use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
-use crate::io::export_unet::{self, ExportConfig, ExportEntry, ExportReport, LoadFailure, PARTS};
+use crate::io::export_unet::{self, Content, ExportConfig, ExportEntry, ExportReport, LoadFailure, PARTS};
 
 /// What it is called in errors.
 const WHAT: &str = "Export masks";
@@ -46,12 +46,12 @@ impl HandMasks<'_> {
     }
 
     /// The mask of one finger, if it has one.
-    fn get(&self, pair: &str, finger: PadId) -> Result<Option<Mask>, TaskError> {
+    fn get(&self, pair: &str, finger: PadId) -> Result<Option<HandMask>, TaskError> {
         let labels = match self.changed.get(pair) {
             Some(labels) => labels.clone(),
             None => self.labels.load(pair)?,
         };
-        Ok(labels.measured(finger).map(|hand| (*hand.mask).clone()))
+        Ok(labels.measured(finger).cloned())
     }
 
     /// The review states that are not "todo", by pair name.
@@ -91,6 +91,8 @@ pub struct ExportChoice {
     pub test_in_train: bool,
     /// Whether all pairs of a tool go to the same part.
     pub by_tool: bool,
+    /// Whether only pixels that a person painted count; all others are ignored.
+    pub hand_checked: bool,
     /// Decides which pair lands in which part.
     pub seed: u64,
 }
@@ -274,12 +276,16 @@ pub fn export_masks(
             true => masks.get(&entry.pair, entry.finger)?,
             false => None,
         };
-        let mask = match (by_hand, automatic.as_mut()) {
-            (Some(mask), _) => mask,
-            (None, Some(automatic)) => automatic(&sample, entry.finger, entry.tool.as_deref())?,
+        let (mask, ignored) = match (by_hand, automatic.as_mut()) {
+            (Some(hand), _) => ((*hand.mask).clone(), hand.unsaid(setup.choice.hand_checked)),
+            (None, Some(automatic)) => {
+                let mask = automatic(&sample, entry.finger, entry.tool.as_deref())?;
+                let unsaid = setup.choice.hand_checked.then(|| mask.map(|_| true));
+                (mask, unsaid)
+            }
             (None, None) => return Err(TaskError::new(WHAT, "its mask disappeared").into()),
         };
-        Ok((imprint, mask))
+        Ok(Content { imprint, mask, ignored })
     })
     .map_err(|err| {
         if cx.cancel.is_cancelled() { TaskError::cancelled(WHAT) } else { TaskError::from_error(WHAT, &err) }

@@ -207,6 +207,17 @@ impl HandMask {
         self.marks.base().text()
     }
 
+    /// The pixels of which it says nothing: those that are ignored, and with `hand_checked` all that no person painted.
+    pub fn unsaid(&self, hand_checked: bool) -> Option<Mask> {
+        let ignored = self.marks.ignored();
+        if !hand_checked {
+            return ignored.cloned();
+        }
+        let checked = self.marks.hand_checked();
+        let (width, height) = (checked.width(), checked.height());
+        Some(Mask::from_fn(width, height, |x, y| !checked[(x, y)] || self.marks.is_ignored(x, y)))
+    }
+
     /// Draws on it, as the person `by`.
     pub fn draw(&mut self, drawing: &Drawing, ground: Ground<'_>, by: Provenance) {
         drawing.apply(Arc::make_mut(&mut self.mask), Arc::make_mut(&mut self.marks), ground, by);

@@ -3,20 +3,22 @@
 //! Masks by threshold, share and mask model are those of [`super::mask`]; what comes here takes more than one imprint: a pose,
 //! strokes, another pair's mask.
 
+use std::borrow::Cow;
+
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::error::TaskError;
-use super::labels::{HandMask, MaskPlace, PairLabels, Review};
+use super::labels::{HandMask, ImprintSource, MaskPlace, PairLabels, Review};
 use crate::domain::cloud::CloudError;
-use crate::domain::contact::signed_distances;
+use crate::domain::contact::{signed_distances, without_grain};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::hand::HandPose;
 use crate::domain::label::{CadPose, Provenance, Surface, across, carry, grow_from};
 use crate::domain::pose::ToolModel;
-use crate::domain::rig::PadId;
+use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::{DepthCamera, PadTouch, Sample};
 
 const WHAT: &str = "Propose a mask";
@@ -128,9 +130,23 @@ fn fail(err: &CloudError) -> TaskError {
 ///
 /// # Errors
 /// If there is none.
-pub fn camera_of(sample: &Sample, pad: PadId) -> Result<&DepthCamera, TaskError> {
+fn camera_of(sample: &Sample, pad: PadId) -> Result<&DepthCamera, TaskError> {
     let camera = sample.pad(pad).and_then(PadTouch::camera);
     camera.ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))
+}
+
+/// How far around a pixel a measured imprint is looked at to tell grain from membrane, millimeters. On simulated touches of
+/// unseen tools at the true pose, masks of 1 mm then have an IoU of 0.93 with the truth, and of 0.82 with the grain.
+const GRAIN_MM: f64 = 1.7;
+
+/// The imprint as distances to the CAD model are measured from it: what was measured without its grain, a prediction, which
+/// has none, as it is.
+pub fn smooth_imprint<'a>(imprint: &'a DepthMap, of: ImprintSource, rig: &Rig) -> Cow<'a, DepthMap> {
+    let radius_px = (GRAIN_MM * rig.depth_px_per_mm()).round();
+    match of {
+        ImprintSource::Measured if radius_px >= 1.0 => Cow::Owned(without_grain(imprint, radius_px as usize)),
+        _ => Cow::Borrowed(imprint),
+    }
 }
 
 /// The signed distance of each membrane point to the CAD model, meters, negative inside; NaN without depth. From it
@@ -139,13 +155,14 @@ pub fn camera_of(sample: &Sample, pad: PadId) -> Result<&DepthCamera, TaskError>
 /// # Errors
 /// If sizes differ or the camera's numbers cannot be right.
 pub fn cad_distances(
-    imprint: &DepthMap,
-    camera: &DepthCamera,
+    (imprint, of): (&DepthMap, ImprintSource),
+    (sample, pad): (&Sample, PadId),
     tool: &ToolModel,
     grasp_from_object: HandPose,
 ) -> Result<Grid<f64>, TaskError> {
+    let (imprint, camera) = (smooth_imprint(imprint, of, &sample.rig), camera_of(sample, pad)?);
     let object_from_grasp = grasp_from_object.to_affine().inverse();
-    signed_distances(imprint, camera, &tool.distance, object_from_grasp, FARTHEST_M).map_err(|err| fail(&err))
+    signed_distances(&imprint, camera, &tool.distance, object_from_grasp, FARTHEST_M).map_err(|err| fail(&err))
 }
 
 /// The pixels within a distance of the CAD model.

@@ -222,8 +222,14 @@ fn form() -> impl Strategy<Value = FigureForm> {
 }
 
 fn mask_choice() -> impl Strategy<Value = ExportChoice> {
-    let flags = (any_of::<Which>(), any::<bool>(), any::<bool>(), any::<u64>());
-    flags.prop_map(|(which, test_in_train, by_tool, seed)| ExportChoice { which, test_in_train, by_tool, seed })
+    let flags = (any_of::<Which>(), any::<[bool; 3]>(), any::<u64>());
+    flags.prop_map(|(which, [test_in_train, by_tool, hand_checked], seed)| ExportChoice {
+        which,
+        test_in_train,
+        by_tool,
+        hand_checked,
+        seed,
+    })
 }
 
 fn output() -> impl Strategy<Value = Output> {

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
-use touch2touch::domain::grid::{DepthMap, Grid, Mask};
+use touch2touch::domain::grid::{Grid, Mask};
 use touch2touch::domain::rig::lab;
-use touch2touch::io::export_unet::{ExportConfig, ExportEntry, ExportError, MANIFEST, check_folder, export};
+use touch2touch::io::export_unet::{
+    Content, ExportConfig, ExportEntry, ExportError, IGNORED, MANIFEST, PARTS, check_folder, export,
+};
 use touch2touch::io::images;
 
 fn entries(n: usize) -> Vec<ExportEntry> {
@@ -18,7 +20,7 @@ fn entries(n: usize) -> Vec<ExportEntry> {
         .collect()
 }
 
-fn content(i: usize) -> (DepthMap, Mask) {
+fn content(i: usize) -> Content {
     let imprint = Grid::from_fn(175, 140, |x, y| match (x, y) {
         (0, 0) => -0.0116,
         (1, 0) => 0.0,
@@ -28,7 +30,7 @@ fn content(i: usize) -> (DepthMap, Mask) {
         (5, 0) => -0.02,
         _ => 0.0001 * (i + x) as f32 / 2.0,
     });
-    (imprint.clone(), imprint.map(|&v| v > 0.005))
+    Content { mask: imprint.map(|&v| v > 0.005), imprint, ignored: None }
 }
 
 fn run(folder: &Path, n: usize, config: &ExportConfig) -> Result<[usize; 3], ExportError> {
@@ -97,7 +99,7 @@ fn foreign_folders_and_failures_leave_everything_as_it_was() {
     let failing =
         export(&folder, &entries(5), &config, |i| if i == 3 { Err("no imprint".into()) } else { Ok(content(i)) });
     assert!(failing.unwrap_err().to_string().contains("no imprint"));
-    let wrong = export(&folder, &entries(5), &config, |i| Ok((content(i).0, Mask::filled(3, 3, true))));
+    let wrong = export(&folder, &entries(5), &config, |i| Ok(Content { mask: Mask::filled(3, 3, true), ..content(i) }));
     assert!(matches!(wrong, Err(ExportError::Size { .. })));
     assert!(matches!(run(&folder, 0, &config), Err(ExportError::Nothing)));
     assert_eq!(tree(&folder), before);
@@ -131,4 +133,27 @@ fn the_check_finds_what_the_loader_would_trip_over() {
     {
         assert!(problems.iter().any(|p| p.what.contains(word)), "{word}: {problems:#?}");
     }
+}
+
+#[test]
+fn pixels_of_which_a_mask_says_nothing_lie_beside_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("out");
+    let some = Mask::from_fn(175, 140, |x, _| x < 9);
+    let load = |i: usize| Ok(Content { ignored: (i == 2).then(|| some.clone()), ..content(i) });
+    let report = export(&folder, &entries(5), &ExportConfig::default(), load).unwrap();
+    assert_eq!(report.ignored_px, 9 * 140);
+    let found: Vec<_> = PARTS
+        .iter()
+        .filter_map(|part| std::fs::read_dir(folder.join(part).join(IGNORED)).ok())
+        .flatten()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    assert_eq!(found.len(), 1);
+    let read = images::read_gray8(&found[0]).unwrap();
+    assert!(read.map(|v| *v == 255) == some);
+    // The loader's rules still hold, and a second export over the first goes.
+    assert!(check_folder(&folder).problems.is_empty());
+    export(&folder, &entries(5), &ExportConfig::default(), |i| Ok(content(i))).unwrap();
+    assert!(!folder.join("train").join(IGNORED).exists());
 }

@@ -80,13 +80,14 @@ impl Computes for DistancesKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Distances>> {
         let (imprint, touch) = (self.imprint.find(state)?, self.imprint.touch());
         let (at, pose) = self.at.find(state, touch.pair)?;
-        let sample = state.results.samples.get(&touch.pair)?.clone();
+        let (sample, side) = (state.results.samples.get(&touch.pair)?.clone(), self.imprint.side());
         let tool = state.library.entry(touch.pair.pair)?.tool.as_deref()?;
         let tool = ToolKey { dataset: touch.pair.dataset, name: tool.into() };
         let tool = state.results.tools.get(&tool)?.clone();
         Some(Job::new(Lane::Compute, "Distances to the CAD model", move |_| {
-            let camera = propose::camera_of(&sample, touch.finger)?;
-            Ok(Distances { grid: propose::cad_distances(imprint.get()?, camera, &tool.model, pose)?, at })
+            let touched = (&*sample, touch.finger);
+            let grid = propose::cad_distances((imprint.get()?, side), touched, &tool.model, pose)?;
+            Ok(Distances { grid, at })
         }))
     }
 
