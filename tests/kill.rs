@@ -1,7 +1,7 @@
 //! The studio's saving under SIGKILL: what was said to be saved is on the disk, whatever the moment.
 //!
 //! One test plays both parts. The parent starts this binary again on the same test with [`ROLE`] set; that child drives
-//! the application model over real files (strokes, clean-ups, undo, navigation, review states, by a seeded script) and
+//! the application model over real files (every drawing tool, contact and ignored pixels, clean-ups, undo, navigation, review states, by a seeded script) and
 //! says after each round up to which act a pair is saved, as the model's document has it. The parent plays the same script
 //! by itself, without saving, so that it knows every mask after every act; kills the child at a random moment; and reads
 //! the folder with the product's reader. Each mask and review state must be one that was there at the last confirmation or
@@ -17,20 +17,21 @@ use std::time::Duration;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Opened, Pane, ViewCommand};
+use strum::IntoEnumIterator as _;
+use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Opened, Pane, SettingsCommand, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::{HandMask, MaskPlace, PairLabels, Review};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::{LiveSource, open_source};
 use touch2touch::app::services::{DataSource, Services};
-use touch2touch::app::settings::Settings;
+use touch2touch::app::settings::{MaskTool, Settings};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::domain::contact::ContactMask;
 use touch2touch::domain::dataset::{Index, PairId, Problem};
 use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::grid::{DepthMap, Grid, Mask};
-use touch2touch::domain::label::CleanKind;
+use touch2touch::domain::grid::{DepthMap, Grid};
+use touch2touch::domain::label::{CleanKind, CleanUp, PackedMask, Paint};
 use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::Sample;
@@ -158,25 +159,43 @@ fn script(seed: u64) -> Vec<Vec<Command>> {
         let finger = if rng.random() { lab::RIGHT } else { lab::LEFT };
         acts.push(match rng.random_range(0..20) {
             0..11 => {
+                let tool = [MaskTool::Brush, MaskTool::Eraser, MaskTool::Lasso, MaskTool::Polygon, MaskTool::Rectangle]
+                    .into_iter()
+                    .chain([MaskTool::Wand, MaskTool::Brush])
+                    .nth(rng.random_range(0..7))
+                    .unwrap_or_default();
+                let paint = if rng.random_range(0..5) == 0 { Paint::Ignore } else { Paint::Contact };
                 let mut at = || [rng.random_range(0.0..175.0f32), rng.random_range(0.0..140.0f32)];
-                let (at_px, to) = (at(), at());
+                let (at_px, way) = (at(), [at(), at(), at()]);
                 let begin = Command::Labels(LabelsCommand::BeginStroke {
                     finger,
                     source: ImprintSource::Measured,
                     at_px,
                     erase: rng.random(),
                 });
-                vec![
+                let mut act = vec![
+                    Command::Settings(SettingsCommand::SetMaskTool(tool)),
+                    Command::Settings(SettingsCommand::SetPaint(paint)),
                     Command::View(ViewCommand::SelectFinger(finger)),
                     begin,
-                    Command::Labels(LabelsCommand::StrokeTo(to)),
-                    Command::Labels(LabelsCommand::EndStroke),
+                ];
+                for to in way {
+                    act.push(Command::Labels(LabelsCommand::StrokeTo(to)));
+                    if tool == MaskTool::Polygon {
+                        act.push(Command::Labels(LabelsCommand::Corner(to)));
+                    }
+                }
+                act.push(Command::Labels(LabelsCommand::EndStroke));
+                act
+            }
+            11 => {
+                let kinds: Vec<CleanKind> = CleanKind::iter().collect();
+                let clean_up = CleanUp::from(kinds[rng.random_range(0..kinds.len())]);
+                vec![
+                    Command::View(ViewCommand::SelectFinger(finger)),
+                    Command::Labels(LabelsCommand::CleanUp(clean_up)),
                 ]
             }
-            11 => vec![
-                Command::View(ViewCommand::SelectFinger(finger)),
-                Command::Labels(LabelsCommand::CleanUp(CleanKind::FillHoles.into())),
-            ],
             12 => vec![Command::View(ViewCommand::SelectFinger(finger)), Command::Labels(LabelsCommand::ResetMask)],
             13 | 14 => vec![Command::Labels(LabelsCommand::Undo)],
             15 => vec![Command::Labels(LabelsCommand::Redo)],
@@ -249,10 +268,11 @@ fn act(role: &str) -> ! {
     }
 }
 
-type Labels = (BTreeMap<MaskPlace, Mask>, Review);
+/// Masks with the provenance of each pixel, and the review state.
+type Labels = (BTreeMap<MaskPlace, PackedMask>, Review);
 
 fn plain(labels: &PairLabels) -> Labels {
-    let mask = |(place, hand): (&MaskPlace, &HandMask)| (place.clone(), (*hand.mask).clone());
+    let mask = |(place, hand): (&MaskPlace, &HandMask)| (place.clone(), hand.pack());
     (labels.masks.iter().map(mask).collect(), labels.review)
 }
 
@@ -340,6 +360,13 @@ fn compare(folder: &Path, played: &[BTreeMap<String, Labels>], said: &Said) -> u
     }
     let mut newer = 0;
     for entry in &source.index().pairs {
+        // Of a journal, a kill can only cut the last line short.
+        let journal = store.journal(&entry.name).unwrap();
+        let (whole, last) = journal.split_at(journal.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1));
+        let torn = |line: &&[u8]| !line.is_empty() && serde_json::from_slice::<serde_json::Value>(line).is_err();
+        // One that was cut short before is closed by the next one.
+        let torn = whole.split(|b| *b == b'\n').filter(torn).count();
+        assert!(torn < ROUNDS, "{torn} lines of a journal do not parse; the last: {:?}", String::from_utf8_lossy(last));
         let (masks, review) = plain(&source.load_labels(&entry.name).unwrap());
         let confirmed = said.saved.get(&entry.name).copied().unwrap_or(0);
         // A line may be on its way when the kill comes, an act is announced before it is begun.
