@@ -54,6 +54,25 @@ impl Rect {
     }
 }
 
+/// The smallest rectangle in which two masks of one size differ; `None` if they are equal or of different size.
+pub fn difference(a: &Mask, b: &Mask) -> Option<Rect> {
+    if a.size() != b.size() {
+        return None;
+    }
+    let mut rect: Option<Rect> = None;
+    for y in 0..a.height() {
+        let (a, b) = (a.row(y), b.row(y));
+        if a == b {
+            continue;
+        }
+        let Some(left) = a.iter().zip(b).position(|(a, b)| a != b) else { continue };
+        let right = a.iter().zip(b).rposition(|(a, b)| a != b).unwrap_or(left);
+        let row = Rect { x: left, y, width: right - left + 1, height: 1 };
+        rect = Some(rect.map_or(row, |r| r.union(row)));
+    }
+    rect
+}
+
 /// Sets every pixel whose center lies within `radius_px` of the segment from `a` to `b` (pixel coordinates,
 /// `(0, 0)` = center of the first pixel), and the pixel under each end; of those only what `allow(x, y)` names, e.g. what
 /// lies within a depth range. `a == b` is a single stamp.
@@ -139,6 +158,15 @@ mod tests {
                 Some(left) => assert_eq!(count(&mask), left),
             }
         }
+    }
+
+    #[test]
+    fn masks_differ_in_a_rectangle() {
+        let (a, mut b) = (empty(), empty());
+        assert_eq!(difference(&a, &b), None);
+        (b[(3, 9)], b[(12, 4)]) = (true, true);
+        assert_eq!(difference(&a, &b), Some(Rect { x: 3, y: 4, width: 10, height: 6 }));
+        assert_eq!(difference(&a, &Mask::filled(3, 3, true)), None);
     }
 
     #[test]

@@ -1,8 +1,6 @@
 //! The mask on an image, and the pen on it.
 
-use eframe::egui::{
-    Align2, Color32, CursorIcon, Event, FontId, Key, PointerButton, Pos2, Stroke, TextureId, Ui, Vec2, vec2,
-};
+use eframe::egui::{Align2, Color32, CursorIcon, Event, FontId, Key, PointerButton, Pos2, Stroke, Ui, Vec2, vec2};
 
 use super::{CONTACT, IGNORED, Memory, PROPOSED};
 use crate::app::command::{LabelsCommand, SettingsCommand, ViewCommand};
@@ -35,8 +33,7 @@ pub(super) fn mask(
     if !settings.mask_outline && cx.state.selection.panes.contains(&Pane::Masks) {
         let mask = in_force.mask;
         let slot = ("mask", source, finger);
-        let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, || (mask_image(mask, Color32::WHITE), None));
-        let texture: TextureId = picture.texture.id();
+        let texture = cx.shared.textures.mask(ui.ctx(), slot, &key, mask);
         output.paint(texture, CONTACT.gamma_multiply(settings.mask_opacity));
     }
     if let Some(ignored) = cx.state.hand_mask(source, finger).and_then(|hand| hand.marks.ignored()) {

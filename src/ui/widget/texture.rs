@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
 
-use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions};
+use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureId, TextureOptions};
 
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::label::{Rect, difference};
 use crate::domain::picture::{self, Rgb8};
 
 /// Bars in a histogram.
@@ -66,8 +68,20 @@ pub struct Picture {
 pub struct Textures {
     slots: BTreeMap<u64, Picture>,
     frame: u64,
+    masks: BTreeMap<u64, MaskPicture>,
     /// Uploads since the start: tests hold on to it that an idle frame uploads nothing.
     pub uploads: u64,
+    /// Pixels of masks uploaded since the start.
+    pub uploaded_px: usize,
+}
+
+/// A mask on the graphics card.
+struct MaskPicture {
+    texture: TextureHandle,
+    /// What is on the card.
+    mask: Arc<Mask>,
+    key: u64,
+    used: u64,
 }
 
 impl Textures {
@@ -76,6 +90,7 @@ impl Textures {
         self.frame += 1;
         let frame = self.frame;
         self.slots.retain(|_, picture| picture.used + 120 > frame);
+        self.masks.retain(|_, picture| picture.used + 120 > frame);
     }
 
     /// The picture in `slot`; made with `make` if `key` (the recipe of what it shows) or `nearest` changed.
@@ -113,6 +128,36 @@ impl Textures {
         };
         picture.used = frame;
         picture
+    }
+
+    /// A mask as a white layer in `slot`: where one of the same size was there before, only the rectangle in which they
+    /// differ is uploaded. A stroke costs what it touches.
+    pub fn mask(&mut self, ctx: &Context, slot: impl Hash, key: impl Hash, mask: &Arc<Mask>) -> TextureId {
+        let (slot, key) = (hash(slot), hash(key));
+        let frame = self.frame;
+        let (options, white) = (TextureOptions::NEAREST, Color32::WHITE);
+        let held = self.masks.entry(slot).or_insert_with(|| {
+            self.uploads += 1;
+            self.uploaded_px += mask.len();
+            let texture = ctx.load_texture("mask", mask_image(mask, white), options);
+            MaskPicture { texture, mask: mask.clone(), key, used: frame }
+        });
+        held.used = frame;
+        if held.key != key {
+            held.key = key;
+            if held.mask.size() != mask.size() {
+                self.uploads += 1;
+                self.uploaded_px += mask.len();
+                held.texture.set(mask_image(mask, white), options);
+            } else if let Some(Rect { x, y, width, height }) = difference(&held.mask, mask) {
+                self.uploads += 1;
+                self.uploaded_px += width * height;
+                let part = Mask::from_fn(width, height, |dx, dy| mask[(x + dx, y + dy)]);
+                held.texture.set_partial([x, y], mask_image(&part, white), options);
+            }
+            held.mask = mask.clone();
+        }
+        held.texture.id()
     }
 
     /// The picture in `slot` as it is: the one before, while the next is being made.
@@ -235,6 +280,23 @@ mod tests {
         textures.get(&ctx, "a", 2, true, make);
         textures.get(&ctx, "b", 2, true, make);
         assert_eq!(textures.uploads, 3);
+    }
+
+    #[test]
+    fn of_a_changed_mask_only_what_differs_is_uploaded() {
+        let (ctx, mut textures) = (Context::default(), Textures::default());
+        let before = Arc::new(Mask::filled(40, 30, false));
+        textures.mask(&ctx, "a", 1, &before);
+        assert_eq!(textures.uploaded_px, 40 * 30);
+        let mut after = (*before).clone();
+        (after[(7, 9)], after[(9, 12)]) = (true, true);
+        let after = Arc::new(after);
+        textures.mask(&ctx, "a", 2, &after);
+        textures.mask(&ctx, "a", 2, &after);
+        textures.mask(&ctx, "a", 3, &after);
+        assert_eq!((textures.uploads, textures.uploaded_px), (2, 40 * 30 + 3 * 4));
+        textures.mask(&ctx, "a", 4, &Arc::new(Mask::filled(9, 9, true)));
+        assert_eq!((textures.uploads, textures.uploaded_px), (3, 40 * 30 + 3 * 4 + 81));
     }
 
     #[test]
