@@ -17,7 +17,7 @@ use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{CleanUp, DrawTool, Drawing, Paint, Provenance};
 use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
-use crate::work::labels::{Act, Deed, system_person};
+use crate::work::labels::{Act, Deed, note, system_person};
 use crate::work::propose::accepted;
 
 /// What can happen to the document.
@@ -58,6 +58,8 @@ pub enum LabelsCommand {
     Redo,
     /// Sets the review state of the selected pair.
     SetReview(Review),
+    /// Sets the note of a pair: it was typed while that one was on screen.
+    SetNote(String, String),
     /// Accepts the pose shown for an imprint, or withdraws it.
     AcceptPose(ImprintSource, bool),
     /// Writes all labels and settings now.
@@ -84,6 +86,10 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         LabelsCommand::Redo => redo(state, effects),
         LabelsCommand::SetReview(review) => {
             set_review(state, review, effects);
+            state.reorder();
+        }
+        LabelsCommand::SetNote(pair, text) => {
+            set_note(state, &pair, &text, effects);
             state.reorder();
         }
         LabelsCommand::AcceptPose(source, accept) => accept_pose(state, source, accept, effects),
@@ -394,6 +400,17 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
     let edit = Edit::Review { pair: pair.clone(), review: before };
     state.history.record(Gesture { name: "review state".into(), edits: vec![edit] });
     save_pair(state, &pair, Deed::named("review state"), effects);
+}
+
+fn set_note(state: &mut State, pair: &str, text: &str, effects: &mut Vec<Effect>) {
+    let text = note(text);
+    if !state.document.is_editable(pair) || state.document.note(pair) == text {
+        return;
+    }
+    let before = state.document.set_note(pair, text);
+    let edit = Edit::Note { pair: pair.to_owned(), note: before };
+    state.history.record(Gesture { name: "note".into(), edits: vec![edit] });
+    save_pair(state, pair, Deed::named("note"), effects);
 }
 
 fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: &mut Vec<Effect>) {

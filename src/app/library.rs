@@ -274,8 +274,12 @@ pub(super) fn show(
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.history.clear();
     state.tasks.failed.clear();
-    state.document =
-        Document { reviews: opened.reviews, last_revision: state.document.last_revision, ..Document::default() };
+    state.document = Document {
+        reviews: opened.reviews,
+        notes: opened.notes,
+        last_revision: state.document.last_revision,
+        ..Document::default()
+    };
     state.library.opening = None;
     let tools = opened.source.index().tools();
     state.library.open = Some(OpenDataset { seq, place: place.clone(), source: opened.source.clone(), tools });

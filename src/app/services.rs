@@ -156,6 +156,8 @@ pub struct Opened {
     pub source: Arc<dyn DataSource>,
     /// Review states stored with it that are not "todo", by pair name.
     pub reviews: BTreeMap<String, Review>,
+    /// Notes stored with it, by pair name.
+    pub notes: BTreeMap<String, String>,
 }
 
 impl std::fmt::Debug for Opened {

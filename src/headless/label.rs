@@ -17,7 +17,7 @@ use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::work::job::JobCx;
-use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, system_person};
+use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, note, system_person};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
 use crate::work::propose::{self, Proposal, ProposalSource, Side, accepted};
@@ -233,6 +233,9 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
     }
     if let Some(review) = args.review {
         labels.review = review;
+    }
+    if let Some(text) = &args.note {
+        labels.note = note(text);
     }
     Ok(())
 }

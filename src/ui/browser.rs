@@ -129,7 +129,8 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         } else if !response.has_focus() && memory.filter != cx.state.library.filter {
             memory.filter.clone_from(&cx.state.library.filter);
         }
-        let tip = "Words of the name or tool. tool:rod narrows to tools; is:todo, is:in-progress, is:flagged, is:done and \
+        let tip = "Words of the name, the tool or the note. tool:rod narrows to tools, note:edge to notes, has:note to pairs \
+             with one; is:todo, is:in-progress, is:flagged, is:done and \
              is:skip to review states; angle>5, psnr<20, ssim<0.8, rms>1, named<100 to scores (of the source chosen, \
              or measured:angle>2) in °, dB, mm and %";
         response.on_hover_text(cx.keys().behind(tip, Action::FindPair));
@@ -381,6 +382,10 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         } else {
             painter.circle_filled(dot, 4.0, color);
         }
+        let noted = !cx.state.document.note(&entry.name).is_empty();
+        if noted {
+            note_mark(&painter, pos2(rect.right() - 10.0, rect.top() + 9.0), p.caution);
+        }
         let mut right = rect.right() - 18.0;
         if let Some((text, color)) = figure_text(cx, id) {
             let at = pos2(right, rect.bottom() - 5.0);
@@ -400,9 +405,26 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         let tool = cut_in_the_middle(&tool, right - left, width);
         text.text(pos2(left, rect.bottom() - 5.0), Align2::LEFT_BOTTOM, tool, font.clone(), p.weak);
     }
-    let tip = format!("{}\n{}", entry.name, review.name());
+    let mut tip = format!("{}\n{}", entry.name, review.name());
+    let note = cx.state.document.note(&entry.name);
+    if !note.is_empty() {
+        tip += &format!("\nNote: {note}");
+    }
     if response.on_hover_text(tip).clicked() {
         cx.push(LibraryCommand::Select(id));
+    }
+}
+
+/// A sheet with lines: the pair has a note.
+fn note_mark(painter: &egui::Painter, center: egui::Pos2, color: Color32) {
+    painter.rect_stroke(
+        Rect::from_center_size(center, vec2(7.0, 8.0)),
+        1.0,
+        Stroke::new(1.0, color),
+        egui::StrokeKind::Inside,
+    );
+    for y in [-1.0, 1.0] {
+        painter.hline(center.x - 2.0..=center.x + 2.0, center.y + y, Stroke::new(1.0, color));
     }
 }
 

@@ -247,7 +247,12 @@ impl Services for Double {
         let source: Arc<dyn DataSource> = self.source.clone();
         let labels = self.source.labels.lock().unwrap();
         let reviews = labels.iter().filter(|(_, l)| l.review != Review::Todo);
-        Ok(Opened { source, reviews: reviews.map(|(name, l)| (name.clone(), l.review)).collect() })
+        let notes = labels.iter().filter(|(_, l)| !l.note.is_empty());
+        Ok(Opened {
+            source,
+            reviews: reviews.map(|(name, l)| (name.clone(), l.review)).collect(),
+            notes: notes.map(|(name, l)| (name.clone(), l.note.clone())).collect(),
+        })
     }
 
     fn find_bundles(&self, _: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {

@@ -63,7 +63,7 @@ use super::double::{Bench, Double, SIMULATED};
 use super::panes;
 
 /// What a document says, without revisions: equal if it looks the same.
-type Said = Vec<(String, BTreeMap<MaskPlace, Mask>, Review)>;
+type Said = Vec<(String, BTreeMap<MaskPlace, Mask>, Review, String)>;
 
 fn said(doc: &Document) -> Said {
     doc.labels
@@ -71,7 +71,7 @@ fn said(doc: &Document) -> Said {
         .filter(|(_, labels)| !labels.is_empty())
         .map(|(name, labels)| {
             let masks = labels.masks.iter().map(|(place, hand)| (place.clone(), (*hand.mask).clone()));
-            (name.clone(), masks.collect(), labels.review)
+            (name.clone(), masks.collect(), labels.review, labels.note.clone())
         })
         .collect()
 }
@@ -377,6 +377,7 @@ draws! {
         3 Undo,
         3 Redo,
         2 SetReview(any_of::<Review>()),
+        1 SetNote(select(vec!["tool_a/data_0".to_owned(), "no such pair".into()]), select(vec![String::new(), " odd\n edge ".into(), "x".repeat(3000)])),
         1 AcceptPose(source(), any::<bool>()),
         1 Save,
     }
@@ -631,9 +632,10 @@ fn carry_out(bench: &mut Bench, commands: Vec<(Command, u8)>) -> Result<(), Test
     }
     bench.send(LabelsCommand::EndStroke);
     bench.settle();
-    for (name, masks, review) in said(&bench.state.document) {
+    for (name, masks, review, note) in said(&bench.state.document) {
         let stored = bench.services.source.labels.lock().unwrap().get(&name).cloned().unwrap_or_default();
         prop_assert_eq!(stored.review, review);
+        prop_assert_eq!(stored.note, note);
         prop_assert_eq!(stored.masks.len(), masks.len());
         for (place, shown) in masks {
             prop_assert_eq!(&*stored.masks[&place].mask, &shown);

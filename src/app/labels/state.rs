@@ -29,6 +29,8 @@ pub struct Document {
     pub stored: BTreeMap<String, Stored>,
     /// Review states that are not "todo", of all pairs: known at opening.
     pub reviews: BTreeMap<String, Review>,
+    /// Notes of all pairs: known at opening.
+    pub notes: BTreeMap<String, String>,
     /// Pairs whose last change is not on the disk yet.
     pub unsaved: BTreeSet<String>,
     /// The last request to write each of them.
@@ -116,6 +118,11 @@ impl Document {
         self.reviews.get(name).copied().unwrap_or_default()
     }
 
+    /// The note of a pair; empty for none.
+    pub fn note(&self, name: &str) -> &str {
+        self.notes.get(name).map_or("", String::as_str)
+    }
+
     /// Whether the stored labels were read, so that the pair may be edited.
     pub fn is_editable(&self, name: &str) -> bool {
         self.stored.get(name) == Some(&Stored::Loaded)
@@ -145,5 +152,16 @@ impl Document {
             self.reviews.insert(name.to_owned(), review);
         }
         before
+    }
+
+    /// Changes the note in both places that hold it; returns the one before.
+    pub(in crate::app) fn set_note(&mut self, name: &str, note: String) -> String {
+        let labels = self.labels.entry(name.to_owned()).or_default();
+        if note.is_empty() {
+            self.notes.remove(name);
+        } else {
+            self.notes.insert(name.to_owned(), note.clone());
+        }
+        std::mem::replace(&mut labels.note, note)
     }
 }

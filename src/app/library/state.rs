@@ -1,6 +1,6 @@
 //! The open data set, and the list of pairs as the browser shows it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use strum::EnumIter;
 
 use super::super::evaluate::state::TableState;
 use super::super::keys::{DatasetSeq, PairKey};
-use super::super::labels::state::Review;
+use super::super::labels::state::Document;
 use super::super::services::DataSource;
 use super::super::state::State;
 use crate::domain::dataset::{Index, PairEntry, PairId};
@@ -123,8 +123,8 @@ pub struct Library {
     pub last_seq: DatasetSeq,
     /// What was seen of the folder while it is followed; `None` while it is not.
     pub follow: Option<Follow>,
-    /// Shows only pairs whose name or tool contains every word (any case). `tool:`, `is:` narrow a word; `angle>5` is a
-    /// [`Condition`] on a score.
+    /// Shows only pairs whose name, tool or note contains every word (any case). `tool:`, `is:` and `note:` narrow a word;
+    /// `has:note` are pairs with one; `angle>5` is a [`Condition`] on a score.
     pub filter: String,
     /// Shows only these pairs: those brushed in a picture of the scores.
     pub brush: Option<Arc<BTreeSet<PairId>>>,
@@ -174,8 +174,8 @@ impl Library {
         }
     }
 
-    /// Recomputes `order` from filter, tool and sort. `reviews` holds the states that are not "todo", by name.
-    pub(in crate::app) fn reorder(&mut self, reviews: &BTreeMap<String, Review>, table: &TableState) {
+    /// Recomputes `order` from filter, tool and sort.
+    pub(in crate::app) fn reorder(&mut self, document: &Document, table: &TableState) {
         let mut words: Vec<String> = self.filter.split_whitespace().map(str::to_lowercase).collect();
         let conditions: Vec<Condition> = words.iter().filter_map(|word| Condition::parse(word)).collect();
         words.retain(|word| Condition::parse(word).is_none());
@@ -183,18 +183,23 @@ impl Library {
             self.brush.as_ref().is_none_or(|brush| brush.contains(&id))
                 && conditions.iter().all(|condition| table.meets(id, condition))
         };
-        let review = |entry: &PairEntry| reviews.get(&entry.name).copied().unwrap_or_default();
+        let review = |entry: &PairEntry| document.review(&entry.name);
         let passes = |entry: &PairEntry| {
             let name = entry.name.to_lowercase();
             let tool = entry.tool.as_deref().unwrap_or("").to_lowercase();
+            let note = document.note(&entry.name).to_lowercase();
             self.tool.as_ref().is_none_or(|t| entry.tool.as_ref() == Some(t))
                 && words.iter().all(|word| {
                     if let Some(t) = word.strip_prefix("tool:") {
                         tool.contains(t)
                     } else if let Some(state) = word.strip_prefix("is:") {
                         review(entry).name().replace(' ', "-").starts_with(state)
+                    } else if let Some(part) = word.strip_prefix("note:") {
+                        note.contains(part)
+                    } else if word == "has:note" {
+                        !note.is_empty()
                     } else {
-                        name.contains(word.as_str()) || tool.contains(word.as_str())
+                        [&name, &tool, &note].into_iter().any(|text| text.contains(word.as_str()))
                     }
                 })
         };
@@ -233,6 +238,6 @@ pub fn short_name(entry: &PairEntry) -> &str {
 impl State {
     /// Recomputes the order of the list.
     pub(in crate::app) fn reorder(&mut self) {
-        self.library.reorder(&self.document.reviews, &self.table);
+        self.library.reorder(&self.document, &self.table);
     }
 }

@@ -50,9 +50,10 @@ impl Computes for LabelsKey {
         for hand in labels.masks.values_mut() {
             hand.revision = doc.next_revision();
         }
-        let review = labels.review;
+        let (review, note) = (labels.review, labels.note.clone());
         doc.labels.insert(name.clone(), labels);
         doc.set_review(&name, review);
+        doc.set_note(&name, note);
         state.history.restore(&name, &read.done, &read.undone);
     }
 

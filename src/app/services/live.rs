@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
-use super::super::labels::state::{PairLabels, Review};
+use super::super::labels::state::PairLabels;
 use super::super::library::state::Place;
 use super::super::services::Opened;
 use super::super::settings::state::{SETTINGS_VERSION, Settings};
@@ -36,8 +36,7 @@ use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
 use crate::work::job::JobCx;
-use crate::work::labels::Labels;
-use crate::work::labels::{Deed, Past};
+use crate::work::labels::{Deed, Labels, Past, Reviews};
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
 use crate::work::sweep::{self, Sweep, SweepSetup};
@@ -100,8 +99,8 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
     };
     let mut problems = dataset.problems.clone();
     let labels = Labels::of(&dataset);
-    let (reviews, mut damaged) = labels.reviews();
-    problems.append(&mut damaged);
+    let mut reviews = labels.reviews();
+    problems.append(&mut reviews.problems);
     Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews, case })
 }
 
@@ -111,7 +110,7 @@ pub struct LiveSource {
     dataset: Arc<Dataset>,
     labels: Labels,
     problems: Vec<Problem>,
-    reviews: BTreeMap<String, Review>,
+    reviews: Reviews,
     case: Option<(PairId, Case)>,
 }
 
@@ -200,8 +199,8 @@ impl DataSource for LiveSource {
 impl Services for LiveServices {
     fn open(&self, place: &Place) -> Result<Opened, TaskError> {
         let source = open_source(place)?;
-        let reviews = source.reviews.clone();
-        Ok(Opened { source: Arc::new(source), reviews })
+        let Reviews { states: reviews, notes, .. } = source.reviews.clone();
+        Ok(Opened { source: Arc::new(source), reviews, notes })
     }
 
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
@@ -385,7 +384,7 @@ mod tests {
     use crate::domain::rig::lab;
     use crate::io::masks::MaskStore;
     use crate::work::export::{LeftOut, Which};
-    use crate::work::labels::{HandMask, MaskPlace, Revision};
+    use crate::work::labels::{HandMask, MaskPlace, Review, Revision};
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
@@ -408,6 +407,7 @@ mod tests {
                 Some(PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
                 Some(AcceptedPose { pose: HandPose { x_m: 1e-3, ..HandPose::default() }, by_hand: true }),
             ],
+            note: "shallow at the edge".into(),
         }
     }
 
@@ -415,7 +415,7 @@ mod tests {
         let masks = |l: &PairLabels| {
             l.masks.iter().map(|(place, h)| (place.clone(), h.mask.clone(), h.base())).collect::<Vec<_>>()
         };
-        masks(a) == masks(b) && a.review == b.review && a.accepted == b.accepted
+        masks(a) == masks(b) && a.review == b.review && a.accepted == b.accepted && a.note == b.note
     }
 
     #[test]
@@ -428,7 +428,7 @@ mod tests {
         assert!(source.load_labels(&name).unwrap().is_empty());
         source.save_labels(&name, &labels(), &Deed::default()).unwrap();
         let again = LiveServices::with_config_folder(None).open(&place).unwrap();
-        assert_eq!(again.reviews[&name], Review::InProgress);
+        assert_eq!((again.reviews[&name], &*again.notes[&name]), (Review::InProgress, "shallow at the edge"));
         assert!(same(&again.source.load_labels(&name).unwrap(), &labels()));
         again.source.save_labels(&name, &PairLabels::default(), &Deed::default()).unwrap();
         assert!(open_source(&place).unwrap().load_labels(&name).unwrap().is_empty());

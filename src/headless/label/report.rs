@@ -20,6 +20,8 @@ pub(super) struct Stored {
     predicted: Vec<(String, usize, String)>,
     /// From the measured, from the predicted imprint.
     accepted: [Option<AcceptedPose>; 2],
+    /// What a person wrote about it; empty for nothing.
+    note: String,
 }
 
 impl Stored {
@@ -33,7 +35,14 @@ impl Stored {
                 ImprintOf::Predicted(what) => predicted.push((finger, pixels, what.to_string())),
             }
         }
-        Self { name: name.to_owned(), review: labels.review.stored(), masks, predicted, accepted: labels.accepted }
+        Self {
+            name: name.to_owned(),
+            review: labels.review.stored(),
+            masks,
+            predicted,
+            accepted: labels.accepted,
+            note: labels.note.clone(),
+        }
     }
 
     pub(super) fn text(&self) -> String {
@@ -47,6 +56,9 @@ impl Stored {
                 let by = if accepted.by_hand { ", by hand" } else { "" };
                 text += &format!("; {of} pose {:.1}° accepted{by}", place.theta_rad.to_degrees());
             }
+        }
+        if !self.note.is_empty() {
+            text += &format!("; note: {}", self.note);
         }
         text
     }

@@ -1,20 +1,18 @@
 //! Following a folder: the same follower as `touch2touch watch`.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::super::super::labels::state::Review;
 use super::super::{DataSource, Followed, Following};
 use super::LiveSource;
 use crate::domain::dataset::Problem;
 use crate::io::follow::{Arrival, Follower};
 use crate::work::error::TaskError;
-use crate::work::labels::Labels;
+use crate::work::labels::{Labels, Reviews};
 
 struct LiveFollowing {
     follower: Follower,
-    reviews: BTreeMap<String, Review>,
+    reviews: Reviews,
     labels: Labels,
     /// Troubles of the folder that were said.
     said: Vec<Problem>,
