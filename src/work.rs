@@ -35,6 +35,7 @@ pub mod pair_files;
 pub mod pose;
 pub mod prediction;
 pub mod propose;
+pub mod queue;
 pub mod statistics;
 pub mod subject;
 pub mod sweep;

@@ -70,6 +70,7 @@ fn how(action: Action) -> How {
         A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
+        A::RankMasks | A::NextUncertain => Verb(&["masks", "queue", "demo"]),
         A::TurnDial => Verb(&["sweep", "demo", "--dial", "threshold", "--values", "3,4,5", "--pairs", "8"]),
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),

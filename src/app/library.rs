@@ -19,12 +19,13 @@ use super::services::Opened;
 use super::settings::state::MAX_RECENT;
 use super::state::State;
 use super::tasks::state::Level;
-use super::{inspect, labels, settings, tasks};
+use super::{evaluate, inspect, labels, settings, tasks};
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
 use crate::io::dataset::ToolUnit;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
+use crate::work::queue::QueueBy;
 use crate::work::tool::UnitSet;
 
 /// What can happen to the data set and its list.
@@ -53,6 +54,8 @@ pub enum LibraryCommand {
     SetSort(Sort),
     /// Sorts it by a score.
     SetScore(ScoreChoice),
+    /// Sorts it by what is uncertain.
+    SetUncertainBy(QueueBy),
     /// Shows only these pairs, or all.
     Brush(Option<Arc<BTreeSet<PairId>>>),
     /// The rows of the list that are on screen.
@@ -69,6 +72,8 @@ pub enum LibraryCommand {
     NextUnfinished,
     /// Selects the next worst pair by the chosen score; the list is then in that order.
     NextWorst,
+    /// Shows the most uncertain pair whose review is not finished, then the next; the list is then in that order.
+    NextUncertain,
     /// Marks the selected pair as done and shows the next unfinished one.
     DoneAndNext,
 }
@@ -108,6 +113,11 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
             state.library.sort = Sort::Score;
             state.reorder();
         }
+        LibraryCommand::SetUncertainBy(by) => {
+            state.table.uncertain_by = by;
+            state.library.sort = Sort::Uncertain;
+            state.reorder();
+        }
         LibraryCommand::Brush(brush) => {
             state.library.brush = brush;
             state.reorder();
@@ -119,6 +129,7 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::Last => select_row(state, usize::MAX, effects),
         LibraryCommand::NextUnfinished => select_next_unfinished(state, effects),
         LibraryCommand::NextWorst => select_next_worst(state, effects),
+        LibraryCommand::NextUncertain => select_next_uncertain(state, effects),
         LibraryCommand::DoneAndNext => {
             labels::set_review(state, Review::Done, effects);
             // Before the list is sorted anew, so that "next" is what the person sees as next.
@@ -196,6 +207,24 @@ fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
     };
     let next = order[start.min(order.len())..].iter().chain(order).find(unfinished).copied();
     match next {
+        Some(pair) => select(state, pair, effects),
+        None => state.log.info("Every pair of the list is done or skipped"),
+    }
+}
+
+/// Where nothing is ranked yet, that is begun.
+fn select_next_uncertain(state: &mut State, effects: &mut Vec<Effect>) {
+    let sorted = std::mem::replace(&mut state.library.sort, Sort::Uncertain) == Sort::Uncertain;
+    state.reorder();
+    if state.table.scores.queue.known() == 0 {
+        return evaluate::rank(state, effects);
+    }
+    if sorted {
+        return select_next_unfinished(state, effects);
+    }
+    let unfinished =
+        |pair: &&PairId| state.library.entry(**pair).is_some_and(|e| !state.document.review(&e.name).is_finished());
+    match state.library.order.iter().find(unfinished).copied() {
         Some(pair) => select(state, pair, effects),
         None => state.log.info("Every pair of the list is done or skipped"),
     }

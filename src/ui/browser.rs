@@ -20,6 +20,7 @@ use crate::app::labels::Review;
 use crate::app::library::{Place, Sort, short_name};
 use crate::domain::dataset::PairId;
 use crate::domain::evaluation::Figure;
+use crate::work::queue::QueueBy;
 
 /// Height of a row, points.
 const ROW: f32 = 40.0;
@@ -146,6 +147,7 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         response.response.accessible_name("Sort").on_hover_text("Order of the list");
     });
     score_row(cx, ui);
+    uncertain_row(cx, ui);
     if let Some(open) = &cx.state.library.open
         && open.tools.len() > 1
     {
@@ -208,6 +210,30 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
     if let Some(next) = next {
         cx.push(LibraryCommand::SetScore(next));
+    }
+}
+
+/// What the list is ordered by where the most uncertain come first, and how many pairs are ranked.
+fn uncertain_row(cx: &mut Cx<'_>, ui: &mut Ui) {
+    if cx.state.library.sort != Sort::Uncertain {
+        return;
+    }
+    let by = cx.state.table.uncertain_by;
+    let combo = egui::ComboBox::from_id_salt("uncertain").width(ui.available_width()).selected_text(by.name());
+    let response = combo.truncate().show_ui(ui, |ui| {
+        for other in QueueBy::iter() {
+            if ui.selectable_label(other == by, other.name()).on_hover_text(other.tip()).clicked() {
+                cx.out.push(Command::Library(LibraryCommand::SetUncertainBy(other)));
+            }
+        }
+    });
+    response.response.accessible_name("Uncertain by").on_hover_text("What uncertain means. ".to_owned() + by.tip());
+    let (known, total) = (cx.state.table.scores.queue.known(), cx.state.library.pairs().len());
+    if cx.state.evaluating().is_none() {
+        ui.horizontal_wrapped(|ui| {
+            cx.action_button(ui, Action::RankMasks, "Rank");
+            ui.label(caption(format!("{known} of {total} ranked"), cx.p));
+        });
     }
 }
 
@@ -302,7 +328,7 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
     let total = cx.state.library.pairs().len();
     let scored = cx.state.table.by().map_or(0, |(source, _)| source.scored);
     let possible = Action::PredictAll.command(cx.state).is_some();
-    if (possible || cx.state.evaluating().is_some()) && scored < total {
+    if (possible && scored < total) || cx.state.evaluating().is_some() {
         predict_all(cx, ui, scored);
     }
 }
@@ -410,8 +436,23 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
     if !note.is_empty() {
         tip += &format!("\nNote: {note}");
     }
+    for part in cx.state.table.scores.queue.get(id).into_iter().flat_map(|queued| &queued.parts) {
+        let worse = (100.0 * part.rank).round();
+        tip += &format!("\n{}: more than {worse:.0} % of the others", part.text());
+    }
     if response.on_hover_text(tip).clicked() {
         cx.push(LibraryCommand::Select(id));
+    }
+}
+
+/// A figure in a word, beside its value.
+fn reason(figure: Figure) -> &'static str {
+    match figure {
+        Figure::Disagreement => "hand/model",
+        Figure::Unsure => "unsure",
+        Figure::SeedSpread => "seeds",
+        Figure::Angle => "angle",
+        other => other.name(),
     }
 }
 
@@ -428,9 +469,19 @@ fn note_mark(painter: &egui::Painter, center: egui::Pos2, color: Color32) {
     }
 }
 
-/// The score of a pair that the list is about.
+/// The score of a pair that the list is about; where the most uncertain come first, why it stands where it does.
 fn figure_text(cx: &Cx<'_>, pair: PairId) -> Option<(String, Color32)> {
-    let (source, figure) = cx.state.table.by()?;
+    let table = &cx.state.table;
+    if cx.state.library.sort == Sort::Uncertain {
+        let part = table.scores.queue.get(pair)?.reason(table.uncertain_by)?;
+        let color = match part.rank {
+            rank if rank > 0.9 => cx.p.wrong,
+            rank if rank > 0.7 => cx.p.caution,
+            _ => cx.p.text,
+        };
+        return Some((format!("{} {}", reason(part.figure), part.figure.text(part.value)), color));
+    }
+    let (source, figure) = table.by()?;
     let value = source.value(pair, figure)?;
     Some((figure.text(value), score_color(cx.p, source, figure, value)))
 }

@@ -55,6 +55,7 @@ use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
+use touch2touch::work::queue::QueueBy;
 use touch2touch::work::subject::Subject;
 use touch2touch::work::sweep::{Dial, InForce, Setting, Sweep};
 use touch2touch::work::tool::UnitSet;
@@ -335,6 +336,8 @@ draws! {
         1 Last,
         1 NextUnfinished,
         1 NextWorst,
+        1 NextUncertain,
+        1 SetUncertainBy(any_of::<QueueBy>()),
         1 DoneAndNext,
     }
     follow: FollowCommand {
@@ -421,6 +424,7 @@ draws! {
         1 Published(any::<bool>()),
         1 Start,
         1 All,
+        1 Rank,
         1 Export(Just(PathBuf::from("table"))),
     }
     dial: DialCommand {
