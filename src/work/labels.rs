@@ -2,8 +2,10 @@
 //! it lies on the disk. The studio and every verb read and write it here.
 
 mod journal;
+mod record;
 
 pub use journal::{Act, Change, Deed, Past};
+pub use record::{Base, MaskRecord, PAUSE_S, Record, working_seconds};
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -371,6 +373,15 @@ impl Labels {
     #[must_use]
     pub fn continued(&self, dataset: &Dataset) -> Self {
         Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: self.saved.clone() }
+    }
+
+    /// What a person drew a second time without seeing the first; in a folder of its own.
+    ///
+    /// # Errors
+    /// If there is no place for labels.
+    pub fn repeats_of(&self, person: &str) -> Result<Self, TaskError> {
+        let store = self.store("Repeats")?.repeats_of(person);
+        Ok(Self { store: Arc::new(Ok(store)), saved: Arc::default() })
     }
 
     /// The folder they lie in.
