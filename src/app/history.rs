@@ -258,6 +258,12 @@ impl History {
         Self::position(&self.undone, pair, shown).map(|at| &self.undone[at])
     }
 
+    /// Forgets what was done to a pair: it is shown as another one from now on.
+    pub fn forget(&mut self, pair: &str) {
+        self.done.retain(|gesture| gesture.pair() != pair);
+        self.undone.retain(|gesture| gesture.pair() != pair);
+    }
+
     /// Forgets everything: another data set is open.
     pub fn clear(&mut self) {
         self.done.clear();

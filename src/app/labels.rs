@@ -1,8 +1,10 @@
 //! The room of the document: strokes, clean-ups, review states, accepted poses, undo, saving.
 
+mod repeat;
 pub mod state;
 
-pub use state::{Changed, Document, HandMask, MaskPlace, PairLabels, Review, Stored, Stroke};
+pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
+pub use state::{Changed, Document, HandMask, MaskPlace, PairLabels, Repeating, Review, Stored, Stroke};
 
 use std::borrow::Cow;
 
@@ -473,14 +475,24 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
 
 /// Writes the labels of a pair of the open data set.
 fn save_pair(state: &mut State, name: &str, mut deed: Deed, effects: &mut Vec<Effect>) {
-    deed.person = Some(state.person()).filter(|person| !person.is_empty());
+    let repeat = state.document.repeats.get(name).map(|repeating| repeating.person.clone());
+    deed.person = repeat.clone().or_else(|| Some(state.person()).filter(|person| !person.is_empty()));
     let Some(open) = &state.library.open else { return };
     let revision = state.document.next_revision();
     let Some(labels) = state.document.labels.get(name) else { return };
-    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels: labels.clone(), deed };
+    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels: labels.clone(), deed, repeat };
     effects.push(Effect::SaveLabels(open.source.clone(), Box::new(save)));
     state.document.unsaved.insert(name.to_owned());
     state.document.asked.insert(name.to_owned(), revision);
+}
+
+/// Labels are on the disk: what is counted of them may be counted again, and what came back may be over.
+pub(super) fn saved(state: &mut State) {
+    let doc = &mut state.document;
+    if doc.unsaved.is_empty() && std::mem::take(&mut doc.marked) {
+        doc.marks += 1;
+    }
+    end_repeats(state);
 }
 
 fn save_all(state: &mut State, effects: &mut Vec<Effect>) {

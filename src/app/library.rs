@@ -132,8 +132,16 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::NextUncertain => select_next_uncertain(state, effects),
         LibraryCommand::DoneAndNext => {
             labels::set_review(state, Review::Done, effects);
+            state.document.since_repeat += 1;
             // Before the list is sorted anew, so that "next" is what the person sees as next.
-            select_next_unfinished(state, effects);
+            let next = next_unfinished(state);
+            match labels::next_repeat(state, next.is_none()) {
+                Some(pair) => {
+                    labels::begin_repeat(state, pair);
+                    select(state, pair, effects);
+                }
+                None => select_unfinished(state, next, effects),
+            }
             state.reorder();
         }
     }
@@ -198,14 +206,23 @@ fn step_by(state: &mut State, by: i64, effects: &mut Vec<Effect>) {
     }
 }
 
-fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
+/// The next of the list whose review is not finished, going round.
+fn next_unfinished(state: &State) -> Option<PairId> {
     let order = &state.library.order;
     let start = state.selection.pair.and_then(|pair| state.library.row_of(pair)).map_or(0, |row| row + 1);
     let unfinished = |pair: &&PairId| {
         Some(**pair) != state.selection.pair
             && state.library.entry(**pair).is_some_and(|e| !state.document.review(&e.name).is_finished())
     };
-    let next = order[start.min(order.len())..].iter().chain(order).find(unfinished).copied();
+    order[start.min(order.len())..].iter().chain(order).find(unfinished).copied()
+}
+
+fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
+    let next = next_unfinished(state);
+    select_unfinished(state, next, effects);
+}
+
+fn select_unfinished(state: &mut State, next: Option<PairId>, effects: &mut Vec<Effect>) {
     match next {
         Some(pair) => select(state, pair, effects),
         None => state.log.info("Every pair of the list is done or skipped"),
@@ -224,10 +241,8 @@ fn select_next_uncertain(state: &mut State, effects: &mut Vec<Effect>) {
     }
     let unfinished =
         |pair: &&PairId| state.library.entry(**pair).is_some_and(|e| !state.document.review(&e.name).is_finished());
-    match state.library.order.iter().find(unfinished).copied() {
-        Some(pair) => select(state, pair, effects),
-        None => state.log.info("Every pair of the list is done or skipped"),
-    }
+    let next = state.library.order.iter().find(unfinished).copied();
+    select_unfinished(state, next, effects);
 }
 
 fn select_next_worst(state: &mut State, effects: &mut Vec<Effect>) {
@@ -260,6 +275,7 @@ pub(super) fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>)
     }
     say_notes(state);
     settings::follow_range(state);
+    labels::end_repeats(state);
 }
 
 /// What is odd about the files of the selected pair, once it is loaded; each pair once.

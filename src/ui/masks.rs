@@ -1,6 +1,7 @@
 //! The mask tools: brush, eraser, automatic sources with live preview, clean-ups, undo, review state.
 
 mod proposal;
+mod stats;
 
 use eframe::egui::{self, RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
@@ -52,6 +53,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             note(cx, ui, memory);
             clean_ups(cx, ui);
             look(cx, ui);
+            stats::show(cx, ui);
         });
     });
 }

@@ -474,6 +474,7 @@ draws! {
         1 SetPoseEngine(registration()),
         1 SetRuntime(any_of::<EngineChoice>()),
         1 SetPerson(select(vec![String::new(), " Anna ".into(), "x".repeat(200)])),
+        1 SetRepeats(number()),
         1 SetCacheBudget(any::<u32>()),
         1 SetCamerasLinked(any::<bool>()),
         1 SetScene(scene()),

@@ -5,12 +5,12 @@ mod follow;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
-use super::super::labels::state::PairLabels;
+use super::super::labels::state::{PairLabels, Review};
 use super::super::library::state::Place;
 use super::super::services::Opened;
 use super::super::settings::state::{SETTINGS_VERSION, Settings};
@@ -36,6 +36,7 @@ use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
 use crate::work::job::JobCx;
+use crate::work::label_stats::{LabelStats, label_stats};
 use crate::work::labels::{Deed, Labels, Past, Reviews};
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
@@ -101,7 +102,7 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
     let labels = Labels::of(&dataset);
     let mut reviews = labels.reviews();
     problems.append(&mut reviews.problems);
-    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews, case })
+    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews, repeats: Arc::default(), case })
 }
 
 /// An open data set with its store of labels.
@@ -111,6 +112,8 @@ pub struct LiveSource {
     labels: Labels,
     problems: Vec<Problem>,
     reviews: Reviews,
+    /// Second masks, by person.
+    repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
     case: Option<(PairId, Case)>,
 }
 
@@ -118,6 +121,16 @@ impl LiveSource {
     /// The data set.
     pub fn dataset(&self) -> &Dataset {
         &self.dataset
+    }
+
+    /// What a person drew a second time: the same each time, so that only differences are written.
+    fn repeats_of(&self, person: &str) -> Result<Labels, TaskError> {
+        let mut known = self.repeats.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(labels) = known.get(person) {
+            return Ok(labels.clone());
+        }
+        let labels = self.labels.repeats_of(person)?;
+        Ok(known.entry(person.to_owned()).or_insert(labels).clone())
     }
 }
 
@@ -175,6 +188,18 @@ impl DataSource for LiveSource {
 
     fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
         self.labels.save(name, labels, deed)
+    }
+
+    fn load_repeat(&self, person: &str, name: &str) -> Result<PairLabels, TaskError> {
+        self.repeats_of(person)?.load(name)
+    }
+
+    fn save_repeat(&self, person: &str, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
+        self.repeats_of(person)?.save(name, labels, deed)
+    }
+
+    fn label_stats(&self, reviews: &BTreeMap<String, Review>, whose: (&str, f64)) -> Result<LabelStats, TaskError> {
+        Ok(label_stats(&self.dataset, &self.labels, reviews, whose))
     }
 
     fn plan_masks(&self, changed: &BTreeMap<String, PairLabels>, choice: ExportChoice) -> Result<Plan, TaskError> {
@@ -384,7 +409,7 @@ mod tests {
     use crate::domain::rig::lab;
     use crate::io::masks::MaskStore;
     use crate::work::export::{LeftOut, Which};
-    use crate::work::labels::{HandMask, MaskPlace, Review, Revision};
+    use crate::work::labels::{HandMask, MaskPlace, Revision};
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
