@@ -22,6 +22,7 @@ mod documented;
 mod hostile;
 #[cfg(feature = "onnx")]
 mod outputs;
+mod queue;
 mod training_data;
 mod unit;
 #[cfg(feature = "onnx")]

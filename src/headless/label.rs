@@ -3,6 +3,8 @@
 mod args;
 mod report;
 
+use strum::IntoEnumIterator as _;
+
 use super::output::says;
 use super::predict::Predictor;
 use super::{Output, VerbResult, find_pair};
@@ -17,7 +19,10 @@ use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::work::job::JobCx;
-use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, note, system_person};
+use crate::work::label_stats::LabelStats;
+use crate::work::labels::{
+    Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person,
+};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
 use crate::work::propose::{self, Proposal, ProposalSource, Side, accepted};
@@ -54,10 +59,14 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
             }
         }
     }
-    let report = Report { folder, pairs };
+    let counts = LabelStats::of_reviews(&dataset.index, &labels.reviews().states).all;
+    let report = Report { folder, pairs, counts };
     output.finish(&report, || {
         let lines: Vec<String> = report.pairs.iter().map(Stored::text).collect();
-        format!("{}\n{} labeled pairs in {}", lines.join("\n"), lines.len(), report.folder.display())
+        let counted = |review: Review| format!("{} {}", report.counts.of(review), review.name());
+        let counts: Vec<String> = Review::iter().map(counted).collect();
+        let (labeled, folder) = (lines.len(), report.folder.display());
+        format!("{}\n{labeled} labeled pairs in {folder}; of all pairs {}", lines.join("\n"), counts.join(", "))
     })?;
     Ok(complete)
 }

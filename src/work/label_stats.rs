@@ -9,6 +9,7 @@ use super::error::TaskError;
 use super::labels::{Act, Labels, Record, Review, working_seconds};
 use super::repeats::{Repeats, repeats};
 use crate::domain::dataset::Index;
+use crate::domain::label::Provenance;
 use crate::io::dataset::Dataset;
 
 /// How many pairs are in each review state.
@@ -73,20 +74,31 @@ pub struct PairWork {
     pub sources: BTreeMap<&'static str, usize>,
 }
 
-/// A mask's source without its numbers.
-fn source_of(base: &str) -> &'static str {
-    const KNOWN: [(&str, &str); 6] = [
+/// What a mask was made from, without its numbers.
+fn source_of(base: &Provenance) -> &'static str {
+    /// How older journals say it.
+    const TOLD: [(&str, &str); 6] = [
         ("Threshold", "threshold"),
         ("Top", "top percent"),
         ("CAD", "CAD distance"),
         ("UNet", "UNet"),
         ("Simulator", "simulator truth"),
-        ("the ", "other imprint"),
+        ("the ", "copy"),
     ];
-    match KNOWN.iter().find(|(begins, _)| base.starts_with(begins)) {
-        Some((_, source)) => source,
-        None if base.is_empty() => "nothing",
-        None => "other",
+    match base {
+        Provenance::Nothing => "nothing",
+        Provenance::Threshold { .. } => "threshold",
+        Provenance::TopPercent { .. } => "top percent",
+        Provenance::Cad { .. } => "CAD distance",
+        Provenance::Model { .. } => "UNet",
+        Provenance::Truth => "simulator truth",
+        Provenance::Copied { .. } => "copy",
+        Provenance::Grown => "grown",
+        Provenance::Imported { .. } => "imported",
+        Provenance::Told { text } => {
+            TOLD.iter().find(|(begins, _)| text.starts_with(begins)).map_or("other", |(_, source)| source)
+        }
+        _ => "other",
     }
 }
 
@@ -94,13 +106,13 @@ impl PairWork {
     /// What a journal says.
     pub fn of(pair: &str, tool: Option<&String>, records: &[Record]) -> Self {
         let mut work = Self { pair: pair.to_owned(), tool: tool.cloned(), ..Self::default() };
-        let mut bases: BTreeMap<(String, String), &str> = BTreeMap::new();
+        let mut bases: BTreeMap<(String, String), Provenance> = BTreeMap::new();
         for record in records {
             work.person.clone_from(&record.person);
             for mask in &record.masks {
                 let place = (mask.finger.clone(), mask.of.to_string());
                 match &mask.after {
-                    Some(after) => drop(bases.insert(place, &after.base)),
+                    Some(after) => drop(bases.insert(place, after.provenance())),
                     None => drop(bases.remove(&place)),
                 }
             }
@@ -234,13 +246,13 @@ pub fn label_stats(
 mod tests {
     use super::*;
     use crate::domain::dataset::{PairEntry, Split};
-    use crate::work::labels::{Base, MaskRecord};
+    use crate::work::labels::MaskRecord;
 
     fn deed(unix_s: u64, act: Act, name: &str, masks: &[(&str, Option<&str>)]) -> Record {
         let mask = |(finger, base): &(&str, Option<&str>)| MaskRecord {
             finger: (*finger).into(),
             of: "measured".into(),
-            after: base.map(|base| Base { base: base.into() }),
+            after: base.map(|base| Provenance::told(base).into()),
         };
         Record {
             unix_s,

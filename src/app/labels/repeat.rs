@@ -7,18 +7,9 @@ use super::super::state::State;
 use super::Review;
 use super::state::Repeating;
 use crate::domain::dataset::PairId;
-use crate::work::labels::system_person;
 
 /// So many pairs are done between two that come back.
 const BETWEEN: usize = 4;
-
-impl State {
-    /// Who labels: by the preferences, else whom the system says.
-    pub fn person(&self) -> String {
-        let named = self.settings.person.trim();
-        if named.is_empty() { system_person().unwrap_or_default() } else { named.to_owned() }
-    }
-}
 
 /// The pair that comes back now, if one does; `all_done`: there is nothing else to be done in the list.
 pub(in crate::app) fn next_repeat(state: &State, all_done: bool) -> Option<PairId> {

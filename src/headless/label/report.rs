@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::io::dataset::Dataset;
+use crate::work::label_stats::Counts;
 use crate::work::labels::{ImprintOf, PairLabels};
 
 /// What is stored of a pair.
@@ -71,4 +72,6 @@ pub(super) struct Report {
     pub(super) folder: PathBuf,
     /// The labeled pair, or all that are labeled.
     pub(super) pairs: Vec<Stored>,
+    /// All pairs of the data set by review state.
+    pub(super) counts: Counts,
 }

@@ -3,10 +3,11 @@
 use serde::Deserialize;
 
 use super::{Act, Labels, Review};
+use crate::domain::label::Provenance;
 use crate::work::error::TaskError;
 
 /// Something that was done to the labels of a pair.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct Record {
     /// When, seconds since 1970 (UTC).
     pub unix_s: u64,
@@ -28,7 +29,7 @@ pub struct Record {
 }
 
 /// A mask that was changed.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct MaskRecord {
     /// The finger.
     #[serde(default)]
@@ -42,11 +43,27 @@ pub struct MaskRecord {
 }
 
 /// What a mask is made from.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct Base {
-    /// In words, e.g. `Threshold 5.00 mm`.
+    /// In words, as older journals say it, e.g. `Threshold 5.00 mm`.
     #[serde(default)]
-    pub base: String,
+    base: String,
+    /// Where its pixels come from, what the correction began from first.
+    #[serde(default)]
+    layers: Vec<Provenance>,
+}
+
+impl Base {
+    /// What the correction began from.
+    pub fn provenance(&self) -> Provenance {
+        self.layers.first().cloned().unwrap_or_else(|| Provenance::told(self.base.as_str()))
+    }
+}
+
+impl From<Provenance> for Base {
+    fn from(base: Provenance) -> Self {
+        Self { base: String::new(), layers: vec![base] }
+    }
 }
 
 /// A longer time between two deeds is a pause, seconds: nobody worked on the pair then.
@@ -83,13 +100,14 @@ mod tests {
     #[test]
     fn lines_are_read_without_their_pixels_and_what_is_no_line_is_left_out() {
         let text = br#"{"unix_s":7,"person":"Anna","act":"do","name":"lasso","masks":[{"finger":"right","of":"measured","before":null,"after":{"size":[2,2],"runs":[4],"base":"Threshold 5.00 mm","later":1}}],"review":["todo","in_progress"],"accepted":[null,null]}
-{"unix_s":9,"person":"","act":"undo","name":"lasso","masks":[{"finger":"right","of":"measured","before":{"size":[2,2],"runs":[4],"base":""},"after":null}],"accepted":[null,null]}
+{"unix_s":9,"person":"","act":"undo","name":"lasso","masks":[{"finger":"right","of":"measured","before":{"size":[2,2],"runs":[4],"base":""},"after":null},{"finger":"left","of":"measured","before":null,"after":{"width":2,"height":1,"runs":[2],"layers":[{"kind":"grown"},{"kind":"hand","person":"Anna"}],"layer_runs":[[0,2]]}}],"accepted":[null,null]}
 {"unix_s":1"#;
         let found = parse(text);
         assert_eq!(found.len(), 2);
         assert_eq!((found[0].unix_s, found[0].person.as_str(), found[0].act), (7, "Anna", Act::Do));
-        assert_eq!(found[0].masks[0].after.as_ref().unwrap().base, "Threshold 5.00 mm");
+        assert_eq!(found[0].masks[0].after.as_ref().unwrap().provenance().text(), "Threshold 5.00 mm");
         assert_eq!(found[0].review, Some([Review::Todo, Review::InProgress]));
         assert_eq!((found[1].act, found[1].masks[0].after.clone()), (Act::Undo, None));
+        assert_eq!(found[1].masks[1].after.as_ref().unwrap().provenance(), Provenance::Grown);
     }
 }
