@@ -93,10 +93,9 @@ impl Edit {
     /// The pair's name.
     pub fn pair(&self) -> &str {
         match self {
-            Self::Mask { pair, .. }
-            | Self::Review { pair, .. }
-            | Self::Note { pair, .. }
-            | Self::Pose { pair, .. } => pair,
+            Self::Mask { pair, .. } | Self::Review { pair, .. } | Self::Note { pair, .. } | Self::Pose { pair, .. } => {
+                pair
+            }
         }
     }
 

@@ -20,9 +20,7 @@ use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::work::job::JobCx;
 use crate::work::label_stats::LabelStats;
-use crate::work::labels::{
-    Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person,
-};
+use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
 use crate::work::propose::{self, Proposal, ProposalSource, Side, accepted};

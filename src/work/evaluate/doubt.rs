@@ -2,7 +2,7 @@
 
 use super::models;
 use crate::domain::contact::ContactMask;
-use crate::domain::grid::{DepthMap, Grid};
+use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::label::Doubt;
 use crate::domain::rig::{PadId, PerPad};
 use crate::infer::mask::contact_of;
@@ -54,7 +54,12 @@ impl<'a> Seen<'a> {
                 continue;
             }
             let (probability, least) = self.probability(imprint, pad)?;
-            let model = contact_of(probability, imprint, *least).mask;
+            let mut model = contact_of(probability, imprint, *least).mask;
+            if let Some((hand, ignored)) = hand.and_then(|hand| Some((hand, hand.marks.ignored()?))) {
+                // Where a person says nothing there is nothing to disagree about.
+                let said = |x: usize, y: usize| if ignored[(x, y)] { hand.mask[(x, y)] } else { model[(x, y)] };
+                model = Mask::from_fn(model.width(), model.height(), said);
+            }
             doubt = doubt.or(Doubt::of(probability, &model, hand.map(|hand| &*hand.mask)));
         }
         Ok(doubt)

@@ -249,7 +249,8 @@ fn key(dataset: &Dataset, id: PairId, tool: &str, labels: &Labeled, files: &File
     }
     let labels = labels.load(&entry.name).ok()?;
     for (place, hand) in labels.iter().flat_map(|labels| &labels.masks) {
-        let pixels: Vec<u8> = hand.mask.as_slice().iter().map(|pixel| u8::from(*pixel)).collect();
+        let mut pixels: Vec<u8> = hand.mask.as_slice().iter().map(|pixel| u8::from(*pixel)).collect();
+        pixels.extend(hand.marks.ignored().iter().flat_map(|ignored| ignored.as_slice()).map(|pixel| u8::from(*pixel)));
         write!(text, "\n{place:?} {:?} {}", hand.mask.size(), sha256(&pixels)).ok()?;
     }
     Some(sha256(text.as_bytes())[..32].to_owned())
