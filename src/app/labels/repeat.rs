@@ -22,6 +22,7 @@ pub(in crate::app) fn next_repeat(state: &State, all_done: bool) -> Option<PairI
     let free = |name: &&String| {
         doc.review(name) == Review::Done
             && !doc.repeats.contains_key(*name)
+            && !doc.repeated.contains(*name)
             && !doc.unsaved.contains(*name)
             && doc.blocked(name).is_none()
             && state.pair_name() != name.as_str()
@@ -57,6 +58,7 @@ pub(in crate::app) fn end_repeats(state: &mut State) {
     for name in ended {
         let Some(Repeating { review, note, .. }) = doc.repeats.remove(&name) else { continue };
         doc.forget(&name);
+        doc.repeated.insert(name.clone());
         if review != Review::Todo {
             doc.reviews.insert(name.clone(), review);
         }

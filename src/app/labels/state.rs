@@ -34,6 +34,8 @@ pub struct Document {
     pub notes: BTreeMap<String, String>,
     /// Pairs that are drawn a second time without the first mask: what is known of them here is of that.
     pub repeats: BTreeMap<String, Repeating>,
+    /// Pairs that came back in this run, and are over.
+    pub(in crate::app) repeated: BTreeSet<String>,
     /// Pairs done since one came back.
     pub(in crate::app) since_repeat: usize,
     /// How often review states were written: what is counted of them is counted again then.
