@@ -2,12 +2,12 @@
 //! lie by the data, all through one pipeline (imprint, contact mask, pose, classifier). The verb `evaluate` and the
 //! studio's Evaluate pane both call [`evaluate`].
 
+mod apart;
 mod doubt;
 mod export;
 mod kept;
 mod load;
 mod methods;
-mod spread;
 mod tool;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -253,7 +253,7 @@ pub fn known(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Resul
     for (at, scores) in scores.iter_mut().enumerate() {
         let mut entries: Vec<_> = work.iter().flat_map(|tool| book.of(at, &tool.ids)).collect();
         if scores.upper_bound {
-            spread::put(&mut entries, dataset, setup, &models, all);
+            apart::put(&mut entries, dataset, setup, &models, all);
         }
         scores.grasps = entries.into_iter().map(|(_, entry)| entry.score).collect();
     }

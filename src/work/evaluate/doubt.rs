@@ -1,6 +1,5 @@
 //! How sure the mask model is of the imprints of a grasp; it sees each of them once.
 
-use super::models;
 use crate::domain::contact::ContactMask;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::label::Doubt;
@@ -9,6 +8,7 @@ use crate::infer::mask::contact_of;
 use crate::work::error::TaskError;
 use crate::work::labels::{MaskPlace, PairLabels};
 use crate::work::mask::{self, MaskInputs};
+use crate::work::models;
 use crate::work::models::Masking;
 
 /// What the mask model said of the imprints of a grasp.

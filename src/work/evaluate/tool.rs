@@ -9,7 +9,7 @@ use super::doubt::Seen;
 use super::kept::{Entry, Kept};
 use super::load::{Case, Labeled, load};
 use super::methods::{Made, Method, Models};
-use super::{Setup, Skipped, ToolWork, spread};
+use super::{Setup, Skipped, ToolWork, apart};
 use crate::domain::align::Ask;
 use crate::domain::catalog::pattern_of;
 use crate::domain::contact::{ContactMask, MaskBasis};
@@ -195,7 +195,7 @@ impl<'a> Tool<'a> {
                     doubt,
                     seed_spread_m: None,
                 };
-                let inputs = if upper { spread::inputs(&case.sample) } else { Vec::new() };
+                let inputs = if upper { apart::inputs(&case.sample) } else { Vec::new() };
                 let entry = Entry::new(score, case.clipped, case.sample.notes.clone(), otherwise, inputs);
                 let pending = Pending { id: case.id, entry, images, failed: false };
                 self.pending.entry(at).or_default().push(pending);
