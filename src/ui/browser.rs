@@ -168,10 +168,11 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
 }
 
-/// By which score the list is ordered, colored and filtered; nothing while there are no scores.
+/// By which score the list is ordered, colored and filtered; nothing while there are no scores, or where the list is
+/// ordered by what is uncertain.
 fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     let table = &cx.state.table;
-    let Some((by, figure)) = table.by() else { return };
+    let Some((by, figure)) = table.by().filter(|_| cx.state.library.sort != Sort::Uncertain) else { return };
     let (chosen, sorted) = (table.chosen.clone(), cx.state.library.sort == Sort::Score);
     let mut next = None;
     ui.horizontal(|ui| {

@@ -97,7 +97,7 @@ fn the_most_uncertain_come_first_by_key_and_say_why() {
     // A mask that is drawn otherwise is a disagreement, once it is ranked again.
     rig.send(LabelsCommand::AdoptAutomatic);
     rig.send(LabelsCommand::CleanUp(CleanUp { kind: CleanKind::Grow, size_mm: 3.0 }));
-    rig.harness.get_by_label("Rank").click();
+    rig.harness.get_by_label("Rank by uncertainty").click();
     rig.harness.step();
     rig.settle();
     let pair = state(&rig).selection.pair.unwrap();

@@ -52,18 +52,18 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
 }
 
 fn counts(counts: &Counts) -> String {
-    Review::iter().map(|review| format!("{:>11}", counts.of(review))).collect()
+    Review::iter().map(|review| format!("{:>12}", counts.of(review))).collect()
 }
 
 fn effort(effort: Effort) -> String {
     let number = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.1}"));
     let (seconds, edits) = (number(effort.seconds_per_mask()), number(effort.edits_per_mask()));
-    format!("{:>6} masks, {seconds:>6} s and {edits:>5} edits a mask", effort.masks)
+    format!("masks {:>5}, {seconds:>6} s and {edits:>5} edits each", effort.masks)
 }
 
 fn text(stats: &LabelStats) -> String {
     let mut lines: Vec<String> =
-        vec![Review::iter().map(|review| format!("{:>11}", review.name())).collect::<String>() + "  tool"];
+        vec![Review::iter().map(|review| format!("{:>12}", review.name())).collect::<String>() + "  tool"];
     for tool in &stats.tools {
         lines.push(format!("{}  {}", counts(&tool.pairs), tool.tool.as_deref().unwrap_or("no tool")));
     }

@@ -38,11 +38,12 @@ pub(super) fn put(
     let bundles = models.generators();
     let kept = all.kept_inputs();
     for (id, entry) in entries {
-        let names: Vec<&str> = entry.inputs.iter().flat_map(|input| kept.of(input)).collect();
-        // A single one of each picture has no spread.
-        if names.len() <= entry.inputs.len() || entry.score.scale != Scale::Measured {
+        // A single one of a picture has no spread.
+        let several = entry.inputs.iter().any(|input| kept.of(input).nth(1).is_some());
+        if !several || entry.score.scale != Scale::Measured {
             continue;
         }
+        let names: Vec<&str> = entry.inputs.iter().flat_map(|input| kept.of(input)).collect();
         let key = crate::io::digest::sha256(format!("{names:?} {:?} {bundles:?}", setup.shift).as_bytes());
         let found = all.sheets().get(SHEET, [key.as_str()]).pop().flatten();
         let found = found.unwrap_or_else(|| {
