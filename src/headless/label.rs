@@ -172,7 +172,7 @@ impl Touch<'_> {
 
 /// The pair whose mask is carried to another: the nearest of the same tool that somebody worked on.
 fn carried_from(dataset: &Dataset, to: PairId) -> Option<PairId> {
-    let (reviews, _) = Labels::of(dataset).reviews();
+    let reviews = Labels::of(dataset).reviews().states;
     let begun = |name: &str| reviews.get(name).is_some_and(|review| propose::is_begun(*review));
     let tool = dataset.index.pairs[to.0 as usize].tool.as_ref()?;
     let pairs = dataset.index.pairs.iter().enumerate();
