@@ -140,7 +140,7 @@ fn what_was_done_comes_back_without_its_mask_and_is_compared_with_it() {
     // What is painted then lies apart, and an export takes the first.
     let again = store.repeats_of("Anna");
     assert_eq!(again.load(&first, lab::RIGHT).unwrap().unwrap().mask, second);
-    assert!(state(&rig).document.own_labels().get(&first).is_none());
+    assert!(!state(&rig).document.own_labels().contains_key(&first));
     press(&mut rig, Modifiers::CTRL, Key::Enter);
     assert!(state(&rig).document.repeats.is_empty(), "it is over when it is written and left");
     assert_eq!(std::fs::read(store.mask_file(&first, lab::RIGHT)).unwrap(), before);
