@@ -11,8 +11,8 @@ use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{
-    Command, DialCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand,
-    ViewCommand,
+    Command, DialCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand,
+    SettingsCommand, ViewCommand,
 };
 use touch2touch::app::dial::DialPairs;
 use touch2touch::app::export::{FigureForm, Output};
@@ -32,6 +32,7 @@ use touch2touch::io::dataset::Dataset;
 use touch2touch::io::images;
 use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::labels::Labels;
+use touch2touch::work::queue::QueueBy;
 use touch2touch::work::subject::Subject;
 use touch2touch::work::sweep::Dial;
 
@@ -70,6 +71,7 @@ fn how(action: Action) -> How {
         A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
+        A::RankMasks | A::NextUncertain => Verb(&["masks", "queue", "demo"]),
         A::TurnDial => Verb(&["sweep", "demo", "--dial", "threshold", "--values", "3,4,5", "--pairs", "8"]),
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
@@ -376,6 +378,33 @@ fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
     // Left out where it is asked for.
     let without = json(&["pose", path, "--no-hand"], home.path());
     assert_eq!(without["cases"][0]["mask"], "unet");
+}
+
+#[test]
+fn the_most_uncertain_masks_are_in_one_order_in_both() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let path = folder.to_str().unwrap();
+    let names: Vec<String> = Dataset::open(&folder).unwrap().index.pairs.iter().map(|pair| pair.name.clone()).collect();
+    json(&["label", path, "--pair", &names[1], "--clean", "grow=1.5"], home.path());
+    let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
+    studio.send(ViewCommand::ShowPanes([Pane::Browser].into_iter().collect()).into());
+    studio.send(EvaluateCommand::Rank.into());
+    for by in QueueBy::iter() {
+        studio.send(LibraryCommand::SetUncertainBy(by).into());
+        let verb = json(&["masks", "queue", path, "--by", by.key()], home.path());
+        let library = &studio.state.library;
+        let order: Vec<&str> = library.order.iter().filter_map(|id| Some(library.entry(*id)?.name.as_str())).collect();
+        let said: Vec<&str> = verb["pairs"].as_array().unwrap().iter().map(|p| p["pair"].as_str().unwrap()).collect();
+        assert_eq!(order, said, "{by:?}");
+        for (id, line) in library.order.iter().zip(verb["pairs"].as_array().unwrap()) {
+            let queued = studio.state.table.scores.queue.get(*id).expect("it is ranked");
+            assert_eq!(line["overall"], optional(queued.overall), "{by:?} {line}");
+            let why = queued.reason(by).map_or_else(String::new, |part| part.text());
+            assert_eq!(line["why"], why, "{by:?}");
+        }
+    }
+    assert!(studio.state.table.scores.queue.known() == names.len() && names.len() >= 3);
 }
 
 #[test]

@@ -22,6 +22,7 @@ mod documented;
 mod hostile;
 #[cfg(feature = "onnx")]
 mod outputs;
+mod queue;
 mod training_data;
 mod unit;
 #[cfg(feature = "onnx")]
@@ -111,7 +112,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let pose = HandPose { pitch_rad: 0.05, ..planar.into() };
     let accepted = [Some(AcceptedPose { pose, by_hand: true }), None];
     let name = cases[0]["name"].as_str().unwrap();
-    store.save_review(name, &StoredReview { review: "todo".into(), accepted }).unwrap();
+    store.save_review(name, &StoredReview { review: "todo".into(), accepted, ..StoredReview::default() }).unwrap();
     let labeled = json(&run(&["pose", set_text, "--json"], data_path));
     let cases: Vec<&Value> = labeled["cases"].as_array().unwrap().iter().filter(|c| !c["accepted"].is_null()).collect();
     assert_eq!(cases.len(), 1);

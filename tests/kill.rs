@@ -119,7 +119,7 @@ impl Services for Files {
                 reviews.insert(entry.name.clone(), review);
             }
         }
-        Ok(Opened { source: Arc::new(Source { live, saves: self.saves }), reviews })
+        Ok(Opened { source: Arc::new(Source { live, saves: self.saves }), reviews, notes: BTreeMap::new() })
     }
     fn find_bundles(&self, _: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
         Default::default()

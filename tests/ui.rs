@@ -22,6 +22,7 @@ mod job;
 mod jobs;
 mod narrow;
 mod palette;
+mod queue;
 mod results;
 mod scene;
 mod seeds;

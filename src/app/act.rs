@@ -66,6 +66,10 @@ impl Action {
             Self::LastPair => when(listed, LibraryCommand::Last),
             Self::NextUnfinished => when(listed, LibraryCommand::NextUnfinished),
             Self::NextWorst => when(listed && state.table.by().is_some(), LibraryCommand::NextWorst),
+            Self::NextUncertain => {
+                let known = state.table.scores.queue.known() > 0;
+                when(listed && (known || can_rank(state)), LibraryCommand::NextUncertain)
+            }
             Self::OtherFinger => does(ViewCommand::SelectFinger(state.other_finger())),
             Self::BothFingers => does(ViewCommand::ShowBothFingers(!state.selection.both_fingers)),
             Self::FindPair => {
@@ -88,6 +92,7 @@ impl Action {
                 let ready = state.scores_key().is_some() && state.evaluating().is_none();
                 when(ready, EvaluateCommand::All)
             }
+            Self::RankMasks => when(can_rank(state), EvaluateCommand::Rank),
             Self::ExportTable => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder)),
             Self::RunSeeds => {
                 let possible = state.can_generate().is_ok() && state.selection.panes.contains(&Pane::Seeds);
@@ -300,6 +305,11 @@ fn does(command: impl Into<Command>) -> Option<Command> {
 
 fn when(possible: bool, command: impl Into<Command>) -> Option<Command> {
     possible.then(|| command.into())
+}
+
+/// Whether the measured imprints of all pairs can be scored now.
+fn can_rank(state: &State) -> bool {
+    state.scores_key().is_some() && state.evaluating().is_none()
 }
 
 /// Whether the pose tool is in hand and there is a tool to be moved.

@@ -105,6 +105,7 @@ actions! {
     LastPair, Navigate, "Last pair", "Shows the last pair of the list", [plain(K::End)];
     NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift(K::N)];
     NextWorst, Navigate, "Next worst", "Shows the pair that is worst by the chosen score, then the next worse one", [plain(K::N)];
+    NextUncertain, Navigate, "Next uncertain", "Shows the most uncertain pair that is neither done nor skipped, then the next; ranks the pairs first where they are not", [alt(K::N)];
     OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)];
     BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)];
     FindPair, Navigate, "Filter pairs", "Moves the keyboard to the filter of the list", [ctrl(K::F)];
@@ -118,6 +119,7 @@ actions! {
     EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [];
     PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [];
     TurnDial, Generate, "Turn the dial", "Poses many pairs with every value of the chosen dial (mask threshold, probability, gate, trim, shift)", [];
+    RankMasks, Generate, "Rank by uncertainty", "Asks the mask model about every measured imprint and registers its pose, so that the most uncertain masks come first; runs no generator", [];
     ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [];
     CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke, rejects a proposal", [plain(K::Escape)];
     NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)];
@@ -244,6 +246,9 @@ impl Action {
             Self::Reload => "refresh again",
             Self::ExportMasks => "unet training labels npy save",
             Self::NextWorst => "bad largest error outlier failure hardest",
+            Self::NextUncertain | Self::RankMasks => {
+                "queue active learning doubt disagreement unsure probability hardest"
+            }
             Self::NextUnfinished => "todo open unlabeled remaining",
             Self::FindPair => "search list find samples",
             Self::Generate => "predict prediction run inference diffusion",

@@ -12,7 +12,7 @@ use super::services::{Followed, Opened};
 use super::settings::state::Settings;
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use super::{adapt, dial, evaluate, export, follow, library, predict, settings, tasks, workbench};
+use super::{adapt, dial, evaluate, export, follow, labels, library, predict, settings, tasks, workbench};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::adapt::Adapted;
 use crate::work::bundles::BundleInfo;
@@ -144,6 +144,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::LabelsSaved(name, revision) if state.document.asked.get(&name) == Some(&revision) => {
             state.document.asked.remove(&name);
             state.document.unsaved.remove(&name);
+            labels::saved(state);
         }
         Answer::JobFailed(err) => state.log.error(&err),
         Answer::Evaluated(ticket, evaluation) => {

@@ -36,6 +36,8 @@ pub struct LabelsToSave {
     pub labels: PairLabels,
     /// What was done.
     pub deed: Deed,
+    /// Who draws it a second time, apart from the pair's labels; `None` for these.
+    pub repeat: Option<String>,
 }
 
 /// Work that leaves the state.

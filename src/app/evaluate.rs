@@ -12,6 +12,7 @@ use super::state::State;
 use super::tasks::state::{Level, Ticket};
 use crate::work::evaluate::{Evaluation, Setup};
 use crate::work::job::Progress;
+use crate::work::queue::measured_only;
 
 /// How often what was scored so far is looked up while all pairs are scored.
 const LOOKS: u64 = 24;
@@ -29,6 +30,8 @@ pub enum EvaluateCommand {
     Start,
     /// Predicts and scores every pair of it.
     All,
+    /// Scores the measured imprints of every pair, so that the most uncertain masks are known; runs no generator.
+    Rank,
     /// Writes the table into a folder.
     Export(PathBuf),
 }
@@ -46,12 +49,19 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
         EvaluateCommand::Published(shown) => state.table.published = shown,
         EvaluateCommand::Start => start(state, state.evaluation_setup(), "Evaluate", effects),
         EvaluateCommand::All => start(state, state.setup_of_all(), "Predict all of", effects),
+        EvaluateCommand::Rank => rank(state, effects),
         EvaluateCommand::Export(folder) => {
             let Some(evaluation) = state.table.result.clone() else { return };
             let ticket = state.tasks.start("Export the table".into(), Vec::new());
             effects.push(Effect::ExportTable { ticket, evaluation, published: state.table.published, folder });
         }
     }
+}
+
+/// Has the measured imprints of every pair scored.
+pub(super) fn rank(state: &mut State, effects: &mut Vec<Effect>) {
+    let setup = state.setup_of_all().map(|setup| measured_only(&setup));
+    start(state, setup, "Rank the masks of", effects);
 }
 
 /// Has the open data set scored. One at a time: a second would only take the cores from the first.
@@ -88,6 +98,9 @@ pub(super) fn arrived(state: &mut State, ticket: Ticket, evaluation: Arc<Evaluat
         let why = format!("the first: {}: {}", first.what, first.why);
         state.log.push(Level::Warning, text, Some(why), None);
     }
-    state.table.result = Some(evaluation);
+    // A ranking is no results table.
+    if !evaluation.setup.bundles.is_empty() {
+        state.table.result = Some(evaluation);
+    }
     state.table.round += 1;
 }

@@ -132,7 +132,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
             state.export.asking_masks = false;
             let ticket = state.tasks.start("Export masks".into(), Vec::new());
-            let (labels, choice) = (state.document.labels.clone(), state.export.masks);
+            let (labels, choice) = (state.document.own_labels(), state.export.masks);
             effects.push(Effect::ExportMasks { ticket, source, labels, choice, folder: file });
         }
         Output::Pair(source) => {

@@ -54,6 +54,13 @@ pub enum Edit {
         /// The state.
         review: Review,
     },
+    /// Replaces the note.
+    Note {
+        /// The pair's name.
+        pair: String,
+        /// The text.
+        note: String,
+    },
     /// Replaces the accepted pose.
     Pose {
         /// The pair's name.
@@ -75,6 +82,7 @@ impl Edit {
                 *mask = labels.put(place, new).as_ref().map(KeptMask::of);
             }
             Self::Review { pair, review } => *review = doc.set_review(pair, *review),
+            Self::Note { pair, note } => *note = doc.set_note(pair, std::mem::take(note)),
             Self::Pose { pair, source, pose } => {
                 let labels = doc.labels.entry(pair.clone()).or_default();
                 std::mem::swap(&mut labels.accepted[*source as usize], pose);
@@ -85,7 +93,9 @@ impl Edit {
     /// The pair's name.
     pub fn pair(&self) -> &str {
         match self {
-            Self::Mask { pair, .. } | Self::Review { pair, .. } | Self::Pose { pair, .. } => pair,
+            Self::Mask { pair, .. } | Self::Review { pair, .. } | Self::Note { pair, .. } | Self::Pose { pair, .. } => {
+                pair
+            }
         }
     }
 
@@ -93,7 +103,7 @@ impl Edit {
     pub fn place(&self) -> Option<&MaskPlace> {
         match self {
             Self::Mask { place, .. } => Some(place),
-            Self::Review { .. } | Self::Pose { .. } => None,
+            Self::Review { .. } | Self::Note { .. } | Self::Pose { .. } => None,
         }
     }
 
@@ -101,6 +111,7 @@ impl Edit {
         std::mem::size_of::<Self>()
             + match self {
                 Self::Mask { mask, .. } => mask.as_ref().map_or(0, |kept| kept.packed.bytes()),
+                Self::Note { note, .. } => note.len(),
                 Self::Review { .. } | Self::Pose { .. } => 0,
             }
     }
@@ -125,6 +136,7 @@ impl Gesture {
             edits.push(Edit::Mask { pair: pair(), place: place.clone(), mask });
         }
         edits.extend(change.review.map(|[before, _]| Edit::Review { pair: pair(), review: before }));
+        edits.extend(change.note.as_ref().map(|[before, _]| Edit::Note { pair: pair(), note: before.clone() }));
         for (source, accepted) in ImprintSource::iter().zip(change.accepted) {
             edits.extend(accepted.map(|[before, _]| Edit::Pose { pair: pair(), source, pose: before }));
         }
@@ -243,6 +255,12 @@ impl History {
     /// What redo would do.
     pub fn next_redo(&self, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
         Self::position(&self.undone, pair, shown).map(|at| &self.undone[at])
+    }
+
+    /// Forgets what was done to a pair: it is shown as another one from now on.
+    pub fn forget(&mut self, pair: &str) {
+        self.done.retain(|gesture| gesture.pair() != pair);
+        self.undone.retain(|gesture| gesture.pair() != pair);
     }
 
     /// Forgets everything: another data set is open.

@@ -1,8 +1,10 @@
 //! The room of the document: strokes, clean-ups, review states, accepted poses, undo, saving.
 
+mod repeat;
 pub mod state;
 
-pub use state::{Changed, Document, HandMask, MaskPlace, PairLabels, Review, Stored, Stroke};
+pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
+pub use state::{Changed, Document, HandMask, MaskPlace, PairLabels, Repeating, Review, Stored, Stroke};
 
 use std::borrow::Cow;
 
@@ -17,7 +19,7 @@ use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{CleanUp, DrawTool, Drawing, Paint, Provenance};
 use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
-use crate::work::labels::{Act, Deed, system_person};
+use crate::work::labels::{Act, Deed, note, system_person};
 use crate::work::propose::accepted;
 
 /// What can happen to the document.
@@ -58,6 +60,8 @@ pub enum LabelsCommand {
     Redo,
     /// Sets the review state of the selected pair.
     SetReview(Review),
+    /// Sets the note of a pair: it was typed while that one was on screen.
+    SetNote(String, String),
     /// Accepts the pose shown for an imprint, or withdraws it.
     AcceptPose(ImprintSource, bool),
     /// Writes all labels and settings now.
@@ -84,6 +88,10 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         LabelsCommand::Redo => redo(state, effects),
         LabelsCommand::SetReview(review) => {
             set_review(state, review, effects);
+            state.reorder();
+        }
+        LabelsCommand::SetNote(pair, text) => {
+            set_note(state, &pair, &text, effects);
             state.reorder();
         }
         LabelsCommand::AcceptPose(source, accept) => accept_pose(state, source, accept, effects),
@@ -396,6 +404,17 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
     save_pair(state, &pair, Deed::named("review state"), effects);
 }
 
+fn set_note(state: &mut State, pair: &str, text: &str, effects: &mut Vec<Effect>) {
+    let text = note(text);
+    if !state.document.is_editable(pair) || state.document.note(pair) == text {
+        return;
+    }
+    let before = state.document.set_note(pair, text);
+    let edit = Edit::Note { pair: pair.to_owned(), note: before };
+    state.history.record(Gesture { name: "note".into(), edits: vec![edit] });
+    save_pair(state, pair, Deed::named("note"), effects);
+}
+
 fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: &mut Vec<Effect>) {
     if !check_editable(state, "Accept the pose") {
         return;
@@ -456,14 +475,24 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
 
 /// Writes the labels of a pair of the open data set.
 fn save_pair(state: &mut State, name: &str, mut deed: Deed, effects: &mut Vec<Effect>) {
-    deed.person = Some(state.person()).filter(|person| !person.is_empty());
+    let repeat = state.document.repeats.get(name).map(|repeating| repeating.person.clone());
+    deed.person = repeat.clone().or_else(|| Some(state.person()).filter(|person| !person.is_empty()));
     let Some(open) = &state.library.open else { return };
     let revision = state.document.next_revision();
     let Some(labels) = state.document.labels.get(name) else { return };
-    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels: labels.clone(), deed };
+    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels: labels.clone(), deed, repeat };
     effects.push(Effect::SaveLabels(open.source.clone(), Box::new(save)));
     state.document.unsaved.insert(name.to_owned());
     state.document.asked.insert(name.to_owned(), revision);
+}
+
+/// Labels are on the disk: what is counted of them may be counted again, and what came back may be over.
+pub(super) fn saved(state: &mut State) {
+    let doc = &mut state.document;
+    if doc.unsaved.is_empty() && std::mem::take(&mut doc.marked) {
+        doc.marks += 1;
+    }
+    end_repeats(state);
 }
 
 fn save_all(state: &mut State, effects: &mut Vec<Effect>) {

@@ -19,12 +19,13 @@ use super::services::Opened;
 use super::settings::state::MAX_RECENT;
 use super::state::State;
 use super::tasks::state::Level;
-use super::{inspect, labels, settings, tasks};
+use super::{evaluate, inspect, labels, settings, tasks};
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
 use crate::io::dataset::ToolUnit;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
+use crate::work::queue::QueueBy;
 use crate::work::tool::UnitSet;
 
 /// What can happen to the data set and its list.
@@ -53,6 +54,8 @@ pub enum LibraryCommand {
     SetSort(Sort),
     /// Sorts it by a score.
     SetScore(ScoreChoice),
+    /// Sorts it by what is uncertain.
+    SetUncertainBy(QueueBy),
     /// Shows only these pairs, or all.
     Brush(Option<Arc<BTreeSet<PairId>>>),
     /// The rows of the list that are on screen.
@@ -69,6 +72,8 @@ pub enum LibraryCommand {
     NextUnfinished,
     /// Selects the next worst pair by the chosen score; the list is then in that order.
     NextWorst,
+    /// Shows the most uncertain pair whose review is not finished, then the next; the list is then in that order.
+    NextUncertain,
     /// Marks the selected pair as done and shows the next unfinished one.
     DoneAndNext,
 }
@@ -108,6 +113,11 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
             state.library.sort = Sort::Score;
             state.reorder();
         }
+        LibraryCommand::SetUncertainBy(by) => {
+            state.table.uncertain_by = by;
+            state.library.sort = Sort::Uncertain;
+            state.reorder();
+        }
         LibraryCommand::Brush(brush) => {
             state.library.brush = brush;
             state.reorder();
@@ -119,10 +129,19 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::Last => select_row(state, usize::MAX, effects),
         LibraryCommand::NextUnfinished => select_next_unfinished(state, effects),
         LibraryCommand::NextWorst => select_next_worst(state, effects),
+        LibraryCommand::NextUncertain => select_next_uncertain(state, effects),
         LibraryCommand::DoneAndNext => {
             labels::set_review(state, Review::Done, effects);
+            state.document.since_repeat += 1;
             // Before the list is sorted anew, so that "next" is what the person sees as next.
-            select_next_unfinished(state, effects);
+            let next = next_unfinished(state);
+            match labels::next_repeat(state, next.is_none()) {
+                Some(pair) => {
+                    labels::begin_repeat(state, pair);
+                    select(state, pair, effects);
+                }
+                None => select_unfinished(state, next, effects),
+            }
             state.reorder();
         }
     }
@@ -187,18 +206,43 @@ fn step_by(state: &mut State, by: i64, effects: &mut Vec<Effect>) {
     }
 }
 
-fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
+/// The next of the list whose review is not finished, going round.
+fn next_unfinished(state: &State) -> Option<PairId> {
     let order = &state.library.order;
     let start = state.selection.pair.and_then(|pair| state.library.row_of(pair)).map_or(0, |row| row + 1);
     let unfinished = |pair: &&PairId| {
         Some(**pair) != state.selection.pair
             && state.library.entry(**pair).is_some_and(|e| !state.document.review(&e.name).is_finished())
     };
-    let next = order[start.min(order.len())..].iter().chain(order).find(unfinished).copied();
+    order[start.min(order.len())..].iter().chain(order).find(unfinished).copied()
+}
+
+fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
+    let next = next_unfinished(state);
+    select_unfinished(state, next, effects);
+}
+
+fn select_unfinished(state: &mut State, next: Option<PairId>, effects: &mut Vec<Effect>) {
     match next {
         Some(pair) => select(state, pair, effects),
         None => state.log.info("Every pair of the list is done or skipped"),
     }
+}
+
+/// Where nothing is ranked yet, that is begun.
+fn select_next_uncertain(state: &mut State, effects: &mut Vec<Effect>) {
+    let sorted = std::mem::replace(&mut state.library.sort, Sort::Uncertain) == Sort::Uncertain;
+    state.reorder();
+    if state.table.scores.queue.known() == 0 {
+        return evaluate::rank(state, effects);
+    }
+    if sorted {
+        return select_next_unfinished(state, effects);
+    }
+    let unfinished =
+        |pair: &&PairId| state.library.entry(**pair).is_some_and(|e| !state.document.review(&e.name).is_finished());
+    let next = state.library.order.iter().find(unfinished).copied();
+    select_unfinished(state, next, effects);
 }
 
 fn select_next_worst(state: &mut State, effects: &mut Vec<Effect>) {
@@ -231,6 +275,7 @@ pub(super) fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>)
     }
     say_notes(state);
     settings::follow_range(state);
+    labels::end_repeats(state);
 }
 
 /// What is odd about the files of the selected pair, once it is loaded; each pair once.
@@ -274,8 +319,12 @@ pub(super) fn show(
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.history.clear();
     state.tasks.failed.clear();
-    state.document =
-        Document { reviews: opened.reviews, last_revision: state.document.last_revision, ..Document::default() };
+    state.document = Document {
+        reviews: opened.reviews,
+        notes: opened.notes,
+        last_revision: state.document.last_revision,
+        ..Document::default()
+    };
     state.library.opening = None;
     let tools = opened.source.index().tools();
     state.library.open = Some(OpenDataset { seq, place: place.clone(), source: opened.source.clone(), tools });

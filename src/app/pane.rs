@@ -38,8 +38,8 @@ pub enum Dock {
     Right(u8),
 }
 
-/// What is computed while a pane is on screen. Everything but [`Need::Thumbnails`] and [`Need::Scores`] is of the
-/// selected pair and begins with its tensors and labels.
+/// What is computed while a pane is on screen. Everything but [`Need::Thumbnails`], [`Need::Scores`] and
+/// [`Need::LabelStats`] is of the selected pair and begins with its tensors and labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Need {
     /// Nothing besides the tensors and labels.
@@ -74,6 +74,8 @@ pub enum Need {
     Thumbnails,
     /// The scores that are kept of all pairs.
     Scores,
+    /// How far the labeling of the data set is.
+    LabelStats,
 }
 
 /// The table, given to the macro `$with`: for each file of `ui` the panes that it draws.
@@ -163,7 +165,7 @@ macro_rules! panes {
                 Form, needs [Poses, FingerPoses], at [Align Right(1)]
             } }
             masks {
-                Masks { "Mask", "Corrects the contact mask", Form, needs [Masks], at [Label Right(1)] }
+                Masks { "Mask", "Corrects the contact mask", Form, needs [Masks, LabelStats], at [Label Right(1)] }
             }
             results { Results {
                 "Results", "The paper's results table of the open data set", Form, needs [],
@@ -238,7 +240,7 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Need] {
                 use ImprintSource::{Measured, Predicted};
                 use Need::{
-                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
+                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, LabelStats, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
                     Steps, Thumbnails, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
@@ -278,7 +280,7 @@ impl Pane {
 
     /// Whether it shows something of the selected pair.
     pub fn is_of_pair(self) -> bool {
-        self.needs().iter().any(|need| !matches!(need, Need::Thumbnails | Need::Scores))
+        self.needs().iter().any(|need| !matches!(need, Need::Thumbnails | Need::Scores | Need::LabelStats))
     }
 }
 

@@ -24,6 +24,7 @@ pub mod deviation;
 pub mod ensemble;
 pub mod imprint;
 pub mod inspection;
+pub mod label_stats;
 pub mod labels;
 pub mod layers;
 pub mod ledger;
@@ -222,6 +223,8 @@ results! {
     Sample(PairKey) in samples, 192 * MIB;
     /// The labels stored for a pair: they go to the document.
     Labels(labels::LabelsKey);
+    /// How far the labeling is, and what it took.
+    LabelStats(label_stats::LabelStatsKey) in label_stats, 8 * MIB;
     /// The CAD model of a tool and what the registration derives from it.
     Tool(tool::ToolKey) in tools, 128 * MIB;
     /// The predictions of a touch that lie on the disk from before.

@@ -31,6 +31,7 @@ use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{ExportChoice, Plan};
 use crate::work::job::JobCx;
+use crate::work::label_stats::LabelStats;
 use crate::work::labels::{Deed, Past};
 use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
@@ -105,6 +106,31 @@ pub trait DataSource: Send + Sync {
     /// If they cannot be written.
     fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError>;
 
+    /// Reads what a person drew a second time of a pair; empty if there is nothing.
+    ///
+    /// # Errors
+    /// As [`DataSource::load_labels`].
+    fn load_repeat(&self, _person: &str, _name: &str) -> Result<PairLabels, TaskError> {
+        Ok(PairLabels::default())
+    }
+
+    /// Writes what a person draws a second time, apart from the labels of the pair.
+    ///
+    /// # Errors
+    /// As [`DataSource::save_labels`], and where there is no place for it.
+    fn save_repeat(&self, _person: &str, _name: &str, _labels: &PairLabels, _deed: &Deed) -> Result<(), TaskError> {
+        Err(TaskError::new("Save the repeat", "this source keeps none"))
+    }
+
+    /// How far the labeling is, what it took, and what comes back to a person; see
+    /// [`crate::work::label_stats::label_stats`].
+    ///
+    /// # Errors
+    /// None of the journals: what cannot be read of them is in the result.
+    fn label_stats(&self, reviews: &BTreeMap<String, Review>, _: (&str, f64)) -> Result<LabelStats, TaskError> {
+        Ok(LabelStats::of_reviews(self.index(), reviews))
+    }
+
     /// What an export of masks would write where. `changed` is newer than what is stored.
     ///
     /// # Errors
@@ -156,6 +182,8 @@ pub struct Opened {
     pub source: Arc<dyn DataSource>,
     /// Review states stored with it that are not "todo", by pair name.
     pub reviews: BTreeMap<String, Review>,
+    /// Notes stored with it, by pair name.
+    pub notes: BTreeMap<String, String>,
 }
 
 impl std::fmt::Debug for Opened {

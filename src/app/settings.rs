@@ -59,6 +59,8 @@ pub enum SettingsCommand {
     SetRuntime(EngineChoice),
     /// Who labels; empty: whom the system says.
     SetPerson(String),
+    /// How many of the pairs that one marked done come back, percent.
+    SetRepeats(f32),
     /// What kept predictions may take on the disk, MiB.
     SetCacheBudget(u32),
     /// Whether the 3D views move together.
@@ -126,6 +128,7 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
         SettingsCommand::SetPoseEngine(engine) => settings.pose_engine = engine,
         SettingsCommand::SetRuntime(runtime) => settings.runtime = runtime,
         SettingsCommand::SetPerson(person) => settings.person = person,
+        SettingsCommand::SetRepeats(percent) => settings.repeats_percent = percent,
         SettingsCommand::SetCacheBudget(mib) => settings.cache_mib = mib,
         SettingsCommand::SetCamerasLinked(linked) => settings.cameras_linked = linked,
         SettingsCommand::SetScene(look) => settings.scene = look.validated(),

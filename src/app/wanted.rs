@@ -22,6 +22,7 @@ impl State {
         list.seeds();
         list.thumbnails();
         list.scores();
+        list.label_stats();
         list.neighbors();
         list.mask_plan();
         list.list
@@ -70,7 +71,9 @@ impl Wanted<'_> {
             return;
         }
         self.ask(pair);
-        self.ask_unless(state.document.stored.contains_key(state.pair_name()), LabelsKey(pair));
+        let name = state.pair_name();
+        let labels = LabelsKey { pair, repeat: state.document.repeats.contains_key(name) };
+        self.ask_unless(state.document.stored.contains_key(name), labels);
         let (measured, predicted) = (ImprintSource::Measured, ImprintSource::Predicted);
         let (scene_measured, cloud_measured) = state.shows_cloud(measured);
         let (scene_predicted, cloud_predicted) = state.shows_cloud(predicted);

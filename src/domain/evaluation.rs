@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::catalog;
 use super::dataset::{PairEntry, Split};
+use super::label::Doubt;
 use super::metrics::{AngleSummary, Unstretched, frechet_distance};
 use super::rig::{PadId, Rig};
 use super::sample::Scale;
@@ -141,6 +142,13 @@ pub struct GraspScore {
     pub angle_error_rad: Option<f64>,
     /// Time to generate one image, seconds.
     pub seconds: Option<f64>,
+    /// Reasons to look at its masks, of the measured imprints.
+    #[serde(default)]
+    pub doubt: Doubt,
+    /// How far predictions with different seeds are apart: the mean over the pixels of their standard deviation, of the
+    /// finger with the most, meters; `None` where fewer than two are kept.
+    #[serde(default)]
+    pub seed_spread_m: Option<f64>,
 }
 
 /// A method with its grasps.
@@ -400,6 +408,8 @@ mod tests {
             images: vec![image],
             angle_error_rad: Some(angle_deg.to_radians()),
             seconds: Some(0.1),
+            doubt: Doubt::default(),
+            seed_spread_m: None,
         }
     }
 

@@ -5,6 +5,7 @@
 mod agreement;
 mod carry;
 mod clean_up;
+mod doubt;
 mod drawing;
 mod gate;
 mod grow;
@@ -22,6 +23,7 @@ use super::grid::Mask;
 pub use agreement::{Agreement, agreement};
 pub use carry::{Carried, Surface, across, carry};
 pub use clean_up::{CleanKind, CleanUp};
+pub use doubt::{Doubt, UNSURE};
 pub use drawing::{DrawTool, Drawing, Ground, Paint};
 pub use gate::Gate;
 pub use grow::grow_from;

@@ -3,6 +3,8 @@
 mod args;
 mod report;
 
+use strum::IntoEnumIterator as _;
+
 use super::output::says;
 use super::predict::Predictor;
 use super::{Output, VerbResult, find_pair};
@@ -17,7 +19,8 @@ use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
 use crate::work::job::JobCx;
-use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, system_person};
+use crate::work::label_stats::LabelStats;
+use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
 use crate::work::propose::{self, Proposal, ProposalSource, Side, accepted};
@@ -54,10 +57,14 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
             }
         }
     }
-    let report = Report { folder, pairs };
+    let counts = LabelStats::of_reviews(&dataset.index, &labels.reviews().states).all;
+    let report = Report { folder, pairs, counts };
     output.finish(&report, || {
         let lines: Vec<String> = report.pairs.iter().map(Stored::text).collect();
-        format!("{}\n{} labeled pairs in {}", lines.join("\n"), lines.len(), report.folder.display())
+        let counted = |review: Review| format!("{} {}", report.counts.of(review), review.name());
+        let counts: Vec<String> = Review::iter().map(counted).collect();
+        let (labeled, folder) = (lines.len(), report.folder.display());
+        format!("{}\n{labeled} labeled pairs in {folder}; of all pairs {}", lines.join("\n"), counts.join(", "))
     })?;
     Ok(complete)
 }
@@ -165,7 +172,7 @@ impl Touch<'_> {
 
 /// The pair whose mask is carried to another: the nearest of the same tool that somebody worked on.
 fn carried_from(dataset: &Dataset, to: PairId) -> Option<PairId> {
-    let (reviews, _) = Labels::of(dataset).reviews();
+    let reviews = Labels::of(dataset).reviews().states;
     let begun = |name: &str| reviews.get(name).is_some_and(|review| propose::is_begun(*review));
     let tool = dataset.index.pairs[to.0 as usize].tool.as_ref()?;
     let pairs = dataset.index.pairs.iter().enumerate();
@@ -233,6 +240,9 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
     }
     if let Some(review) = args.review {
         labels.review = review;
+    }
+    if let Some(text) = &args.note {
+        labels.note = note(text);
     }
     Ok(())
 }

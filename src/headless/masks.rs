@@ -1,4 +1,7 @@
-//! `touch2touch masks`: contact masks as training folders, and how far those of two people agree.
+//! `touch2touch masks`: contact masks as training folders, how far those of two people agree, and which to look at first.
+
+mod queue;
+mod stats;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -29,6 +32,10 @@ pub(super) enum MasksVerb {
     Export(ExportArgs),
     /// Compare the masks of two people, the worst first.
     Compare(CompareMasksArgs),
+    /// How many pairs of each tool are in which review state, and what the masks took: seconds, edits, repeats.
+    Stats(stats::StatsArgs),
+    /// List the pairs, the most uncertain masks first.
+    Queue(Box<queue::QueueArgs>),
 }
 
 /// Arguments of `masks compare`.
@@ -170,6 +177,8 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let args = match verb {
         MasksVerb::Export(args) => args,
         MasksVerb::Compare(args) => return compare(args),
+        MasksVerb::Stats(args) => return stats::run(args),
+        MasksVerb::Queue(args) => return queue::run(args),
     };
     let Format::Unet = args.format;
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;

@@ -84,6 +84,19 @@ pub fn user_folder() -> Option<PathBuf> {
     folders::program_cache().map(|folder| folder.join("predictions"))
 }
 
+/// The names of all stored predictions: they begin with the image they are of.
+#[derive(Clone, Debug, Default)]
+pub struct Inputs(Vec<String>);
+
+impl Inputs {
+    /// Those of the image with the digest `input`.
+    pub fn of(&self, input: &str) -> impl Iterator<Item = &str> {
+        let prefix = format!("{}-", short(input));
+        let first = self.0.partition_point(|name| *name < prefix);
+        self.0[first..].iter().map(String::as_str).take_while(move |name| name.starts_with(&prefix))
+    }
+}
+
 impl Store {
     /// A store in `folder` (made when something is first written) of at most `budget` bytes; 0 keeps nothing.
     pub fn new(folder: PathBuf, budget: u64) -> Self {
@@ -109,6 +122,14 @@ impl Store {
     pub fn get(&self, recipe: &Recipe) -> Option<Stored> {
         let stored = self.read(&self.file(recipe))?;
         (stored.recipe == *recipe).then_some(stored)
+    }
+
+    /// Which predictions there are, in one look.
+    pub fn inputs(&self) -> Inputs {
+        let mut names: Vec<String> =
+            self.files().into_iter().map(|found| found.name).filter(|name| name.ends_with(SUFFIX)).collect();
+        names.sort_unstable();
+        Inputs(names)
     }
 
     /// Every prediction of the image with the digest `input`, the most recently used first, at most `limit`.

@@ -24,6 +24,7 @@ use crate::domain::rig::{PadId, Rig};
 
 /// Name of the folder beside a data set.
 pub const FOLDER: &str = "touch2touch_masks";
+const REPEATS: &str = "repeats";
 const JOURNAL_SUFFIX: &str = ".journal.jsonl";
 const FORMAT: &str = "touch2touch-mask";
 const REVIEW_FORMAT: &str = "touch2touch-review";
@@ -32,6 +33,8 @@ const VERSION: u32 = 1;
 const MASK_VERSION: u32 = 2;
 /// Reviews whose accepted poses were set by hand or leave the plane; others are written as version 1.
 const HAND_VERSION: u32 = 2;
+/// Reviews with a note: an older program would write them back without it.
+const NOTE_VERSION: u32 = 3;
 const MASK_SUFFIX: &str = ".mask.json";
 const PREDICTED_SUFFIX: &str = ".predicted.json";
 const PREDICTED_FORMAT: &str = "touch2touch-predicted-masks";
@@ -106,6 +109,20 @@ pub struct StoredReview {
     /// Accepted `grasp_from_object`, from the measured and from the predicted imprint.
     #[serde(default)]
     pub accepted: [Option<AcceptedPose>; 2],
+    /// What a person wrote about the pair; empty for nothing.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub note: String,
+}
+
+impl StoredReview {
+    /// An older program must not read a pose or a note without what it cannot know; all other files it still reads.
+    fn version(&self) -> u32 {
+        match self {
+            Self { note, .. } if !note.is_empty() => NOTE_VERSION,
+            Self { accepted, .. } if !accepted.iter().flatten().all(|a| a.is_plain()) => HAND_VERSION,
+            _ => VERSION,
+        }
+    }
 }
 
 /// Seconds since 1970, for [`StoredMask::saved_unix_s`]; 0 if the clock is set before that.
@@ -223,6 +240,14 @@ impl MaskStore {
     #[must_use]
     pub fn of_rig(self, rig: Arc<Rig>) -> Self {
         Self { rig, ..self }
+    }
+
+    /// The store of what a person drew a second time, in a folder inside this one.
+    #[must_use]
+    pub fn repeats_of(&self, person: &str) -> Self {
+        let within = |folder: &PathBuf| folder.join(REPEATS).join(names::label(person));
+        let also_read = self.also_read.as_ref().map(within);
+        Self { folder: within(&self.folder), also_read, rig: self.rig.clone() }
     }
 
     /// Where files are written.
@@ -364,9 +389,8 @@ impl MaskStore {
     /// As [`MaskStore::save`].
     pub fn save_review(&self, pair: &str, review: &StoredReview) -> Result<(), StoreError> {
         self.load_review(pair)?;
-        // An older program must not read a pose without what it cannot know; all other files it still reads.
-        let version = if review.accepted.iter().flatten().all(|a| a.is_plain()) { VERSION } else { HAND_VERSION };
-        let content = ReviewFile { format: REVIEW_FORMAT.into(), version, pair: pair.into(), review: review.clone() };
+        let (format, version) = (REVIEW_FORMAT.into(), review.version());
+        let content = ReviewFile { format, version, pair: pair.into(), review: review.clone() };
         self.write(&self.folder.join(review_name(pair)), &content)
     }
 
@@ -523,7 +547,7 @@ fn contact_px(mask: &Mask) -> usize {
 fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, StoreError> {
     let content: ReviewFile = serde_json::from_slice(bytes)
         .map_err(|err| StoreError::Damaged { file: file.to_owned(), reason: err.to_string() })?;
-    check_format(file, &content.format, REVIEW_FORMAT, content.version, HAND_VERSION)?;
+    check_format(file, &content.format, REVIEW_FORMAT, content.version, NOTE_VERSION)?;
     if content.review.accepted.iter().flatten().any(|a| !a.pose.is_finite()) {
         let reason = "an accepted pose is not a finite number".into();
         return Err(StoreError::Damaged { file: file.to_owned(), reason });

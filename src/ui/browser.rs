@@ -20,6 +20,7 @@ use crate::app::labels::Review;
 use crate::app::library::{Place, Sort, short_name};
 use crate::domain::dataset::PairId;
 use crate::domain::evaluation::Figure;
+use crate::work::queue::QueueBy;
 
 /// Height of a row, points.
 const ROW: f32 = 40.0;
@@ -129,7 +130,8 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         } else if !response.has_focus() && memory.filter != cx.state.library.filter {
             memory.filter.clone_from(&cx.state.library.filter);
         }
-        let tip = "Words of the name or tool. tool:rod narrows to tools; is:todo, is:in-progress, is:flagged, is:done and \
+        let tip = "Words of the name, the tool or the note. tool:rod narrows to tools, note:edge to notes, has:note to pairs \
+             with one; is:todo, is:in-progress, is:flagged, is:done and \
              is:skip to review states; angle>5, psnr<20, ssim<0.8, rms>1, named<100 to scores (of the source chosen, \
              or measured:angle>2) in °, dB, mm and %";
         response.on_hover_text(cx.keys().behind(tip, Action::FindPair));
@@ -145,6 +147,7 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         response.response.accessible_name("Sort").on_hover_text("Order of the list");
     });
     score_row(cx, ui);
+    uncertain_row(cx, ui);
     if let Some(open) = &cx.state.library.open
         && open.tools.len() > 1
     {
@@ -165,10 +168,11 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
 }
 
-/// By which score the list is ordered, colored and filtered; nothing while there are no scores.
+/// By which score the list is ordered, colored and filtered; nothing while there are no scores, or where the list is
+/// ordered by what is uncertain.
 fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     let table = &cx.state.table;
-    let Some((by, figure)) = table.by() else { return };
+    let Some((by, figure)) = table.by().filter(|_| cx.state.library.sort != Sort::Uncertain) else { return };
     let (chosen, sorted) = (table.chosen.clone(), cx.state.library.sort == Sort::Score);
     let mut next = None;
     ui.horizontal(|ui| {
@@ -207,6 +211,30 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
     if let Some(next) = next {
         cx.push(LibraryCommand::SetScore(next));
+    }
+}
+
+/// What the list is ordered by where the most uncertain come first, and how many pairs are ranked.
+fn uncertain_row(cx: &mut Cx<'_>, ui: &mut Ui) {
+    if cx.state.library.sort != Sort::Uncertain {
+        return;
+    }
+    let by = cx.state.table.uncertain_by;
+    let combo = egui::ComboBox::from_id_salt("uncertain").width(ui.available_width()).selected_text(by.name());
+    let response = combo.truncate().show_ui(ui, |ui| {
+        for other in QueueBy::iter() {
+            if ui.selectable_label(other == by, other.name()).on_hover_text(other.tip()).clicked() {
+                cx.out.push(Command::Library(LibraryCommand::SetUncertainBy(other)));
+            }
+        }
+    });
+    response.response.accessible_name("Uncertain by").on_hover_text("What uncertain means. ".to_owned() + by.tip());
+    let (known, total) = (cx.state.table.scores.queue.known(), cx.state.library.pairs().len());
+    if cx.state.evaluating().is_none() {
+        ui.horizontal_wrapped(|ui| {
+            cx.action_button(ui, Action::RankMasks, "Rank");
+            ui.label(caption(format!("{known} of {total} ranked"), cx.p));
+        });
     }
 }
 
@@ -301,7 +329,7 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
     let total = cx.state.library.pairs().len();
     let scored = cx.state.table.by().map_or(0, |(source, _)| source.scored);
     let possible = Action::PredictAll.command(cx.state).is_some();
-    if (possible || cx.state.evaluating().is_some()) && scored < total {
+    if (possible && scored < total) || cx.state.evaluating().is_some() {
         predict_all(cx, ui, scored);
     }
 }
@@ -381,6 +409,10 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         } else {
             painter.circle_filled(dot, 4.0, color);
         }
+        let noted = !cx.state.document.note(&entry.name).is_empty();
+        if noted {
+            note_mark(&painter, pos2(rect.right() - 10.0, rect.top() + 9.0), p.caution);
+        }
         let mut right = rect.right() - 18.0;
         if let Some((text, color)) = figure_text(cx, id) {
             let at = pos2(right, rect.bottom() - 5.0);
@@ -400,15 +432,57 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         let tool = cut_in_the_middle(&tool, right - left, width);
         text.text(pos2(left, rect.bottom() - 5.0), Align2::LEFT_BOTTOM, tool, font.clone(), p.weak);
     }
-    let tip = format!("{}\n{}", entry.name, review.name());
+    let mut tip = format!("{}\n{}", entry.name, review.name());
+    let note = cx.state.document.note(&entry.name);
+    if !note.is_empty() {
+        tip += &format!("\nNote: {note}");
+    }
+    for part in cx.state.table.scores.queue.get(id).into_iter().flat_map(|queued| &queued.parts) {
+        let worse = (100.0 * part.rank).round();
+        tip += &format!("\n{}: more than {worse:.0} % of the others", part.text());
+    }
     if response.on_hover_text(tip).clicked() {
         cx.push(LibraryCommand::Select(id));
     }
 }
 
-/// The score of a pair that the list is about.
+/// A figure in a word, beside its value.
+fn reason(figure: Figure) -> &'static str {
+    match figure {
+        Figure::Disagreement => "hand/model",
+        Figure::Unsure => "unsure",
+        Figure::SeedSpread => "seeds",
+        Figure::Angle => "angle",
+        other => other.name(),
+    }
+}
+
+/// A sheet with lines: the pair has a note.
+fn note_mark(painter: &egui::Painter, center: egui::Pos2, color: Color32) {
+    painter.rect_stroke(
+        Rect::from_center_size(center, vec2(7.0, 8.0)),
+        1.0,
+        Stroke::new(1.0, color),
+        egui::StrokeKind::Inside,
+    );
+    for y in [-1.0, 1.0] {
+        painter.hline(center.x - 2.0..=center.x + 2.0, center.y + y, Stroke::new(1.0, color));
+    }
+}
+
+/// The score of a pair that the list is about; where the most uncertain come first, why it stands where it does.
 fn figure_text(cx: &Cx<'_>, pair: PairId) -> Option<(String, Color32)> {
-    let (source, figure) = cx.state.table.by()?;
+    let table = &cx.state.table;
+    if cx.state.library.sort == Sort::Uncertain {
+        let part = table.scores.queue.get(pair)?.reason(table.uncertain_by)?;
+        let color = match part.rank {
+            rank if rank > 0.9 => cx.p.wrong,
+            rank if rank > 0.7 => cx.p.caution,
+            _ => cx.p.text,
+        };
+        return Some((format!("{} {}", reason(part.figure), part.figure.text(part.value)), color));
+    }
+    let (source, figure) = table.by()?;
     let value = source.value(pair, figure)?;
     Some((figure.text(value), score_color(cx.p, source, figure, value)))
 }

@@ -1,6 +1,7 @@
 //! The mask tools: brush, eraser, automatic sources with live preview, clean-ups, undo, review state.
 
 mod proposal;
+mod stats;
 
 use eframe::egui::{self, RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
@@ -18,13 +19,21 @@ use crate::app::state::Lookup;
 use crate::domain::label::Paint;
 use crate::domain::rig::PadId;
 use crate::domain::units;
-use crate::work::labels::system_person;
+use crate::work::labels::{MAX_NOTE, system_person};
 
-/// Nothing is kept between frames.
-pub(super) type Memory = ();
+/// The note being typed.
+#[derive(Default)]
+pub(super) struct Memory {
+    /// The pair that it is of.
+    pair: String,
+    /// The text.
+    note: String,
+    /// Whether it is being typed.
+    typing: bool,
+}
 
 /// The pane.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         if let Some(err) = cx.state.document.blocked(cx.state.pair_name()) {
@@ -41,8 +50,10 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
             }
             correct(cx, ui);
             review(cx, ui);
+            note(cx, ui, memory);
             clean_ups(cx, ui);
             look(cx, ui);
+            stats::show(cx, ui);
         });
     });
 }
@@ -402,6 +413,34 @@ fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         cx.action_button(ui, Action::DoneAndNext, "Done, next");
     });
+}
+
+/// The note of the pair: what is typed becomes part of the document when the field is left, as one change.
+fn note(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
+    let name = cx.state.pair_name();
+    let closing = ui.input(|i| i.viewport().close_requested());
+    // Another pair was chosen meanwhile, or the window closes: the text is of the pair it was typed for.
+    if memory.typing && (memory.pair != name || closing) {
+        memory.typing = false;
+        cx.out.push(LabelsCommand::SetNote(memory.pair.clone(), memory.note.clone()).into());
+    }
+    if !memory.typing {
+        name.clone_into(&mut memory.pair);
+        cx.state.document.note(name).clone_into(&mut memory.note);
+    }
+    let editable = cx.state.document.is_editable(name);
+    let edit = egui::TextEdit::singleline(&mut memory.note)
+        .hint_text("Note")
+        .char_limit(MAX_NOTE)
+        .desired_width(ui.available_width() - 8.0);
+    let response = ui.add_enabled(editable, edit).accessible_name("Note");
+    memory.typing |= response.has_focus();
+    if memory.typing && response.lost_focus() {
+        memory.typing = false;
+        cx.push(LabelsCommand::SetNote(memory.pair.clone(), memory.note.clone()));
+    }
+    let tip = "What is to be said about this pair. The list shows a mark and finds pairs by the words of their notes";
+    response.on_hover_text(tip);
 }
 
 fn look(cx: &mut Cx<'_>, ui: &mut Ui) {

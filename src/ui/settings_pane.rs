@@ -11,6 +11,9 @@ use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
 use crate::infer::engine::EngineChoice;
 use crate::work::labels::system_person;
 
+const REPEATS: &str = "Share of the pairs that you marked done that come back as todo, without their mask and unannounced. \
+                       The first mask stays; both are compared under Progress of the Mask pane. 0 switches it off. Default 5 %";
+
 /// Nothing is kept between frames.
 pub(super) type Memory = ();
 
@@ -110,6 +113,14 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
     ui.label(section("Labels", cx.p));
     person(cx, ui);
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Blind repeats").color(cx.p.weak));
+        let mut percent = cx.state.settings.repeats_percent;
+        let drag = egui::DragValue::new(&mut percent).speed(0.1).range(0.0..=100.0).fixed_decimals(1).suffix(" %");
+        if ui.add(drag).accessible_name("Blind repeats").on_hover_text(REPEATS).changed() {
+            cx.push(SettingsCommand::SetRepeats(percent));
+        }
+    });
     if let Ok(device) = cx.device {
         ui.label(caption(format!("Graphics: {}", device.adapter()), cx.p));
     }

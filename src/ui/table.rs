@@ -25,7 +25,7 @@ const NAMES: [f32; 2] = [90.0, 110.0];
 /// The least width of a number's column, points: what finds no room is left out.
 const NUMBER: f32 = 62.0;
 /// The figures that columns are made of, the most telling first.
-const FIGURES: [Figure; 8] = [
+const FIGURES: [Figure; 11] = [
     Figure::Angle,
     Figure::Psnr,
     Figure::Ssim,
@@ -34,6 +34,9 @@ const FIGURES: [Figure; 8] = [
     Figure::PsnrNoiseFree,
     Figure::SsimTool,
     Figure::SsimNoiseFree,
+    Figure::Disagreement,
+    Figure::Unsure,
+    Figure::SeedSpread,
 ];
 
 /// Nothing is kept between frames: the order is the list's.
@@ -188,6 +191,9 @@ fn heading(figure: Figure) -> &'static str {
         Figure::PsnrNoiseFree => "clean",
         Figure::SsimNoiseFree => "SSIM cl.",
         Figure::SsimTool => "SSIM t.",
+        Figure::Disagreement => "hand/model",
+        Figure::Unsure => "unsure",
+        Figure::SeedSpread => "seeds",
         Figure::Psnr | Figure::Ssim | Figure::Seconds => figure.name(),
     }
 }

@@ -10,7 +10,7 @@ use super::bundles::{BundleInfo, BundleKind, FoundBundles};
 use super::error::TaskError;
 use super::imprint::{imprint_of, measured};
 use super::job::JobCx;
-use super::labels::{Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review};
+use super::labels::{Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, note};
 use super::mask::{MaskChoice, MaskInputs};
 use super::models::{Masking, Models, Wanted};
 use super::pose::pose;
@@ -82,6 +82,8 @@ struct CaseLabels {
     masks: Vec<CaseMask>,
     review: Review,
     accepted: [Option<AcceptedPose>; 2],
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    note: String,
 }
 
 /// What an imprint led to.
@@ -172,11 +174,21 @@ impl CaseLabels {
             of: place.of.clone(),
             mask: hand.pack(),
         };
-        Self { masks: labels.masks.iter().map(mask).collect(), review: labels.review, accepted: labels.accepted }
+        Self {
+            masks: labels.masks.iter().map(mask).collect(),
+            review: labels.review,
+            accepted: labels.accepted,
+            note: labels.note.clone(),
+        }
     }
 
     fn labels(&self) -> Result<PairLabels, TaskError> {
-        let mut labels = PairLabels { review: self.review, accepted: self.accepted, ..PairLabels::default() };
+        let mut labels = PairLabels {
+            review: self.review,
+            accepted: self.accepted,
+            note: note(&self.note),
+            ..PairLabels::default()
+        };
         for mask in &self.masks {
             let hand =
                 HandMask::unpack(&mask.mask, Default::default()).map_err(|err| TaskError::from_error(WHAT, &err))?;

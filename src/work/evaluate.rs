@@ -2,6 +2,8 @@
 //! lie by the data, all through one pipeline (imprint, contact mask, pose, classifier). The verb `evaluate` and the
 //! studio's Evaluate pane both call [`evaluate`].
 
+mod apart;
+mod doubt;
 mod export;
 mod kept;
 mod load;
@@ -237,20 +239,23 @@ pub fn evaluate(
     })
 }
 
-/// The figures that are kept of the grasps of `dataset` by the methods of `setup`, without computing any. Their lab SSIM
-/// is in the range of the tool's predictions at the time.
+/// The figures that are kept of the grasps of `dataset` by the methods of `setup`, without computing any but how far kept
+/// predictions with different seeds are apart. Their lab SSIM is in the range of the tool's predictions at the time.
 ///
 /// # Errors
 /// If a bundle cannot be opened.
 pub fn known(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Result<Vec<Scores>, TaskError> {
-    let sheets = models.sheets().clone();
+    let (all, sheets) = (models, models.sheets().clone());
     let models = Models::open(setup, dataset, models)?;
     let work = load::plan(dataset, setup);
     let book = Kept::open(dataset, setup, &models, &sheets, &work, true);
     let mut scores = models.empty_scores();
     for (at, scores) in scores.iter_mut().enumerate() {
-        let entries = work.iter().flat_map(|tool| book.of(at, &tool.ids));
-        scores.grasps = entries.map(|(_, entry)| entry.score).collect();
+        let mut entries: Vec<_> = work.iter().flat_map(|tool| book.of(at, &tool.ids)).collect();
+        if scores.upper_bound {
+            apart::put(&mut entries, dataset, setup, &models, all);
+        }
+        scores.grasps = entries.into_iter().map(|(_, entry)| entry.score).collect();
     }
     Ok(scores)
 }

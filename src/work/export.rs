@@ -56,7 +56,7 @@ impl HandMasks<'_> {
 
     /// The review states that are not "todo", by pair name.
     fn reviews(&self) -> BTreeMap<String, Review> {
-        let (mut reviews, _) = self.labels.reviews();
+        let mut reviews = self.labels.reviews().states;
         reviews.extend(self.changed.iter().map(|(pair, labels)| (pair.clone(), labels.review)));
         reviews
     }

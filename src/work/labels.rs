@@ -2,8 +2,10 @@
 //! it lies on the disk. The studio and every verb read and write it here.
 
 mod journal;
+mod record;
 
 pub use journal::{Act, Change, Deed, Past};
+pub use record::{Base, MaskRecord, PAUSE_S, Record, working_seconds};
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -276,6 +278,29 @@ pub struct PairLabels {
     pub review: Review,
     /// Accepted `grasp_from_object` poses: from the measured, from the predicted imprint.
     pub accepted: [Option<AcceptedPose>; 2],
+    /// What a person wrote about it, in one line; empty for nothing. See [`note`].
+    pub note: String,
+}
+
+/// Longest note, characters.
+pub const MAX_NOTE: usize = 1000;
+
+/// A text as a note of a pair: one line without control characters, of at most [`MAX_NOTE`] characters.
+pub fn note(text: &str) -> String {
+    let words: Vec<&str> =
+        text.split(|c: char| c.is_whitespace() || c.is_control()).filter(|w| !w.is_empty()).collect();
+    words.join(" ").chars().take(MAX_NOTE).collect::<String>().trim_end().to_owned()
+}
+
+/// What people said about the pairs of a data set, apart from masks and poses.
+#[derive(Clone, Debug, Default)]
+pub struct Reviews {
+    /// Review states that are not "todo", by pair name.
+    pub states: BTreeMap<String, Review>,
+    /// Notes, by pair name.
+    pub notes: BTreeMap<String, String>,
+    /// The files that cannot be read.
+    pub problems: Vec<Problem>,
 }
 
 impl PairLabels {
@@ -350,6 +375,15 @@ impl Labels {
         Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: self.saved.clone() }
     }
 
+    /// What a person drew a second time without seeing the first; in a folder of its own.
+    ///
+    /// # Errors
+    /// If there is no place for labels.
+    pub fn repeats_of(&self, person: &str) -> Result<Self, TaskError> {
+        let store = self.store("Repeats")?.repeats_of(person);
+        Ok(Self { store: Arc::new(Ok(store)), saved: Arc::default() })
+    }
+
     /// The folder they lie in.
     ///
     /// # Errors
@@ -362,22 +396,28 @@ impl Labels {
         (*self.store).as_ref().map_err(|err| store_error(what, err))
     }
 
-    /// The review states that are not "todo", by pair name, and the files that cannot be read.
-    pub fn reviews(&self) -> (BTreeMap<String, Review>, Vec<Problem>) {
+    /// Review states and notes of all pairs.
+    pub fn reviews(&self) -> Reviews {
         let store = match &*self.store {
             Ok(store) => store,
             Err(err) => {
                 let problem =
                     Problem { file: std::path::PathBuf::new(), what: err.to_string(), hint: err.hint().into() };
-                return (BTreeMap::new(), vec![problem]);
+                return Reviews { problems: vec![problem], ..Reviews::default() };
             }
         };
-        let (stored, damaged) = store.reviews();
-        let known = |(pair, review): (String, StoredReview)| {
-            let review = Review::from_stored(&review.review).filter(|review| *review != Review::Todo)?;
-            Some((pair, review))
-        };
-        (stored.into_iter().filter_map(known).collect(), damaged)
+        let (stored, problems) = store.reviews();
+        let mut reviews = Reviews { problems, ..Reviews::default() };
+        for (pair, stored) in stored {
+            if let Some(state) = Review::from_stored(&stored.review).filter(|state| *state != Review::Todo) {
+                reviews.states.insert(pair.clone(), state);
+            }
+            let text = note(&stored.note);
+            if !text.is_empty() {
+                reviews.notes.insert(pair, text);
+            }
+        }
+        reviews
     }
 
     /// The pairs and fingers that have a mask drawn by hand.
@@ -414,6 +454,7 @@ impl Labels {
                     .with_hint("It may come from a newer version of this program.")
             })?;
             labels.accepted = stored.accepted;
+            labels.note = note(&stored.note);
         }
         lock(&self.saved).insert(name.to_owned(), labels.clone());
         Ok(labels)
@@ -453,8 +494,9 @@ impl Labels {
             }
             .map_err(fail)?;
         }
-        if before.review != labels.review || before.accepted != labels.accepted {
-            let review = StoredReview { review: labels.review.stored().into(), accepted: labels.accepted };
+        if before.review != labels.review || before.accepted != labels.accepted || before.note != labels.note {
+            let (review, accepted) = (labels.review.stored().into(), labels.accepted);
+            let review = StoredReview { review, accepted, note: labels.note.clone() };
             store.save_review(name, &review).map_err(fail)?;
         }
         lock(&self.saved).insert(name.to_owned(), labels.clone());

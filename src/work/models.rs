@@ -25,7 +25,7 @@ use crate::infer::generator::{GenerateError, Generator, Item, Observer};
 use crate::infer::mask::{MaskError, MaskModel};
 use crate::infer::recipe::{Recipe, input_digest};
 use crate::infer::sheets::Sheets;
-use crate::infer::store::Store;
+use crate::infer::store::{Inputs, Store};
 
 /// Predictions of one touch that are read back; older ones stay on the disk.
 const LISTED: usize = 16;
@@ -312,6 +312,11 @@ impl Models {
             kept.push(KeptPrediction { engine, config: stored.recipe.config(), prediction });
         }
         kept
+    }
+
+    /// Which predictions are kept on the disk.
+    pub(in crate::work) fn kept_inputs(&self) -> Inputs {
+        self.store.as_ref().map_or_else(Inputs::default, |store| lock(store).inputs())
     }
 
     /// What the mask model says of an imprint in meters, and what the mask is made of in the end. A pixel of at least

@@ -226,7 +226,7 @@ impl<'a> Reader<'a> {
                     format!("the trainer knows no rig but the lab's, not {}", dataset.rig.name),
                 ));
             }
-            let (reviews, _) = labels.reviews();
+            let reviews = labels.reviews().states;
             let mut models = Tools::new(dataset);
             for &id in wanted {
                 let Some(entry) = dataset.index.get(id) else { continue };

@@ -32,6 +32,7 @@ use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::export::{ExportChoice, Plan};
 use touch2touch::work::job::JobCx;
+use touch2touch::work::label_stats::LabelStats;
 use touch2touch::work::labels::Deed;
 use touch2touch::work::models::Wanted;
 use touch2touch::work::prediction::Prediction;
@@ -53,6 +54,10 @@ pub(crate) struct Source {
     pub(crate) damaged: Mutex<BTreeSet<String>>,
     pub(crate) full_disk: AtomicBool,
     pub(crate) saves: AtomicU64,
+    /// Second masks as they would lie on the disk.
+    pub(crate) repeats: Mutex<BTreeMap<String, PairLabels>>,
+    /// Pairs that are to come back.
+    pub(crate) due: Mutex<Vec<String>>,
     /// What is odd about every pair loaded from now on.
     pub(crate) notes: Mutex<Vec<Problem>>,
 }
@@ -79,6 +84,8 @@ impl Source {
             damaged: Mutex::default(),
             full_disk: AtomicBool::new(false),
             saves: AtomicU64::new(0),
+            repeats: Mutex::default(),
+            due: Mutex::default(),
             notes: Mutex::default(),
         }
     }
@@ -171,6 +178,24 @@ impl DataSource for Source {
         Ok(())
     }
 
+    fn load_repeat(&self, _: &str, name: &str) -> Result<PairLabels, TaskError> {
+        Ok(self.repeats.lock().unwrap().get(name).cloned().unwrap_or_default())
+    }
+
+    fn save_repeat(&self, _: &str, name: &str, labels: &PairLabels, _: &Deed) -> Result<(), TaskError> {
+        if self.full_disk.load(Ordering::Relaxed) {
+            return Err(TaskError::new("Save the repeat", "no space left"));
+        }
+        self.repeats.lock().unwrap().insert(name.to_owned(), labels.clone());
+        Ok(())
+    }
+
+    fn label_stats(&self, reviews: &BTreeMap<String, Review>, _: (&str, f64)) -> Result<LabelStats, TaskError> {
+        let mut stats = LabelStats::of_reviews(self.index(), reviews);
+        stats.repeats.due.clone_from(&self.due.lock().unwrap());
+        Ok(stats)
+    }
+
     fn plan_masks(&self, _: &BTreeMap<String, PairLabels>, _: ExportChoice) -> Result<Plan, TaskError> {
         Ok(Plan::default())
     }
@@ -247,7 +272,12 @@ impl Services for Double {
         let source: Arc<dyn DataSource> = self.source.clone();
         let labels = self.source.labels.lock().unwrap();
         let reviews = labels.iter().filter(|(_, l)| l.review != Review::Todo);
-        Ok(Opened { source, reviews: reviews.map(|(name, l)| (name.clone(), l.review)).collect() })
+        let notes = labels.iter().filter(|(_, l)| !l.note.is_empty());
+        Ok(Opened {
+            source,
+            reviews: reviews.map(|(name, l)| (name.clone(), l.review)).collect(),
+            notes: notes.map(|(name, l)| (name.clone(), l.note.clone())).collect(),
+        })
     }
 
     fn find_bundles(&self, _: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {

@@ -55,6 +55,7 @@ use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
+use touch2touch::work::queue::QueueBy;
 use touch2touch::work::subject::Subject;
 use touch2touch::work::sweep::{Dial, InForce, Setting, Sweep};
 use touch2touch::work::tool::UnitSet;
@@ -63,7 +64,7 @@ use super::double::{Bench, Double, SIMULATED};
 use super::panes;
 
 /// What a document says, without revisions: equal if it looks the same.
-type Said = Vec<(String, BTreeMap<MaskPlace, Mask>, Review)>;
+type Said = Vec<(String, BTreeMap<MaskPlace, Mask>, Review, String)>;
 
 fn said(doc: &Document) -> Said {
     doc.labels
@@ -71,7 +72,7 @@ fn said(doc: &Document) -> Said {
         .filter(|(_, labels)| !labels.is_empty())
         .map(|(name, labels)| {
             let masks = labels.masks.iter().map(|(place, hand)| (place.clone(), (*hand.mask).clone()));
-            (name.clone(), masks.collect(), labels.review)
+            (name.clone(), masks.collect(), labels.review, labels.note.clone())
         })
         .collect()
 }
@@ -335,6 +336,8 @@ draws! {
         1 Last,
         1 NextUnfinished,
         1 NextWorst,
+        1 NextUncertain,
+        1 SetUncertainBy(any_of::<QueueBy>()),
         1 DoneAndNext,
     }
     follow: FollowCommand {
@@ -377,6 +380,7 @@ draws! {
         3 Undo,
         3 Redo,
         2 SetReview(any_of::<Review>()),
+        1 SetNote(select(vec!["tool_a/data_0".to_owned(), "no such pair".into()]), select(vec![String::new(), " odd\n edge ".into(), "x".repeat(3000)])),
         1 AcceptPose(source(), any::<bool>()),
         1 Save,
     }
@@ -420,6 +424,7 @@ draws! {
         1 Published(any::<bool>()),
         1 Start,
         1 All,
+        1 Rank,
         1 Export(Just(PathBuf::from("table"))),
     }
     dial: DialCommand {
@@ -469,6 +474,7 @@ draws! {
         1 SetPoseEngine(registration()),
         1 SetRuntime(any_of::<EngineChoice>()),
         1 SetPerson(select(vec![String::new(), " Anna ".into(), "x".repeat(200)])),
+        1 SetRepeats(number()),
         1 SetCacheBudget(any::<u32>()),
         1 SetCamerasLinked(any::<bool>()),
         1 SetScene(scene()),
@@ -631,9 +637,10 @@ fn carry_out(bench: &mut Bench, commands: Vec<(Command, u8)>) -> Result<(), Test
     }
     bench.send(LabelsCommand::EndStroke);
     bench.settle();
-    for (name, masks, review) in said(&bench.state.document) {
+    for (name, masks, review, note) in said(&bench.state.document) {
         let stored = bench.services.source.labels.lock().unwrap().get(&name).cloned().unwrap_or_default();
         prop_assert_eq!(stored.review, review);
+        prop_assert_eq!(stored.note, note);
         prop_assert_eq!(stored.masks.len(), masks.len());
         for (place, shown) in masks {
             prop_assert_eq!(&*stored.masks[&place].mask, &shown);

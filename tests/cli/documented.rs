@@ -81,6 +81,8 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch label", How::Run(&[], "", &[0])),
     ("touch2touch masks export", How::Run(&[], "", &[0])),
     ("touch2touch masks compare", How::Run(&[], "", &[0])),
+    ("touch2touch masks queue", How::Run(&[], "", &[0])),
+    ("touch2touch masks stats", How::Run(&[], "", &[0])),
     ("touch2touch basin", How::Run(&[], "", &[0])),
     ("touch2touch bench registration", How::Run(&[], "--limit 2 --no-peers", &[0])),
     ("touch2touch bench generator", How::Run(&[], "--grasps 1 --steps 1 --engine rten --bundle SMALL", &[0])),

@@ -145,12 +145,16 @@ fn poses_by_hand_are_a_newer_version_and_old_files_are_read() {
     let tilted = HandPose { pitch_rad: 0.05, x_m: 1e-3, ..planar.into() };
     for pose in [HandPose::from(planar), tilted] {
         let by_hand = Some(AcceptedPose { pose, by_hand: true });
-        let review = StoredReview { review: "todo".into(), accepted: [None, by_hand] };
+        let review = StoredReview { review: "todo".into(), accepted: [None, by_hand], ..StoredReview::default() };
         store.save_review("hand", &review).unwrap();
         assert!(text("hand").contains("\"version\":2"));
         assert_eq!(store.load_review("hand").unwrap(), Some(review));
     }
-    for bad in [text("hand").replace("\"version\":2", "\"version\":3"), text("hand").replace("0.05", "1e999")] {
+    let noted = StoredReview { review: "todo".into(), note: "shallow".into(), ..StoredReview::default() };
+    store.save_review("noted", &noted).unwrap();
+    assert!(text("noted").contains("\"version\":3"), "an older program would lose the note");
+    assert_eq!(store.load_review("noted").unwrap(), Some(noted));
+    for bad in [text("hand").replace("\"version\":2", "\"version\":9"), text("hand").replace("0.05", "1e999")] {
         std::fs::write(dir.path().join("hand.review.json"), &bad).unwrap();
         assert!(store.load_review("hand").is_err(), "{bad}");
     }
@@ -161,7 +165,7 @@ fn reviews_and_the_journal() {
     let dir = tempfile::tempdir().unwrap();
     let store = MaskStore::in_folder(dir.path().to_owned());
     let pose = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.1 / 3.0 };
-    let review = StoredReview { review: "done".into(), accepted: [Some(pose.into()), None] };
+    let review = StoredReview { review: "done".into(), accepted: [Some(pose.into()), None], ..StoredReview::default() };
     store.save_review("b", &review).unwrap();
     store.save_review("a", &StoredReview { review: "flagged".into(), ..StoredReview::default() }).unwrap();
     assert_eq!(store.load_review("b").unwrap(), Some(review));

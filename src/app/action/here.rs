@@ -17,7 +17,10 @@ impl Action {
                 Self::Generate | Self::GenerateNewSeed | Self::NextPair | Self::PreviousPair | Self::NextWorst
             ),
             Workspace::Align => self.group() == Group::Pose,
-            Workspace::Label => self.group() == Group::Mask || self == Self::NextUnfinished,
+            Workspace::Label => {
+                self.group() == Group::Mask
+                    || matches!(self, Self::NextUnfinished | Self::NextUncertain | Self::RankMasks)
+            }
             Workspace::Evaluate => {
                 matches!(self, Self::EvaluateDataset | Self::PredictAll | Self::ExportTable | Self::NextWorst)
             }

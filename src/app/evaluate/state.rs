@@ -11,6 +11,7 @@ use crate::domain::dataset::{Index, PairId};
 use crate::domain::evaluation::{Condition, Figure, GraspScore, Row, Scores, paper_rows};
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::evaluate::{Evaluation, Setup};
+use crate::work::queue::{Queue, QueueBy};
 
 /// Grasps of each tool that the studio offers; `None` is all of them.
 pub const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];
@@ -36,6 +37,8 @@ pub struct TableState {
     pub(in crate::app) next_look: u64,
     /// The score that the list is ordered by, as it was chosen.
     pub chosen: ScoreChoice,
+    /// What uncertainty is, where the list is ordered by that.
+    pub uncertain_by: QueueBy,
 }
 
 impl Default for TableState {
@@ -50,6 +53,7 @@ impl Default for TableState {
             round: 0,
             next_look: 0,
             chosen: ScoreChoice::default(),
+            uncertain_by: QueueBy::default(),
         }
     }
 }
@@ -70,6 +74,8 @@ pub struct ScoreChoice {
 pub struct ScoreTable {
     /// The measured imprints first, where they are scored; each has scores.
     pub sources: Vec<SourceScores>,
+    /// Which pairs are worth a look first.
+    pub queue: Queue,
 }
 
 /// The scores of the pairs by one source.
@@ -135,6 +141,7 @@ impl SourceScores {
 impl ScoreTable {
     /// Of the pairs of an index, by name.
     pub fn new(index: &Index, scores: Vec<Scores>) -> Self {
+        let queue = Queue::of(index, &scores);
         let places: BTreeMap<&str, usize> = index.pairs.iter().map(|entry| entry.name.as_str()).zip(0..).collect();
         let source = |scores: Scores| {
             let mut grasps = vec![None; index.pairs.len()];
@@ -156,12 +163,13 @@ impl ScoreTable {
             let scored = grasps.iter().flatten().count();
             SourceScores { name, upper_bound, scored, grasps, figures }
         };
-        Self { sources: scores.into_iter().map(source).filter(|source| source.scored > 0).collect() }
+        Self { sources: scores.into_iter().map(source).filter(|source| source.scored > 0).collect(), queue }
     }
 
     /// Bytes that it holds, about.
     pub(in crate::app) fn bytes(&self) -> usize {
-        self.sources.iter().map(|source| source.grasps.len() * 768).sum()
+        let queued: usize = self.queue.pairs.iter().map(|queued| 64 + 32 * queued.parts.len()).sum();
+        queued + self.sources.iter().map(|source| source.grasps.len() * 768).sum::<usize>()
     }
 
     /// The source of a name, or whose name has a word in it, whatever its case.

@@ -8,6 +8,7 @@ use super::super::keys::{ImprintSource, Revision};
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::label::{DrawTool, Drawing, Ground, Provenance};
 use crate::work::error::TaskError;
+use crate::work::label_stats::LabelStats;
 pub use crate::work::labels::{HandMask, MaskPlace, PairLabels, Review};
 use crate::work::propose::Proposal;
 
@@ -29,6 +30,20 @@ pub struct Document {
     pub stored: BTreeMap<String, Stored>,
     /// Review states that are not "todo", of all pairs: known at opening.
     pub reviews: BTreeMap<String, Review>,
+    /// Notes of all pairs: known at opening.
+    pub notes: BTreeMap<String, String>,
+    /// Pairs that are drawn a second time without the first mask: what is known of them here is of that.
+    pub repeats: BTreeMap<String, Repeating>,
+    /// Pairs that came back in this run, and are over.
+    pub(in crate::app) repeated: BTreeSet<String>,
+    /// Pairs done since one came back.
+    pub(in crate::app) since_repeat: usize,
+    /// How often review states were written: what is counted of them is counted again then.
+    pub(in crate::app) marks: u64,
+    /// Whether one was changed since.
+    pub(in crate::app) marked: bool,
+    /// What was counted last.
+    pub stats: Option<Arc<LabelStats>>,
     /// Pairs whose last change is not on the disk yet.
     pub unsaved: BTreeSet<String>,
     /// The last request to write each of them.
@@ -100,7 +115,33 @@ impl Stroke {
     }
 }
 
+/// A pair that is drawn a second time, with what was said about it the first time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Repeating {
+    /// Who draws it.
+    pub person: String,
+    /// Its review state.
+    pub(in crate::app) review: Review,
+    /// Its note.
+    pub(in crate::app) note: String,
+}
+
 impl Document {
+    /// Labels of the pairs looked at so far, without those that are drawn a second time.
+    pub fn own_labels(&self) -> BTreeMap<String, PairLabels> {
+        let own = self.labels.iter().filter(|(name, _)| !self.repeats.contains_key(*name));
+        own.map(|(name, labels)| (name.clone(), labels.clone())).collect()
+    }
+
+    /// Forgets what is known of a pair: it is read again when it is looked at.
+    pub(in crate::app) fn forget(&mut self, name: &str) {
+        self.labels.remove(name);
+        self.stored.remove(name);
+        self.reviews.remove(name);
+        self.notes.remove(name);
+        self.changed = None;
+    }
+
     /// What is known about a pair, if anything.
     pub fn pair(&self, name: &str) -> Option<&PairLabels> {
         self.labels.get(name)
@@ -114,6 +155,11 @@ impl Document {
     /// The review state of a pair.
     pub fn review(&self, name: &str) -> Review {
         self.reviews.get(name).copied().unwrap_or_default()
+    }
+
+    /// The note of a pair; empty for none.
+    pub fn note(&self, name: &str) -> &str {
+        self.notes.get(name).map_or("", String::as_str)
     }
 
     /// Whether the stored labels were read, so that the pair may be edited.
@@ -139,11 +185,23 @@ impl Document {
     pub(in crate::app) fn set_review(&mut self, name: &str, review: Review) -> Review {
         let labels = self.labels.entry(name.to_owned()).or_default();
         let before = std::mem::replace(&mut labels.review, review);
+        self.marked |= before != review;
         if review == Review::Todo {
             self.reviews.remove(name);
         } else {
             self.reviews.insert(name.to_owned(), review);
         }
         before
+    }
+
+    /// Changes the note in both places that hold it; returns the one before.
+    pub(in crate::app) fn set_note(&mut self, name: &str, note: String) -> String {
+        let labels = self.labels.entry(name.to_owned()).or_default();
+        if note.is_empty() {
+            self.notes.remove(name);
+        } else {
+            self.notes.insert(name.to_owned(), note.clone());
+        }
+        std::mem::replace(&mut labels.note, note)
     }
 }

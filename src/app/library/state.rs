@@ -1,6 +1,6 @@
 //! The open data set, and the list of pairs as the browser shows it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use strum::EnumIter;
 
 use super::super::evaluate::state::TableState;
 use super::super::keys::{DatasetSeq, PairKey};
-use super::super::labels::state::Review;
+use super::super::labels::state::Document;
 use super::super::services::DataSource;
 use super::super::state::State;
 use crate::domain::dataset::{Index, PairEntry, PairId};
@@ -53,6 +53,8 @@ pub enum Sort {
     Review,
     /// By the chosen score, the worst first unless chosen otherwise; what was not scored last.
     Score,
+    /// The most uncertain masks first; of what was not ranked, as in the data set.
+    Uncertain,
 }
 
 impl Sort {
@@ -64,6 +66,7 @@ impl Sort {
             Self::Tool => "Tool",
             Self::Review => "Review state",
             Self::Score => "Score",
+            Self::Uncertain => "Uncertain",
         }
     }
 }
@@ -123,8 +126,8 @@ pub struct Library {
     pub last_seq: DatasetSeq,
     /// What was seen of the folder while it is followed; `None` while it is not.
     pub follow: Option<Follow>,
-    /// Shows only pairs whose name or tool contains every word (any case). `tool:`, `is:` narrow a word; `angle>5` is a
-    /// [`Condition`] on a score.
+    /// Shows only pairs whose name, tool or note contains every word (any case). `tool:`, `is:` and `note:` narrow a word;
+    /// `has:note` are pairs with one; `angle>5` is a [`Condition`] on a score.
     pub filter: String,
     /// Shows only these pairs: those brushed in a picture of the scores.
     pub brush: Option<Arc<BTreeSet<PairId>>>,
@@ -174,8 +177,8 @@ impl Library {
         }
     }
 
-    /// Recomputes `order` from filter, tool and sort. `reviews` holds the states that are not "todo", by name.
-    pub(in crate::app) fn reorder(&mut self, reviews: &BTreeMap<String, Review>, table: &TableState) {
+    /// Recomputes `order` from filter, tool and sort.
+    pub(in crate::app) fn reorder(&mut self, document: &Document, table: &TableState) {
         let mut words: Vec<String> = self.filter.split_whitespace().map(str::to_lowercase).collect();
         let conditions: Vec<Condition> = words.iter().filter_map(|word| Condition::parse(word)).collect();
         words.retain(|word| Condition::parse(word).is_none());
@@ -183,18 +186,23 @@ impl Library {
             self.brush.as_ref().is_none_or(|brush| brush.contains(&id))
                 && conditions.iter().all(|condition| table.meets(id, condition))
         };
-        let review = |entry: &PairEntry| reviews.get(&entry.name).copied().unwrap_or_default();
+        let review = |entry: &PairEntry| document.review(&entry.name);
         let passes = |entry: &PairEntry| {
             let name = entry.name.to_lowercase();
             let tool = entry.tool.as_deref().unwrap_or("").to_lowercase();
+            let note = document.note(&entry.name).to_lowercase();
             self.tool.as_ref().is_none_or(|t| entry.tool.as_ref() == Some(t))
                 && words.iter().all(|word| {
                     if let Some(t) = word.strip_prefix("tool:") {
                         tool.contains(t)
                     } else if let Some(state) = word.strip_prefix("is:") {
                         review(entry).name().replace(' ', "-").starts_with(state)
+                    } else if let Some(part) = word.strip_prefix("note:") {
+                        note.contains(part)
+                    } else if word == "has:note" {
+                        !note.is_empty()
                     } else {
-                        name.contains(word.as_str()) || tool.contains(word.as_str())
+                        [&name, &tool, &note].into_iter().any(|text| text.contains(word.as_str()))
                     }
                 })
         };
@@ -204,6 +212,7 @@ impl Library {
         let entry = |id: &PairId| &pairs[id.0 as usize];
         match self.sort {
             Sort::Natural | Sort::Score => {}
+            Sort::Uncertain => table.scores.queue.sort(&mut order, table.uncertain_by),
             Sort::Name => order.sort_by(|a, b| entry(a).name.cmp(&entry(b).name)),
             Sort::Tool => order.sort_by(|a, b| entry(a).tool.cmp(&entry(b).tool)),
             Sort::Review => order.sort_by_key(|id| review(entry(id))),
@@ -233,6 +242,6 @@ pub fn short_name(entry: &PairEntry) -> &str {
 impl State {
     /// Recomputes the order of the list.
     pub(in crate::app) fn reorder(&mut self) {
-        self.library.reorder(&self.document.reviews, &self.table);
+        self.library.reorder(&self.document, &self.table);
     }
 }

@@ -9,7 +9,12 @@ use crate::work::labels::Past;
 
 /// The labels stored for a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LabelsKey(pub PairKey);
+pub struct LabelsKey {
+    /// The pair.
+    pub pair: PairKey,
+    /// Whether those of a second time are meant.
+    pub repeat: bool,
+}
 
 /// Labels as they were read.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +28,7 @@ pub struct Read {
 
 impl LabelsKey {
     fn name(self, state: &State) -> Option<String> {
-        Some(state.library.entry(self.0.pair)?.name.clone())
+        Some(state.library.entry(self.pair.pair)?.name.clone())
     }
 }
 
@@ -32,7 +37,15 @@ impl Computes for LabelsKey {
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Read>> {
         let (source, name) = (state.library.open.as_ref()?.source.clone(), self.name(state)?);
+        let repeat = state.document.repeats.get(&name).map(|repeating| repeating.person.clone());
+        if repeat.is_some() != self.repeat {
+            return None;
+        }
         Some(Job::new(Lane::Files, format!("Labels of {name}"), move |_| {
+            if let Some(person) = repeat {
+                let labels = source.load_repeat(&person, &name)?;
+                return Ok(Read { labels, done: Vec::new(), undone: Vec::new() });
+            }
             let labels = source.load_labels(&name)?;
             let [done, undone] = source.past(&name, &labels).into();
             Ok(Read { labels, done, undone })
@@ -42,6 +55,10 @@ impl Computes for LabelsKey {
     fn arrived(&self, state: &mut State, read: &Arc<Read>) {
         let Some(name) = self.name(state) else { return };
         let doc = &mut state.document;
+        // Asked for before the pair came back, or before that was over.
+        if doc.repeats.contains_key(&name) != self.repeat {
+            return;
+        }
         if doc.stored.insert(name.clone(), Stored::Loaded) == Some(Stored::Loaded) {
             // Read twice: what is here may be newer.
             return;
@@ -50,14 +67,15 @@ impl Computes for LabelsKey {
         for hand in labels.masks.values_mut() {
             hand.revision = doc.next_revision();
         }
-        let review = labels.review;
+        let (review, note) = (labels.review, labels.note.clone());
         doc.labels.insert(name.clone(), labels);
         doc.set_review(&name, review);
+        doc.set_note(&name, note);
         state.history.restore(&name, &read.done, &read.undone);
     }
 
     fn failed(&self, state: &mut State, err: &TaskError) -> bool {
-        if let Some(name) = self.name(state) {
+        if let Some(name) = self.name(state).filter(|name| state.document.repeats.contains_key(name) == self.repeat) {
             state.document.stored.insert(name, Stored::Blocked(err.clone()));
         }
         true

@@ -20,7 +20,7 @@ impl Computes for MaskPlanKey {
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Plan>> {
         let source = state.library.open.as_ref()?.source.clone();
-        let (changed, choice) = (state.document.labels.clone(), self.choice);
+        let (changed, choice) = (state.document.own_labels(), self.choice);
         Some(Job::new(Lane::Files, "Plan of an export", move |_| source.plan_masks(&changed, choice)))
     }
 

@@ -116,7 +116,10 @@ impl Runtime {
                     id,
                     "Save the labels",
                     Box::new(move |_| {
-                        source.save_labels(&save.name, &save.labels, &save.deed)?;
+                        match &save.repeat {
+                            None => source.save_labels(&save.name, &save.labels, &save.deed)?,
+                            Some(person) => source.save_repeat(person, &save.name, &save.labels, &save.deed)?,
+                        }
                         Ok(Answer::LabelsSaved(save.name, save.revision))
                     }),
                 );

@@ -5,7 +5,7 @@ mod follow;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::super::action::Bindings;
@@ -36,8 +36,8 @@ use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
 use crate::work::job::JobCx;
-use crate::work::labels::Labels;
-use crate::work::labels::{Deed, Past};
+use crate::work::label_stats::{LabelStats, label_stats};
+use crate::work::labels::{Deed, Labels, Past, Reviews};
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::prediction::Prediction;
 use crate::work::sweep::{self, Sweep, SweepSetup};
@@ -100,9 +100,9 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
     };
     let mut problems = dataset.problems.clone();
     let labels = Labels::of(&dataset);
-    let (reviews, mut damaged) = labels.reviews();
-    problems.append(&mut damaged);
-    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews, case })
+    let mut reviews = labels.reviews();
+    problems.append(&mut reviews.problems);
+    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews, repeats: Arc::default(), case })
 }
 
 /// An open data set with its store of labels.
@@ -111,7 +111,9 @@ pub struct LiveSource {
     dataset: Arc<Dataset>,
     labels: Labels,
     problems: Vec<Problem>,
-    reviews: BTreeMap<String, Review>,
+    reviews: Reviews,
+    /// Second masks, by person.
+    repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
     case: Option<(PairId, Case)>,
 }
 
@@ -119,6 +121,16 @@ impl LiveSource {
     /// The data set.
     pub fn dataset(&self) -> &Dataset {
         &self.dataset
+    }
+
+    /// What a person drew a second time: the same each time, so that only differences are written.
+    fn repeats_of(&self, person: &str) -> Result<Labels, TaskError> {
+        let mut known = self.repeats.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(labels) = known.get(person) {
+            return Ok(labels.clone());
+        }
+        let labels = self.labels.repeats_of(person)?;
+        Ok(known.entry(person.to_owned()).or_insert(labels).clone())
     }
 }
 
@@ -178,6 +190,18 @@ impl DataSource for LiveSource {
         self.labels.save(name, labels, deed)
     }
 
+    fn load_repeat(&self, person: &str, name: &str) -> Result<PairLabels, TaskError> {
+        self.repeats_of(person)?.load(name)
+    }
+
+    fn save_repeat(&self, person: &str, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
+        self.repeats_of(person)?.save(name, labels, deed)
+    }
+
+    fn label_stats(&self, reviews: &BTreeMap<String, Review>, whose: (&str, f64)) -> Result<LabelStats, TaskError> {
+        Ok(label_stats(&self.dataset, &self.labels, reviews, whose))
+    }
+
     fn plan_masks(&self, changed: &BTreeMap<String, PairLabels>, choice: ExportChoice) -> Result<Plan, TaskError> {
         let masks = HandMasks { labels: &self.labels, changed };
         export::plan(&self.dataset, &masks, &ExportSetup { pairs: None, choice })
@@ -200,8 +224,8 @@ impl DataSource for LiveSource {
 impl Services for LiveServices {
     fn open(&self, place: &Place) -> Result<Opened, TaskError> {
         let source = open_source(place)?;
-        let reviews = source.reviews.clone();
-        Ok(Opened { source: Arc::new(source), reviews })
+        let Reviews { states: reviews, notes, .. } = source.reviews.clone();
+        Ok(Opened { source: Arc::new(source), reviews, notes })
     }
 
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
@@ -408,6 +432,7 @@ mod tests {
                 Some(PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
                 Some(AcceptedPose { pose: HandPose { x_m: 1e-3, ..HandPose::default() }, by_hand: true }),
             ],
+            note: "shallow at the edge".into(),
         }
     }
 
@@ -415,7 +440,7 @@ mod tests {
         let masks = |l: &PairLabels| {
             l.masks.iter().map(|(place, h)| (place.clone(), h.mask.clone(), h.base())).collect::<Vec<_>>()
         };
-        masks(a) == masks(b) && a.review == b.review && a.accepted == b.accepted
+        masks(a) == masks(b) && a.review == b.review && a.accepted == b.accepted && a.note == b.note
     }
 
     #[test]
@@ -428,7 +453,7 @@ mod tests {
         assert!(source.load_labels(&name).unwrap().is_empty());
         source.save_labels(&name, &labels(), &Deed::default()).unwrap();
         let again = LiveServices::with_config_folder(None).open(&place).unwrap();
-        assert_eq!(again.reviews[&name], Review::InProgress);
+        assert_eq!((again.reviews[&name], &*again.notes[&name]), (Review::InProgress, "shallow at the edge"));
         assert!(same(&again.source.load_labels(&name).unwrap(), &labels()));
         again.source.save_labels(&name, &PairLabels::default(), &Deed::default()).unwrap();
         assert!(open_source(&place).unwrap().load_labels(&name).unwrap().is_empty());

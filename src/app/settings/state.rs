@@ -19,6 +19,7 @@ use crate::infer::engine::EngineChoice;
 use crate::work::bundles::BundleInfo;
 pub use crate::work::mask::{MaskChoice, MaskSource};
 pub use crate::work::propose::ProposalSource;
+use crate::work::repeats;
 use scene::SceneLook;
 use versus::Versus;
 
@@ -67,6 +68,8 @@ pub struct Settings {
     pub cache_mib: u32,
     /// Who labels; empty: whom the system says.
     pub person: String,
+    /// How many of the pairs that the person marked done come back unannounced, percent; 0 switches that off.
+    pub repeats_percent: f32,
     /// Whether the 3D views of prediction and measurement move together.
     pub cameras_linked: bool,
     /// How the 3D views look.
@@ -131,6 +134,7 @@ impl Default for Settings {
             runtime: EngineChoice::default(),
             cache_mib: 512,
             person: String::new(),
+            repeats_percent: (100.0 * repeats::SHARE) as f32,
             cameras_linked: true,
             scene: SceneLook::default(),
             versus: std::collections::BTreeMap::new(),
@@ -160,6 +164,7 @@ impl Settings {
             bundle_folders: person.bundle_folders.clone(),
             cache_mib: person.cache_mib,
             person: person.person.clone(),
+            repeats_percent: person.repeats_percent,
             hint_dismissed: person.hint_dismissed,
             keys: person.keys.clone(),
             last: person.last.clone(),
@@ -181,6 +186,7 @@ impl Settings {
         self.mask = self.mask.validated();
         self.scene = self.scene.validated();
         self.cache_mib = self.cache_mib.min(MAX_CACHE_MIB);
+        self.repeats_percent = clamp_or(self.repeats_percent, 0.0, 100.0, default.repeats_percent);
         self.person = self.person.chars().filter(|c| !c.is_control()).take(80).collect();
         self.recent.truncate(MAX_RECENT);
         self

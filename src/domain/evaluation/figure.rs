@@ -33,6 +33,12 @@ pub enum Figure {
     Tool,
     /// Time to generate one image, seconds.
     Seconds,
+    /// One minus the Dice of the mask drawn by hand and the mask model's, of the worse finger, 0..1.
+    Disagreement,
+    /// Share of the pixels whose probability of contact is near one half, of the worse finger, 0..1.
+    Unsure,
+    /// How far predictions with different seeds are apart, meters.
+    SeedSpread,
 }
 
 impl Figure {
@@ -48,6 +54,9 @@ impl Figure {
             Self::SsimTool => "SSIM tool's range",
             Self::Tool => "Tool named",
             Self::Seconds => "Time",
+            Self::Disagreement => "Hand against model",
+            Self::Unsure => "Model unsure",
+            Self::SeedSpread => "Seed spread",
         }
     }
 
@@ -63,6 +72,9 @@ impl Figure {
             Self::SsimTool => "ssim-tool",
             Self::Tool => "named",
             Self::Seconds => "time",
+            Self::Disagreement => "disagreement",
+            Self::Unsure => "unsure",
+            Self::SeedSpread => "spread",
         }
     }
 
@@ -82,6 +94,15 @@ impl Figure {
             Self::SsimTool => "Structural similarity with the lab's range: that of the tool's predictions",
             Self::Tool => "Share of the imprints whose tool the classifier names, percent",
             Self::Seconds => "Time to generate one image, seconds",
+            Self::Disagreement => {
+                "What the mask drawn by hand and the mask model's do not share: 1 - Dice of the worse finger, percent"
+            }
+            Self::Unsure => {
+                "Share of the pixels to which the mask model gives a probability of 0.25 to 0.75, worse finger, percent"
+            }
+            Self::SeedSpread => {
+                "Standard deviation between kept predictions with different seeds, mean over the pixels, mm"
+            }
         }
     }
 
@@ -90,8 +111,8 @@ impl Figure {
         match self {
             Self::Angle => "°",
             Self::Psnr | Self::PsnrNoiseFree => "dB",
-            Self::Rms => "mm",
-            Self::Tool => "%",
+            Self::Rms | Self::SeedSpread => "mm",
+            Self::Tool | Self::Disagreement | Self::Unsure => "%",
             Self::Seconds => "s",
             Self::Ssim | Self::SsimNoiseFree | Self::SsimTool => "",
         }
@@ -100,8 +121,8 @@ impl Figure {
     /// Its decimals on screen.
     pub fn decimals(self) -> usize {
         match self {
-            Self::Angle | Self::Psnr | Self::PsnrNoiseFree => 1,
-            Self::Rms => 2,
+            Self::Angle | Self::Psnr | Self::PsnrNoiseFree | Self::Disagreement | Self::Unsure => 1,
+            Self::Rms | Self::SeedSpread => 2,
             Self::Tool => 0,
             Self::Ssim | Self::SsimNoiseFree | Self::SsimTool | Self::Seconds => 3,
         }
@@ -111,8 +132,8 @@ impl Figure {
     pub fn shown(self, value: f64) -> f64 {
         match self {
             Self::Angle => value.to_degrees(),
-            Self::Rms => units::mm(value),
-            Self::Tool => value * 100.0,
+            Self::Rms | Self::SeedSpread => units::mm(value),
+            Self::Tool | Self::Disagreement | Self::Unsure => value * 100.0,
             _ => value,
         }
     }
@@ -128,7 +149,7 @@ impl Figure {
 
     /// Whether a larger value is a better one.
     pub fn larger_is_better(self) -> bool {
-        !matches!(self, Self::Angle | Self::Rms | Self::Seconds)
+        !matches!(self, Self::Angle | Self::Rms | Self::Seconds | Self::Disagreement | Self::Unsure | Self::SeedSpread)
     }
 
     /// Whether `a` is worse than `b`: then it is less. A figure that is not a number (no pose was found) is the worst.
@@ -167,6 +188,9 @@ impl GraspScore {
             Figure::SsimTool => mean(images().filter_map(|image| image.ssim)),
             Figure::Tool => mean(images().filter_map(|i| i.tool_right).map(|right| if right { 1.0 } else { 0.0 })),
             Figure::Seconds => self.seconds,
+            Figure::Disagreement => self.doubt.disagreement,
+            Figure::Unsure => self.doubt.unsure,
+            Figure::SeedSpread => self.seed_spread_m,
         }
     }
 }

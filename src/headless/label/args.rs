@@ -46,6 +46,9 @@ pub(in super::super) struct LabelArgs {
     /// Set the review state.
     #[arg(long, requires = "pair", value_parser = keyed::<Review>())]
     pub(super) review: Option<Review>,
+    /// Write a note about the pair; an empty one removes it.
+    #[arg(long, value_name = "TEXT", requires = "pair")]
+    pub(super) note: Option<String>,
     /// Accept the pose of this imprint: what the registration answers, or `--pose`.
     #[arg(long, value_name = "IMPRINT", requires = "pair", value_parser = keyed::<ImprintSource>())]
     pub(super) accept: Option<ImprintSource>,

@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::io::dataset::Dataset;
+use crate::work::label_stats::Counts;
 use crate::work::labels::{ImprintOf, PairLabels};
 
 /// What is stored of a pair.
@@ -20,6 +21,8 @@ pub(super) struct Stored {
     predicted: Vec<(String, usize, String)>,
     /// From the measured, from the predicted imprint.
     accepted: [Option<AcceptedPose>; 2],
+    /// What a person wrote about it; empty for nothing.
+    note: String,
 }
 
 impl Stored {
@@ -33,7 +36,14 @@ impl Stored {
                 ImprintOf::Predicted(what) => predicted.push((finger, pixels, what.to_string())),
             }
         }
-        Self { name: name.to_owned(), review: labels.review.stored(), masks, predicted, accepted: labels.accepted }
+        Self {
+            name: name.to_owned(),
+            review: labels.review.stored(),
+            masks,
+            predicted,
+            accepted: labels.accepted,
+            note: labels.note.clone(),
+        }
     }
 
     pub(super) fn text(&self) -> String {
@@ -48,6 +58,9 @@ impl Stored {
                 text += &format!("; {of} pose {:.1}° accepted{by}", place.theta_rad.to_degrees());
             }
         }
+        if !self.note.is_empty() {
+            text += &format!("; note: {}", self.note);
+        }
         text
     }
 }
@@ -59,4 +72,6 @@ pub(super) struct Report {
     pub(super) folder: PathBuf,
     /// The labeled pair, or all that are labeled.
     pub(super) pairs: Vec<Stored>,
+    /// All pairs of the data set by review state.
+    pub(super) counts: Counts,
 }

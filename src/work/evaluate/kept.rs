@@ -25,7 +25,7 @@ use crate::io::digest::sha256;
 use crate::io::files;
 
 /// To be raised when a figure is computed in another way.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// The sheet of what files hold.
 const FILES: &str = "files";
 /// No larger file is a touch or a CAD model.
@@ -51,6 +51,8 @@ pub(super) struct Entry {
     pub(super) notes: Vec<Problem>,
     /// Why masks are not of the source that was asked, with how many.
     pub(super) otherwise: Vec<(String, usize)>,
+    /// Digests of the color pictures, by which predictions of them are found.
+    pub(super) inputs: Vec<String>,
 }
 
 impl Entry {
@@ -59,6 +61,7 @@ impl Entry {
         clipped: Option<bool>,
         notes: Vec<Problem>,
         otherwise: Vec<(String, usize)>,
+        inputs: Vec<String>,
     ) -> Self {
         Self {
             no_pose: score.angle_error_rad.is_some_and(f64::is_nan),
@@ -69,6 +72,7 @@ impl Entry {
             clipped,
             notes,
             otherwise,
+            inputs,
             score,
         }
     }
@@ -245,7 +249,8 @@ fn key(dataset: &Dataset, id: PairId, tool: &str, labels: &Labeled, files: &File
     }
     let labels = labels.load(&entry.name).ok()?;
     for (place, hand) in labels.iter().flat_map(|labels| &labels.masks) {
-        let pixels: Vec<u8> = hand.mask.as_slice().iter().map(|pixel| u8::from(*pixel)).collect();
+        let mut pixels: Vec<u8> = hand.mask.as_slice().iter().map(|pixel| u8::from(*pixel)).collect();
+        pixels.extend(hand.marks.ignored().iter().flat_map(|ignored| ignored.as_slice()).map(|pixel| u8::from(*pixel)));
         write!(text, "\n{place:?} {:?} {}", hand.mask.size(), sha256(&pixels)).ok()?;
     }
     Some(sha256(text.as_bytes())[..32].to_owned())

@@ -167,6 +167,15 @@ impl Models {
         self.methods.iter().map(empty).collect()
     }
 
+    /// The generators among the methods.
+    pub(super) fn generators(&self) -> Vec<BundleInfo> {
+        let bundle = |method: &Method| match method {
+            Method::Generator(method) => Some(method.bundle.clone()),
+            Method::Measured | Method::Stored => None,
+        };
+        self.methods.iter().filter_map(bundle).collect()
+    }
+
     /// The identity of the classifier's bundle.
     pub(super) fn classifier_hash(&self) -> Option<&str> {
         self.classifier_bundle.as_ref().map(Bundle::hash)

@@ -5,16 +5,18 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
+use super::doubt::Seen;
 use super::kept::{Entry, Kept};
 use super::load::{Case, Labeled, load};
 use super::methods::{Made, Method, Models};
-use super::{Setup, Skipped, ToolWork};
+use super::{Setup, Skipped, ToolWork, apart};
 use crate::domain::align::Ask;
 use crate::domain::catalog::pattern_of;
 use crate::domain::contact::{ContactMask, MaskBasis};
 use crate::domain::dataset::PairId;
 use crate::domain::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
 use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use crate::domain::label::Doubt;
 use crate::domain::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ssim_ranges, unit_range};
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad};
@@ -51,8 +53,9 @@ struct Pending {
     failed: bool,
 }
 
-/// A grasp with what a method made of it, its masks, and why some are not of the source that was asked.
-type Masked<'a> = (&'a Case, Made, PerPad<Mask>, Vec<(String, usize)>);
+/// A grasp with what a method made of it, its masks, why some are not of the source that was asked, and how sure the mask
+/// model is of them.
+type Masked<'a> = (&'a Case, Made, PerPad<Mask>, Vec<(String, usize)>, Doubt);
 
 /// The grasps of one tool, by method.
 pub(super) struct Tool<'a> {
@@ -118,6 +121,7 @@ impl<'a> Tool<'a> {
                     }
                 };
                 let mut otherwise: Vec<(String, usize)> = Vec::new();
+                let mut seen = Seen::new(by, by_models);
                 let masks = case.sample.rig.pads().map(|f| {
                     if self.model.is_none() || case.sample.grasp_from_object.is_none() {
                         return None;
@@ -126,7 +130,7 @@ impl<'a> Tool<'a> {
                     let tool = self.model.as_ref();
                     let (labels, of) = (case.labels.as_ref(), of.as_ref());
                     let inputs = MaskInputs { sample: &case.sample, tool, labels, of };
-                    let found = guarded(|| by_models.contact_mask(by, imprint, f, inputs).map_err(|err| err.why));
+                    let found = guarded(|| seen.contact_mask(imprint, f, inputs).map_err(|err| err.why));
                     let finger = || case.sample.rig.pad_key(f);
                     let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
                     let ContactMask { mask, basis } = found.ok()?;
@@ -145,18 +149,23 @@ impl<'a> Tool<'a> {
                     Some(mask)
                 });
                 let masks = masks.collect();
-                kept.push((case, made, masks, otherwise));
+                let doubt = match upper && case.sample.scale == Scale::Measured {
+                    true => guarded(|| seen.doubt(&made.imprints, case.labels.as_ref()).map_err(|err| err.why)),
+                    false => Ok(Doubt::default()),
+                };
+                let doubt = doubt.map_err(|why| skip(case, format!("mask model: {why}"))).unwrap_or_default();
+                kept.push((case, made, masks, otherwise, doubt));
             }
             // Poses on all cores; the models run one by one.
             let angles: Vec<Result<Option<f64>, String>> = kept
                 .par_iter()
-                .map(|(case, made, masks, _)| {
+                .map(|(case, made, masks, ..)| {
                     // A color picture has no depth, so there is nothing that could fail.
                     let posed = with_masks && made.colors.is_empty();
                     guarded(|| Ok(posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()))
                 })
                 .collect();
-            for ((case, made, _, otherwise), angle) in kept.into_iter().zip(angles) {
+            for ((case, made, _, otherwise, doubt), angle) in kept.into_iter().zip(angles) {
                 let scored = angle.and_then(|angle| Ok((angle, guarded(|| Ok(images(case, &made, setup, upper)))?)));
                 let (angle_error_rad, mut images) = match scored {
                     Ok(scored) => scored,
@@ -183,8 +192,11 @@ impl<'a> Tool<'a> {
                     images: Vec::new(),
                     angle_error_rad,
                     seconds: made.seconds,
+                    doubt,
+                    seed_spread_m: None,
                 };
-                let entry = Entry::new(score, case.clipped, case.sample.notes.clone(), otherwise);
+                let inputs = if upper { apart::inputs(&case.sample) } else { Vec::new() };
+                let entry = Entry::new(score, case.clipped, case.sample.notes.clone(), otherwise, inputs);
                 let pending = Pending { id: case.id, entry, images, failed: false };
                 self.pending.entry(at).or_default().push(pending);
             }

@@ -53,6 +53,8 @@ pub struct Change {
     pub review: Option<[Review; 2]>,
     /// The pose accepted of the measured and of the predicted imprint.
     pub accepted: [Option<[Option<AcceptedPose>; 2]>; 2],
+    /// The note.
+    pub note: Option<[String; 2]>,
 }
 
 /// The same pixels from the same source; the revision is of one run of the program.
@@ -80,6 +82,7 @@ impl Change {
             let pair = [before.accepted[i], after.accepted[i]];
             *accepted = (pair[0] != pair[1]).then_some(pair);
         }
+        change.note = (before.note != after.note).then(|| [before.note.clone(), after.note.clone()]);
         change
     }
 
@@ -94,6 +97,7 @@ impl Change {
         self.masks.values_mut().for_each(|pair| pair.reverse());
         self.review.iter_mut().for_each(|pair| pair.reverse());
         self.accepted.iter_mut().flatten().for_each(|pair| pair.reverse());
+        self.note.iter_mut().for_each(|pair| pair.reverse());
         self
     }
 
@@ -101,6 +105,7 @@ impl Change {
     fn overlaps(&self, other: &Self) -> bool {
         self.masks.keys().any(|place| other.masks.contains_key(place))
             || self.review.is_some() && other.review.is_some()
+            || self.note.is_some() && other.note.is_some()
             || (0..2).any(|i| self.accepted[i].is_some() && other.accepted[i].is_some())
     }
 
@@ -108,6 +113,7 @@ impl Change {
     fn leads_to(&self, labels: &PairLabels) -> bool {
         self.masks.iter().all(|(place, [_, after])| same(after.as_ref(), labels.masks.get(place)))
             && self.review.is_none_or(|[_, after]| after == labels.review)
+            && self.note.as_ref().is_none_or(|[_, after]| *after == labels.note)
             && (0..2).all(|i| self.accepted[i].is_none_or(|[_, after]| after == labels.accepted[i]))
     }
 }
@@ -145,6 +151,8 @@ pub(super) struct Line {
     review: Option<[Review; 2]>,
     #[serde(default)]
     accepted: [Option<[Option<AcceptedPose>; 2]>; 2],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    note: Option<[String; 2]>,
 }
 
 impl Line {
@@ -164,6 +172,7 @@ impl Line {
             masks: change.masks.iter().map(mask).collect(),
             review: change.review,
             accepted: change.accepted,
+            note: change.note.clone(),
         }
     }
 
@@ -178,7 +187,7 @@ impl Line {
             }
             masks.insert(MaskPlace { pad, of: line.of }, pair);
         }
-        let change = Change { masks, review: self.review, accepted: self.accepted };
+        let change = Change { masks, review: self.review, accepted: self.accepted, note: self.note };
         Some((self.act, Past { name: self.name.into(), change }))
     }
 }
@@ -243,6 +252,9 @@ fn apply(labels: &mut PairLabels, change: &Change) {
     }
     if let Some([_, after]) = change.review {
         labels.review = after;
+    }
+    if let Some([_, after]) = &change.note {
+        labels.note.clone_from(after);
     }
     for (i, accepted) in change.accepted.iter().enumerate() {
         if let Some([_, after]) = accepted {

@@ -1,21 +1,21 @@
 //! Following a folder: the same follower as `touch2touch watch`.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use super::super::super::labels::state::Review;
 use super::super::{DataSource, Followed, Following};
 use super::LiveSource;
 use crate::domain::dataset::Problem;
 use crate::io::follow::{Arrival, Follower};
 use crate::work::error::TaskError;
-use crate::work::labels::Labels;
+use crate::work::labels::{Labels, Reviews};
 
 struct LiveFollowing {
     follower: Follower,
-    reviews: BTreeMap<String, Review>,
+    reviews: Reviews,
     labels: Labels,
+    repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
     /// Troubles of the folder that were said.
     said: Vec<Problem>,
 }
@@ -23,8 +23,8 @@ struct LiveFollowing {
 /// `None` for the demo.
 pub(super) fn start(source: &LiveSource) -> Option<Box<dyn Following>> {
     let follower = Follower::continuing(source.dataset.clone())?;
-    let (reviews, labels) = (source.reviews.clone(), source.labels.clone());
-    Some(Box::new(LiveFollowing { follower, reviews, labels, said: Vec::new() }))
+    let (reviews, labels, repeats) = (source.reviews.clone(), source.labels.clone(), source.repeats.clone());
+    Some(Box::new(LiveFollowing { follower, reviews, labels, repeats, said: Vec::new() }))
 }
 
 impl Following for LiveFollowing {
@@ -50,6 +50,7 @@ impl Following for LiveFollowing {
             labels: self.labels.continued(&dataset),
             problems: dataset.problems.clone(),
             reviews: self.reviews.clone(),
+            repeats: self.repeats.clone(),
             case: None,
             dataset,
         });
