@@ -225,7 +225,7 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     let Some(stroke) = doc.stroke.take() else { return };
     let labels = doc.labels.entry(stroke.pair.clone()).or_default();
     let Some(now) = labels.masks.get(&stroke.place) else { return };
-    if now.is_same(&stroke.start) {
+    if !now.is_worth_keeping(&stroke.start, stroke.before.is_some()) {
         labels.put(&stroke.place, stroke.before);
         return;
     }
@@ -332,9 +332,7 @@ fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
     }
     let finger = state.selection.finger;
     let source = state.worked_on(finger);
-    let (Some(start), Some(place)) = (start_from(state, source, finger), state.mask_place(source, finger)) else {
-        return state.log.error(&TaskError::new(WHAT, "there is no mask to work on yet"));
-    };
+    let Some(place) = state.mask_place(source, finger) else { return };
     let proposal = match state.proposal(source, finger) {
         Lookup::Ready(proposal) => proposal.clone(),
         Lookup::Failed(err) => {
@@ -348,16 +346,14 @@ fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
         }
     };
     state.selection.proposing = false;
-    let was_hand = state.hand_mask(source, finger).is_some();
-    match accepted(&start, &proposal, state.settings.mask.over_hand) {
-        None if was_hand => state.log.info(format!("{WHAT}: the mask is so already")),
-        accepted => {
-            let hand = accepted.unwrap_or_else(|| HandMask::new(start.mask.clone(), proposal.provenance.clone()));
-            let how = serde_json::to_value(&proposal.provenance).ok();
-            let deed = Deed { how, ..Deed::named("proposal accepted") };
-            set_hand_mask(state, deed, place, Some(hand), effects);
-        }
+    let drawn = state.hand_mask(source, finger);
+    let hand = accepted(drawn, &proposal, state.settings.mask.over_hand);
+    if drawn.is_some_and(|drawn| drawn.is_same(&hand)) {
+        return state.log.info(format!("{WHAT}: the mask is so already"));
     }
+    let how = serde_json::to_value(&proposal.provenance).ok();
+    let deed = Deed { how, ..Deed::named("proposal accepted") };
+    set_hand_mask(state, deed, place, Some(hand), effects);
 }
 
 fn reset(state: &mut State, effects: &mut Vec<Effect>) {

@@ -210,7 +210,9 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
                 let mut hand = args.from.map_or_else(|| start.clone(), |from| start.copied(from));
                 if args.propose.is_some() {
                     let proposal = touch.proposal((dataset, id), &found, pad, labels)?;
-                    hand = accepted(&start, &proposal, args.over_hand).unwrap_or(hand);
+                    let imprint = found.imprints[pad].as_ref();
+                    let drawn = imprint.and_then(|imprint| labels.drawn(&place(pad), imprint));
+                    hand = accepted(drawn, &proposal, args.over_hand);
                 }
                 if let Some(imprint) = &found.imprints[pad] {
                     for drawing in &args.draw {
@@ -220,7 +222,7 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
                 for clean_up in &args.clean {
                     hand.clean(*clean_up, &dataset.rig);
                 }
-                if makes || !hand.is_same(&start) {
+                if makes || hand.is_worth_keeping(&start, labels.masks.contains_key(&place(pad))) {
                     labels.draw(&place(pad), Some(hand));
                 }
             }

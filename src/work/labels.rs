@@ -249,6 +249,13 @@ impl HandMask {
         self.mask == other.mask && self.marks == other.marks
     }
 
+    /// Whether what was done to `start` is worth keeping. Of a mask that a person drew, who looked at which pixel counts as
+    /// well; of an automatic one, a stroke that changes no pixel makes no drawn one.
+    pub fn is_worth_keeping(&self, start: &Self, was_drawn: bool) -> bool {
+        let changed = self.mask != start.mask || self.marks.ignored() != start.marks.ignored();
+        changed || was_drawn && self.marks != start.marks
+    }
+
     /// In few bytes.
     pub fn pack(&self) -> PackedMask {
         PackedMask::pack(&self.mask, &self.marks)

@@ -275,10 +275,12 @@ pub fn nearest_before<T: Copy>(here: usize, with_mask: impl Iterator<Item = (usi
     with_mask.filter(|(at, _)| *at != here).min_by_key(|(at, _)| distance(*at)).map(|(_, pair)| pair)
 }
 
-/// A proposal as the hand mask that accepting it whole makes, over the mask in force: what a person painted stays unless
-/// `over_hand`. `None` if it changes nothing.
+/// The mask that accepting a proposal whole makes. Of the one that was drawn, what a person painted stays unless
+/// `over_hand`, and ignored pixels stay so.
 #[must_use]
-pub fn accepted(start: &HandMask, proposal: &Proposal, over_hand: bool) -> Option<HandMask> {
-    let mut hand = start.clone();
-    hand.replace(&proposal.mask, proposal.provenance.clone(), !over_hand).then_some(hand)
+pub fn accepted(drawn: Option<&HandMask>, proposal: &Proposal, over_hand: bool) -> HandMask {
+    let Some(drawn) = drawn else { return HandMask::new(proposal.mask.clone(), proposal.provenance.clone()) };
+    let mut hand = drawn.clone();
+    hand.replace(&proposal.mask, proposal.provenance.clone(), !over_hand);
+    hand
 }

@@ -105,7 +105,7 @@ fn a_damaged_file_blocks_its_pair_and_is_kept() {
     for bad in [
         String::new(),
         good[..good.len() / 2].to_owned(),
-        good.replace("\"version\":1", "\"version\":2"),
+        good.replace("\"version\":2", "\"version\":3"),
         good.replace("24500]", "24499]"),
         good.replace("\"contact_px\":24500", "\"contact_px\":24000"),
         good.replace("data_0", "data_1"),

@@ -3,9 +3,9 @@
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
-use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::marks::Marks;
+use super::paint::Paint;
 use super::provenance::Provenance;
 use super::{Rect, paint_where, region};
 use crate::domain::grid::{DepthMap, Mask};
@@ -31,53 +31,6 @@ pub enum DrawTool {
         /// By how much the depth may differ, meters.
         tolerance_m: f32,
     },
-}
-
-/// What a drawing makes of the pixels it touches.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Hash,
-    PartialOrd,
-    Ord,
-    Serialize,
-    Deserialize,
-    EnumIter,
-    EnumString,
-    IntoStaticStr,
-)]
-#[serde(rename_all = "snake_case")]
-#[strum(serialize_all = "snake_case")]
-pub enum Paint {
-    /// Contact.
-    #[default]
-    Contact,
-    /// Free of contact.
-    Free,
-    /// Neither: a network does not learn from them, and no score counts them.
-    Ignore,
-    /// What the proposal says that is shown over the mask.
-    LetThrough,
-}
-
-impl Paint {
-    /// The name in files and on the command line.
-    pub fn key(self) -> &'static str {
-        self.into()
-    }
-
-    /// What the other button of the pointer makes of them.
-    #[must_use]
-    pub fn reversed(self) -> Self {
-        match self {
-            Self::Contact => Self::Free,
-            Self::Free | Self::Ignore | Self::LetThrough => Self::Contact,
-        }
-    }
 }
 
 /// Pixels of dragging that double or halve the tolerance of the wand.

@@ -1,7 +1,7 @@
 //! [`Marks`]: what stands behind the pixels of a corrected mask.
 
 use super::Rect;
-use super::drawing::Paint;
+use super::paint::Paint;
 use super::provenance::Provenance;
 use crate::domain::grid::{Grid, Mask};
 
