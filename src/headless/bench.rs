@@ -6,6 +6,7 @@ pub(super) mod fan;
 mod figures;
 mod front;
 mod generator;
+mod labelling;
 mod peers;
 mod registration;
 mod rows;
@@ -28,6 +29,8 @@ pub(super) enum BenchVerb {
     Generator(generator::GeneratorArgs),
     /// Write fresh known grasps of the built-in simulator, for `bench registration`.
     Cases(cases::CasesArgs),
+    /// What proposed contact masks are worth on simulated grasps, and what a stroke costs.
+    Labelling(labelling::LabellingArgs),
     /// Seconds for a whole data set on all cores, on simulated pairs.
     Dataset(dataset::DatasetArgs),
 }
@@ -37,6 +40,7 @@ pub(super) fn run(verb: &BenchVerb) -> VerbResult {
         BenchVerb::Registration(args) => registration::run(args),
         BenchVerb::Generator(args) => generator::run(args),
         BenchVerb::Cases(args) => cases::run(args),
+        BenchVerb::Labelling(args) => labelling::run(args),
         BenchVerb::Dataset(args) => dataset::run(args),
     }
 }

@@ -225,6 +225,22 @@ impl HandMask {
         drawing.apply(Arc::make_mut(&mut self.mask), Arc::make_mut(&mut self.marks), ground, by);
     }
 
+    /// Draws what comes after the first `from` points of a drawing that grows, as the person `by`. `touched` holds what was
+    /// drawn on so far. Whether it touched anything new.
+    pub fn draw_on(
+        &mut self,
+        drawing: &Drawing,
+        touched: &mut Mask,
+        ground: Ground<'_>,
+        from: usize,
+        by: Provenance,
+    ) -> bool {
+        let Some(rect) = drawing.touch(touched, ground, from) else { return false };
+        let (mask, marks) = (Arc::make_mut(&mut self.mask), Arc::make_mut(&mut self.marks));
+        marks.paint(mask, (touched, rect), drawing.paint, ground.proposed, by);
+        true
+    }
+
     /// Takes another mask's pixels over where they differ; see [`Marks::replace`].
     pub fn replace(&mut self, new: &Mask, by: Provenance, keep_hand: bool) -> bool {
         Arc::make_mut(&mut self.marks).replace(Arc::make_mut(&mut self.mask), new, by, keep_hand)

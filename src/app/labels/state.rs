@@ -99,19 +99,15 @@ pub struct Stroke {
 impl Stroke {
     /// Draws on the mask: what a brush did since its first `from` points, anything else anew. Whether it touched anything.
     pub(in crate::app) fn draw_on(&mut self, hand: &mut HandMask, imprint: &DepthMap, from: usize) -> bool {
-        let ground =
-            Ground { imprint, allowed: self.allowed.as_ref(), proposed: self.proposed.as_ref().map(|p| &p.mask) };
         let mut undone = false;
         if !matches!(self.drawing.tool, DrawTool::Brush { .. }) {
             undone = !hand.is_same(&self.start);
             *hand = HandMask { revision: hand.revision, ..self.start.clone() };
             self.touched.as_mut_slice().fill(false);
         }
-        let Some(rect) = self.drawing.touch(&mut self.touched, ground, from) else { return undone };
-        let (mask, marks) = (Arc::make_mut(&mut hand.mask), Arc::make_mut(&mut hand.marks));
         let proposed = self.proposed.as_ref().map(|proposal| &proposal.mask);
-        marks.paint(mask, (&self.touched, rect), self.drawing.paint, proposed, self.by.clone());
-        true
+        let ground = Ground { imprint, allowed: self.allowed.as_ref(), proposed };
+        hand.draw_on(&self.drawing, &mut self.touched, ground, from, self.by.clone()) || undone
     }
 }
 

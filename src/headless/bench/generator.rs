@@ -1,6 +1,6 @@
 //! `touch2touch bench generator`: error against time of sampler, steps and engine, on simulated grasps.
 
-mod cases;
+pub(super) mod cases;
 mod timing;
 
 use std::path::PathBuf;

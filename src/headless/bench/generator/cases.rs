@@ -16,11 +16,11 @@ use crate::work::cloud::contact_points;
 use crate::work::compare::LAB_PEAK_M;
 
 /// A grasp of a simulated tool.
-pub(super) struct Case {
-    pub(super) name: String,
-    pub(super) sample: Sample,
-    tool: std::sync::Arc<ToolModel>,
-    truth: PlanarPose,
+pub(in crate::headless::bench) struct Case {
+    pub(in crate::headless::bench) name: String,
+    pub(in crate::headless::bench) sample: Sample,
+    pub(in crate::headless::bench) tool: std::sync::Arc<ToolModel>,
+    pub(in crate::headless::bench) truth: PlanarPose,
 }
 
 /// What a prediction is worth.
@@ -37,7 +37,11 @@ pub(super) struct Score {
 ///
 /// # Errors
 /// If no tool is wanted, or a CAD model cannot be used.
-pub(super) fn simulate(count: usize, seed: u64, wanted: impl Fn(bool) -> bool) -> anyhow::Result<Vec<Case>> {
+pub(in crate::headless::bench) fn simulate(
+    count: usize,
+    seed: u64,
+    wanted: impl Fn(bool) -> bool,
+) -> anyhow::Result<Vec<Case>> {
     let specs: Vec<_> = catalog::tools().iter().filter(|tool| wanted(tool.seen)).collect();
     anyhow::ensure!(!specs.is_empty(), "there are no such tools");
     let models = specs

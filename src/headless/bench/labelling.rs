@@ -1,0 +1,326 @@
+//! `touch2touch bench labelling`: what proposed masks are worth on known grasps, and what a stroke costs.
+
+use std::time::Instant;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::Machine;
+use super::figures::quantile;
+use super::generator::cases::{Case, simulate};
+use crate::domain::align::Ask;
+use crate::domain::frames::PlanarPose;
+use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::label::{CadPose, DrawTool, Drawing, Ground, Paint, Provenance, agreement, difference};
+use crate::domain::pose::RegistrationChoice;
+use crate::domain::rig::{PadId, PerPad, Rig, lab};
+use crate::headless::args::JsonArgs;
+use crate::headless::predict::{ModelArgs, Predictor};
+use crate::headless::{Output, VerbResult};
+use crate::work::cloud::contact_points;
+use crate::work::job::JobCx;
+use crate::work::labels::{HandMask, ImprintSource};
+use crate::work::mask::{MaskChoice, MaskInputs, MaskSource};
+use crate::work::models::Masking;
+use crate::work::pose::pose;
+use crate::work::propose::{self, Side};
+
+/// Moves of the pointer in a stroke.
+const MOVES: usize = 60;
+/// Strokes of each kind.
+const STROKES: usize = 20;
+
+/// Arguments of `bench labelling`.
+#[derive(Debug, Args)]
+pub(in crate::headless) struct LabellingArgs {
+    /// Grasps of the unseen tools, simulated.
+    #[arg(long, default_value_t = 18, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    grasps: u32,
+    /// Seed of grasps and noise.
+    #[arg(long, default_value_t = 1)]
+    simulation_seed: u64,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+/// What one source proposes on the imprints of one kind.
+#[derive(Serialize)]
+struct Row {
+    imprint: &'static str,
+    source: String,
+    /// With the true contact, mean over fingers; `None` where nothing could be proposed.
+    iou: Option<f64>,
+    iou_worst: Option<f64>,
+    /// Of the poses registered from the proposed masks, degrees, mean.
+    angle_error_deg: Option<f64>,
+    /// Between those and the poses registered from the true masks of the same imprints, degrees, mean.
+    apart_from_true_masks_deg: Option<f64>,
+    /// Grasps without a pose.
+    no_pose: usize,
+    /// To make the mask of one finger, milliseconds, median.
+    ms: Option<f64>,
+}
+
+/// What a stroke costs besides the screen.
+#[derive(Serialize)]
+struct Stroke {
+    size: [usize; 2],
+    radius_px: f32,
+    /// For a move of the pointer: drawing, provenance, and finding what to upload; milliseconds.
+    move_median_ms: f64,
+    move_worst_ms: f64,
+    /// For the end of it: packing for undo, journal and file; milliseconds.
+    end_median_ms: f64,
+    /// The largest share of the picture that one move uploads.
+    largest_upload: f64,
+}
+
+#[derive(Serialize)]
+struct Report {
+    machine: Machine,
+    grasps: usize,
+    simulation_seed: u64,
+    rows: Vec<Row>,
+    strokes: Vec<Stroke>,
+}
+
+/// Proposals of one source, by grasp.
+struct Found {
+    source: &'static str,
+    ious: Vec<f64>,
+    errors: Vec<Option<f64>>,
+    apart: Vec<f64>,
+    ms: Vec<f64>,
+}
+
+pub(super) fn run(args: &LabellingArgs) -> VerbResult {
+    let machine = Machine::now();
+    let cases = simulate(args.grasps as usize, args.simulation_seed, |seen| !seen)?;
+    let output = Output::new(args.json.common(), "proposing", cases.len() * 2);
+    let mut predictor = Predictor::new(&args.model, &Rig::lab());
+    let mut rows = Vec::new();
+    for imprint in [ImprintSource::Measured, ImprintSource::Predicted] {
+        let mut found: Vec<Found> = Vec::new();
+        for (at, case) in cases.iter().enumerate() {
+            output.step(&case.name);
+            let imprints = predictor.imprints(&case.sample, imprint, &JobCx::unwatched())?;
+            // What is carried comes from the grasp of the same tool before.
+            let from = cases[..at].iter().rev().find(|from| std::sync::Arc::ptr_eq(&from.tool, &case.tool));
+            let truth = true_masks(case)?;
+            let true_pose = registered(case, &imprints, &truth);
+            for (source, masks, ms) in proposals(&mut predictor, case, from, (imprint, &imprints), &truth)? {
+                let place = found.iter().position(|found| found.source == source).unwrap_or_else(|| {
+                    found.push(Found { source, ious: vec![], errors: vec![], apart: vec![], ms: vec![] });
+                    found.len() - 1
+                });
+                let one = &mut found[place];
+                for pad in lab::PADS {
+                    if let (Some(mask), Some(truth)) = (&masks[pad], &truth[pad]) {
+                        one.ious.extend(agreement(mask, truth, lab_px_per_mm()).map(|found| found.iou));
+                    }
+                }
+                let at = registered(case, &imprints, &masks);
+                one.errors.push(at.map(|at| apart_deg(at, case.truth)));
+                one.apart.extend(at.zip(true_pose).map(|(a, b)| apart_deg(a, b)));
+                one.ms.push(ms);
+            }
+        }
+        rows.extend(found.into_iter().map(|found| row(imprint, &found)));
+    }
+    let strokes = [([175, 140], 4.0), ([1024, 1024], 4.0), ([1024, 1024], 40.0)];
+    let strokes = strokes.into_iter().map(|(size, radius_px)| stroke(size, radius_px)).collect();
+    let report = Report { machine, grasps: cases.len(), simulation_seed: args.simulation_seed, rows, strokes };
+    args.json.write(&report)?;
+    output.finish(&report, || text(&report))?;
+    Ok(true)
+}
+
+fn lab_px_per_mm() -> f64 {
+    Rig::lab().depth_px_per_mm()
+}
+
+fn apart_deg(a: PlanarPose, b: PlanarPose) -> f64 {
+    crate::domain::units::angle_error(a.theta_rad, b.theta_rad).to_degrees()
+}
+
+fn true_masks(case: &Case) -> anyhow::Result<PerPad<Mask>> {
+    let mut masks = PerPad::default();
+    for pad in lab::PADS {
+        let truth = case.sample.pad(pad).and_then(|touch| touch.depth()?.truth.as_ref());
+        let truth = truth.ok_or_else(|| anyhow::anyhow!("a simulated grasp knows its contact"))?;
+        masks[pad] = Some(truth.contact.clone());
+    }
+    Ok(masks)
+}
+
+fn registered(case: &Case, imprints: &PerPad<DepthMap>, masks: &PerPad<Mask>) -> Option<PlanarPose> {
+    let points = contact_points(&case.sample, &imprints.as_ref(), &masks.as_ref()).ok()?;
+    let method = RegistrationChoice::default().method();
+    pose(&points, &case.tool, &*method, Ask::default(), None).ok().map(|found| found.grasp_from_object)
+}
+
+type Proposed = (&'static str, PerPad<Mask>, f64);
+
+/// What each source proposes for a grasp, with the milliseconds that a finger took.
+fn proposals(
+    predictor: &mut Predictor,
+    case: &Case,
+    from: Option<&Case>,
+    (of, imprints): (ImprintSource, &PerPad<DepthMap>),
+    truth: &PerPad<Mask>,
+) -> anyhow::Result<Vec<Proposed>> {
+    let mut all: Vec<Proposed> = Vec::new();
+    let mut each = |name, make: &mut dyn FnMut(PadId, &DepthMap) -> anyhow::Result<Mask>| -> anyhow::Result<_> {
+        let begin = Instant::now();
+        let mut masks = PerPad::default();
+        for (pad, imprint) in imprints.entries() {
+            masks[pad] = Some(make(pad, imprint)?);
+        }
+        let ms = begin.elapsed().as_secs_f64() * 1e3 / lab::PADS.len() as f64;
+        all.push((name, masks.clone(), ms));
+        Ok(masks)
+    };
+    let mut by_model = PerPad::default();
+    for (name, source) in [
+        ("threshold", MaskSource::Threshold),
+        ("top percent", MaskSource::TopPercent),
+        ("mask model", MaskSource::Unet),
+    ] {
+        let choice = MaskChoice { source, ..MaskChoice::default() };
+        let model = predictor.mask_model(&choice)?;
+        let engine = predictor.engine();
+        let inputs = MaskInputs { sample: &case.sample, tool: None, labels: None, of: None };
+        by_model = each(name, &mut |pad, imprint| {
+            let by = Masking { choice, model: model.as_ref(), engine };
+            Ok(predictor.models().contact_mask(by, imprint, pad, inputs)?.mask)
+        })?;
+    }
+    let within_m = MaskChoice::default().cad_distance_m;
+    let near_cad = |pose: PlanarPose, at: CadPose, pad, imprint: &DepthMap| -> anyhow::Result<Mask> {
+        let distances = propose::cad_distances((imprint, of), (&case.sample, pad), &case.tool, pose.into())?;
+        Ok(propose::near_cad(&distances, within_m, at).mask)
+    };
+    each("CAD at the true pose", &mut |pad, imprint| near_cad(case.truth, CadPose::Truth, pad, imprint))?;
+    if let Some(pose) = registered(case, imprints, &by_model) {
+        each("CAD at the registered pose", &mut |pad, imprint| {
+            near_cad(pose, CadPose::Registered(pose), pad, imprint)
+        })?;
+    }
+    each("other finger's true mask", &mut |pad, imprint| {
+        let other = lab::PADS[usize::from(pad == lab::PADS[0])];
+        let (Some(there), Some(mask)) = (&imprints[other], &truth[other]) else { anyhow::bail!("there is no other") };
+        let from = Side { sample: &case.sample, pad: other, imprint: there };
+        Ok(propose::carried_across("other", (from, mask), Side { sample: &case.sample, pad, imprint })?.mask)
+    })?;
+    if let Some(from) = from {
+        let masks = true_masks(from)?;
+        each("carried from another grasp", &mut |pad, imprint| {
+            let mut labels = crate::work::labels::PairLabels::default();
+            let hand = masks[pad].clone().map(|mask| HandMask::new(mask, Provenance::Truth));
+            labels.draw(&crate::work::labels::MaskPlace::measured(pad), hand);
+            let to = Side { sample: &case.sample, pad, imprint };
+            Ok(propose::carried_from_pair("another", (&from.sample, &labels), to)?.mask)
+        })?;
+    }
+    all.push(("true mask", truth.clone(), 0.0));
+    Ok(all)
+}
+
+fn mean(values: &[f64]) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+}
+
+fn row(imprint: ImprintSource, found: &Found) -> Row {
+    let errors: Vec<f64> = found.errors.iter().copied().flatten().collect();
+    Row {
+        imprint: imprint.key(),
+        source: found.source.into(),
+        iou: mean(&found.ious),
+        iou_worst: found.ious.iter().copied().min_by(f64::total_cmp),
+        angle_error_deg: mean(&errors),
+        apart_from_true_masks_deg: mean(&found.apart),
+        no_pose: found.errors.len() - errors.len(),
+        ms: quantile(found.ms.iter().copied(), 0.5),
+    }
+}
+
+/// Strokes across a picture, as the studio draws them move by move.
+fn stroke(size: [usize; 2], radius_px: f32) -> Stroke {
+    let [width, height] = size;
+    let imprint = DepthMap::filled(width, height, 0.005);
+    let (mut moves, mut ends, mut largest) = (Vec::new(), Vec::new(), 0.0f64);
+    let mut hand = HandMask::new(Mask::filled(width, height, false), Provenance::Nothing);
+    for stroke in 0..STROKES {
+        let at = |i: usize| {
+            let t = i as f32 / MOVES as f32;
+            let y = height as f32 * ((stroke as f32 + 0.5) / STROKES as f32 + 0.1 * (6.0 * t).sin());
+            [width as f32 * t, y]
+        };
+        let paint = if stroke % 4 == 3 { Paint::Free } else { Paint::Contact };
+        let mut drawing = Drawing::begin(DrawTool::Brush { radius_px }, at(0), paint);
+        let mut touched = Mask::filled(width, height, false);
+        for i in 1..=MOVES {
+            let shown = hand.mask.clone();
+            let begin = Instant::now();
+            let from = drawing.points.len();
+            drawing.move_to(at(i));
+            hand.draw_on(&drawing, &mut touched, Ground::new(&imprint), from, Provenance::hand("bench"));
+            let upload = difference(&shown, &hand.mask);
+            moves.push(begin.elapsed().as_secs_f64() * 1e3);
+            largest = largest.max(upload.map_or(0.0, |rect| (rect.width * rect.height) as f64 / imprint.len() as f64));
+        }
+        let begin = Instant::now();
+        let bytes = serde_json::to_vec(&hand.pack()).map_or(0, |bytes| bytes.len());
+        ends.push(begin.elapsed().as_secs_f64() * 1e3);
+        log::debug!("{bytes} bytes");
+    }
+    Stroke {
+        size,
+        radius_px,
+        move_median_ms: quantile(moves.iter().copied(), 0.5).unwrap_or(f64::NAN),
+        move_worst_ms: moves.iter().copied().fold(0.0, f64::max),
+        end_median_ms: quantile(ends.iter().copied(), 0.5).unwrap_or(f64::NAN),
+        largest_upload: largest,
+    }
+}
+
+fn text(report: &Report) -> String {
+    let number = |value: Option<f64>, digits: usize| value.map_or("-".into(), |v| format!("{v:.digits$}"));
+    let mut lines = vec![format!(
+        "{} simulated grasps of the unseen tools; IoU with the true contact, angles in degrees (mean)",
+        report.grasps
+    )];
+    lines.push(format!(
+        "{:10} {:28} {:>6} {:>6} {:>7} {:>16} {:>8} {:>8}",
+        "imprint", "source", "IoU", "worst", "error", "from true masks", "no pose", "ms"
+    ));
+    for row in &report.rows {
+        lines.push(format!(
+            "{:10} {:28} {:>6} {:>6} {:>7} {:>16} {:>8} {:>8}",
+            row.imprint,
+            row.source,
+            number(row.iou, 3),
+            number(row.iou_worst, 3),
+            number(row.angle_error_deg, 2),
+            number(row.apart_from_true_masks_deg, 2),
+            row.no_pose,
+            number(row.ms, 1)
+        ));
+    }
+    lines.push("strokes, without the screen:".into());
+    for stroke in &report.strokes {
+        lines.push(format!(
+            "{:>4} x {:<4} brush of {:>2} px: a move {:.3} ms (worst {:.3}), the end {:.2} ms, uploads at most {:.1} % of the picture",
+            stroke.size[0],
+            stroke.size[1],
+            stroke.radius_px,
+            stroke.move_median_ms,
+            stroke.move_worst_ms,
+            stroke.end_median_ms,
+            stroke.largest_upload * 100.0
+        ));
+    }
+    lines.join("\n")
+}
