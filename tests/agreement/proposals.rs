@@ -18,6 +18,14 @@ fn strokes(studio: &mut Studio) {
     }
 }
 
+/// With the pane of the masks on screen: proposals are made while it is looked at.
+fn open(folder: &Path, home: &Path) -> Studio {
+    let mut studio = Studio::open(Place::Path(folder.to_owned()), home);
+    let panes = [Pane::Measured, Pane::Masks, Pane::SceneMeasured].into_iter().collect();
+    studio.send(ViewCommand::ShowPanes(panes).into());
+    studio
+}
+
 fn hand(studio: &Studio) -> Option<HandMask> {
     studio.state.hand_mask(MEASURED, lab::RIGHT).cloned()
 }
@@ -45,7 +53,7 @@ fn what_is_proposed_is_the_same_on_the_screen_and_by_verb() {
         ProposalSource::Carry,
         ProposalSource::OtherFinger,
     ] {
-        let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
+        let mut studio = open(&folder, home.path());
         let at = studio.state.library.open.as_ref().unwrap().source.index().pairs.iter().position(|p| p.name == name);
         studio.send(LibraryCommand::Select(PairId(at.unwrap() as u32)).into());
         let mask = MaskSettings { proposal: source, choice, radius_px: 3.0, ..MaskSettings::default() };
@@ -91,7 +99,7 @@ fn what_is_proposed_is_the_same_on_the_screen_and_by_verb() {
 fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() {
     let home = tempfile::tempdir().unwrap();
     let folder = lab_folder(home.path());
-    let mut studio = Studio::open(Place::Path(folder), home.path());
+    let mut studio = open(&folder, home.path());
     let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
     let proposal = ProposalSource::CadTruth;
     let mask = MaskSettings { proposal, choice, radius_px: 3.0, ..MaskSettings::default() };

@@ -43,7 +43,7 @@ pub const SCENE: &[(&str, &str)] = &[
     ("[[camera_left]], [[camera_right]], [[camera_front]], [[camera_top]]", "from left, right, front, top"),
     ("Hover", "cross-hair in the images"),
     ("Click a point", "read it, or measure with [[measure_distance]] (mm) and [[measure_angle]] (angle)"),
-    ("[[pose_tool]]", "pose tool: keys or handles; [[accept_hand]] accepts, [[cancel_jobs]] reverts"),
+    ("[[pose_tool]]", "pose tool: keys or handles; [[accept]] accepts, [[cancel_jobs]] reverts"),
     ("[[next_layer]]", "next layer"),
     ("[[section]], [[window_only]], [[parallel]]", "cut open, GelSlim's window only, parallel lines"),
     ("Click in the list", "show or hide; the dots: color, size, opacity"),
