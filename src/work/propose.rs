@@ -211,8 +211,9 @@ pub struct Side<'a> {
 }
 
 impl<'a> Side<'a> {
-    fn surface(self) -> Result<Surface<'a>, TaskError> {
-        Ok(Surface { imprint: self.imprint, camera: camera_of(self.sample, self.pad)? })
+    /// Without its grain: a pixel that was dropped would be carried nowhere.
+    fn smooth(self) -> Cow<'a, DepthMap> {
+        smooth_imprint(self.imprint, ImprintSource::Measured, &self.sample.rig)
     }
 }
 
@@ -223,7 +224,10 @@ fn carried(
     gate_m: f64,
     provenance: Provenance,
 ) -> Result<Proposal, TaskError> {
-    let found = carry(from.surface()?, mask, to.surface()?, from_to, gate_m).map_err(|err| fail(&err))?;
+    let (from_imprint, to_imprint) = (from.smooth(), to.smooth());
+    let to = Surface { imprint: &to_imprint, camera: camera_of(to.sample, to.pad)? };
+    let from = Surface { imprint: &from_imprint, camera: camera_of(from.sample, from.pad)? };
+    let found = carry(from, mask, to, from_to, gate_m).map_err(|err| fail(&err))?;
     let note = match found.drift_m {
         Some(drift) => format!("the membranes lie {:.2} mm apart (median)", drift * 1e3),
         None => "nothing of it is in contact here".into(),

@@ -86,11 +86,11 @@ mod tests {
         simulate(&catalog::tools()[0], at, seed, &SimConfig::default())
     }
 
+    /// The noise-free imprint of a finger: the grain is somebody else's.
     fn surface(sample: &Sample, finger: usize) -> (Surface<'_>, &Mask) {
         let touch = sample.pad(lab::PADS[finger]).unwrap();
-        let depth = touch.depth().unwrap();
-        let surface = Surface { imprint: &depth.imprint, camera: touch.camera().unwrap() };
-        (surface, &depth.truth.as_ref().unwrap().contact)
+        let truth = touch.depth().unwrap().truth.as_ref().unwrap();
+        (Surface { imprint: &truth.imprint, camera: touch.camera().unwrap() }, &truth.contact)
     }
 
     #[test]
