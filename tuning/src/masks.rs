@@ -174,7 +174,8 @@ impl Objective for Recipe {
             let random = &mut Random::new(c.seed, Purpose::Variation, step, place);
             let varied = c.sensors.vary(touch, self.start.size, random);
             let bit = |&v: &bool| f32::from(u8::from(v));
-            made.inputs.extend(varied.imprint_m.iter().map(|&m| self.start.scaled(if m.is_finite() { m } else { 0.0 })));
+            made.inputs
+                .extend(varied.imprint_m.iter().map(|&m| self.start.scaled(if m.is_finite() { m } else { 0.0 })));
             made.masks.extend(varied.contact.iter().map(bit));
             match &varied.counted {
                 Some(counted) => made.counted.extend(counted.iter().map(bit)),
@@ -240,9 +241,8 @@ impl MaskTuner {
     /// The network's ONNX file as it is now (the running mean of the weights), as long as before.
     pub fn tuned(&self) -> Vec<u8> {
         let params = self.trainer.average();
-        self.file.with(|name| {
-            params.get(&format!("{MASK}{name}")).map(|entry| entry.values.to_vec()).unwrap_or_default()
-        })
+        self.file
+            .with(|name| params.get(&format!("{MASK}{name}")).map(|entry| entry.values.to_vec()).unwrap_or_default())
     }
 
     /// What the network says of imprints (meters, as in [`MaskTouch::imprint_m`]) now: the probability of contact of each
@@ -307,7 +307,8 @@ fn check(touches: &[MaskTouch], [width, height]: [usize; 2]) -> Result<()> {
     let pixels = width * height;
     for (index, touch) in touches.iter().enumerate() {
         let counted = touch.counted.as_ref().map_or(pixels, Vec::len);
-        let sizes = [("imprint", touch.imprint_m.len()), ("mask", touch.contact.len()), ("map of what counts", counted)];
+        let sizes =
+            [("imprint", touch.imprint_m.len()), ("mask", touch.contact.len()), ("map of what counts", counted)];
         if let Some((what, found)) = sizes.into_iter().find(|(_, found)| *found != pixels) {
             return Err(Error::Mask { index, why: format!("its {what} has {found} values instead of {pixels}") });
         }

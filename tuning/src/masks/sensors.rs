@@ -245,7 +245,10 @@ mod tests {
         assert!(least(&measured) < 0.005 && least(&measured) >= 0.003, "{}", least(&measured));
         assert!(least(&predicted) >= 0.009);
         let varied = Sensors::default().vary(&touch(), SIZE, &mut random(3));
-        assert_eq!(varied.imprint_m.iter().filter(|v| !v.is_finite()).count(), usize::from(varied.imprint_m.iter().any(|v| v.is_nan())));
+        assert_eq!(
+            varied.imprint_m.iter().filter(|v| !v.is_finite()).count(),
+            usize::from(varied.imprint_m.iter().any(|v| v.is_nan()))
+        );
         assert!(Sensors { shallowest: 0.0, ..Sensors::default() }.check().is_err());
         assert!(Sensors { grain_m: f64::NAN, ..Sensors::default() }.check().is_err());
         assert!(Sensors::default().check().is_ok() && Sensors::none().check().is_ok());
