@@ -34,7 +34,7 @@ use crate::io::dataset::Dataset;
 use crate::io::memory::peak_mib;
 
 pub use super::error::Remark;
-pub use super::tuning::{Tuning, unfinished_folder};
+pub use super::tuning::Tuning;
 pub use adapted::{Adapted, HeldBack, MOST_SHOWN, PadSummary};
 use gather::{Touch, gather};
 pub use score::Scored;
