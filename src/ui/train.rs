@@ -53,15 +53,16 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.label(caption("Left out", cx.p));
         let percent = DragValue::new(&mut form.choice.held_out_percent).range(0..=MOST_HELD_OUT).suffix(" %");
         let percent = ui.add(percent).accessible_name("Pairs left out for the score");
-        percent.on_hover_text(
-            "Of the pairs so many are not learned from, both fingers together: the score is of these. Pairs that the data \
-             set keeps for tests are never learned from",
-        );
+        percent
+            .on_hover_text("Of the pairs so many are not learned from, both fingers together: the score is of these");
         ui.label(caption("Seed", cx.p));
         let seed = ui.add(DragValue::new(&mut form.choice.seed).range(0..=999_999));
         seed.accessible_name("Seed of the training")
             .on_hover_text("Decides which pairs are left out, and the order and variation of the masks");
     });
+    let tip = "Else pairs that the data set keeps for tests (test_only) are left out, so that no score is of what was \
+               trained on";
+    ui.checkbox(&mut form.choice.test_in_train, "train on pairs kept for tests").on_hover_text(tip);
     if form != before {
         cx.push(TrainCommand::SetForm(form));
     }

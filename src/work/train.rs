@@ -46,11 +46,13 @@ pub struct TrainChoice {
     pub held_out_percent: u8,
     /// Decides which those are, and the order and variation of the masks.
     pub seed: u64,
+    /// Whether pairs that the data set keeps for tests (`test_only`) are divided like the rest; else they are left out.
+    pub test_in_train: bool,
 }
 
 impl Default for TrainChoice {
     fn default() -> Self {
-        Self { held_out_percent: 20, seed: 0 }
+        Self { held_out_percent: 20, seed: 0, test_in_train: false }
     }
 }
 
@@ -175,7 +177,7 @@ impl TrainPlan {
             self.left_out.iter().map(|(why, n)| format!("; {} {}", counted(*n, "pair"), why.text())).collect();
         Err(TaskError::new(WHAT, format!("there is no mask to learn from{}", others.concat())).with_hint(
             "Correct masks (or take automatic ones over where they are right) and mark their pairs \"done\"; pairs that \
-             the data set keeps for tests are not learned from.",
+             the data set keeps for tests are not learned from unless you ask for it.",
         ))
     }
 }
@@ -183,7 +185,7 @@ impl TrainPlan {
 /// What a training would learn from: the masks drawn by hand, on measured imprints and on predictions, of pairs marked
 /// *done*. Reads the labels of these pairs, no data.
 ///
-/// Pairs that the data set keeps for tests are always left out for the score. Of the others so many are as the choice says,
+/// Pairs that the data set keeps for tests are left out for the score, unless the choice says otherwise. Of the others so many are as the choice says,
 /// by the pair's name and the seed, at least one where there are two.
 ///
 /// # Errors
@@ -221,7 +223,7 @@ pub fn plan(dataset: &Dataset, masks: &HandMasks<'_>, choice: TrainChoice) -> Re
             id: PairId(at as u32),
             name: entry.name.clone(),
             tool: entry.tool.clone(),
-            held_out: entry.split == Split::Test,
+            held_out: entry.split == Split::Test && !choice.test_in_train,
             places,
         });
     }

@@ -456,7 +456,7 @@ draws! {
     }
     train: TrainCommand {
         1 SetForm((any::<bool>(), any::<u32>(), any::<u8>(), any::<u64>()).prop_map(|(by_steps, n, held_out_percent, seed)| {
-            TrainForm { choice: TrainChoice { held_out_percent, seed }, by_steps, minutes: n, steps: n }
+            TrainForm { choice: TrainChoice { held_out_percent, seed, test_in_train: by_steps }, by_steps, minutes: n, steps: n }
         })),
         1 Start,
         1 Use,

@@ -144,6 +144,7 @@ impl State {
                 let words = words.option_if(!form.by_steps, "--minutes", form.minutes);
                 let words = words.option("--held-out", form.choice.held_out_percent);
                 let words = words.option("--seed", form.choice.seed);
+                let words = if form.choice.test_in_train { words.word("--test-in-train") } else { words };
                 match (&self.settings.mask.bundle, self.bundle(BundleKind::Mask)) {
                     (Some(_), Ok(bundle)) => words.option("--start", bundle.origin.path().display()),
                     _ => words,

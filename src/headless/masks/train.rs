@@ -36,9 +36,12 @@ pub(in crate::headless) struct TrainArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     steps: Option<u32>,
     /// Percent of the pairs that are left out of the training, for the score; 0 learns from all, and what that is worth is
-    /// not known. Pairs that the data set keeps for tests are never learned from.
+    /// not known.
     #[arg(long, value_name = "PERCENT", default_value_t = TrainChoice::default().held_out_percent, value_parser = clap::value_parser!(u8).range(0..=90))]
     held_out: u8,
+    /// Divides pairs that the data set keeps for tests (test_only) like the rest; else they are left out.
+    #[arg(long)]
+    test_in_train: bool,
     /// Decides which pairs are left out, and the order and variation of the masks.
     #[arg(long, default_value_t = TrainChoice::default().seed)]
     seed: u64,
@@ -63,7 +66,7 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
     let output = Output::new(args.common, "training", 1);
     let labels = Labels::of(&dataset);
     let masks = HandMasks { labels: &labels, changed: &BTreeMap::new() };
-    let choice = TrainChoice { held_out_percent: args.held_out, seed: args.seed };
+    let choice = TrainChoice { held_out_percent: args.held_out, seed: args.seed, test_in_train: args.test_in_train };
     let planned = plan(&dataset, &masks, choice)?;
     for line in planned.lines() {
         output.note(&line);

@@ -19,7 +19,7 @@ fn held(entries: &[Entry]) -> Vec<&str> {
 
 fn divided(count: usize, for_tests: usize, held_out_percent: u8, seed: u64) -> Vec<Entry> {
     let mut entries = entries(count, for_tests);
-    divide(&mut entries, TrainChoice { held_out_percent, seed });
+    divide(&mut entries, TrainChoice { held_out_percent, seed, test_in_train: false });
     entries
 }
 

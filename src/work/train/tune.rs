@@ -160,7 +160,7 @@ fn digest(setup: &TrainSetup, gathered: &Gathered) -> String {
     let mut all = Sha256::new();
     let asked = json!({
         "program": env!("CARGO_PKG_VERSION"), "start": *setup.start.id, "tuning": setup.tuning,
-        "seed": setup.choice.seed, "held_out": setup.choice.held_out_percent,
+        "seed": setup.choice.seed, "held_out": setup.choice.held_out_percent, "test_in_train": setup.choice.test_in_train,
     });
     all.update(asked.to_string());
     for drawn in gathered.learned.iter().chain(&gathered.held) {
