@@ -34,7 +34,7 @@ const WHAT: &str = "Train the mask model";
 pub const ENOUGH_MASKS: usize = 20;
 /// Fewer than this of a tool are hardly that tool's shape.
 const ENOUGH_OF_A_TOOL: usize = 3;
-/// Most masks in memory; more are left out, by the seed.
+/// Most masks in memory; more are left out.
 const MOST_MASKS: usize = 5000;
 /// Pairs of tools that nobody named.
 pub const NO_TOOL: &str = "no tool named";

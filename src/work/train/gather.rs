@@ -99,7 +99,8 @@ pub(super) fn gather(
                     continue;
                 }
             };
-            gathered.persons.extend(masks.labels.persons(&entry.name)?);
+            // Who drew what is not on the disk yet is not known there.
+            gathered.persons.extend(masks.labels.persons(&entry.name).unwrap_or_default());
             let labels = masks.of_pair(&entry.name)?;
             for place in &entry.places {
                 let Some(hand) = labels.masks.get(place) else { continue };

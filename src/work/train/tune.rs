@@ -1,5 +1,6 @@
 //! The training itself, and what it is worth on what was left out.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use serde_json::json;
@@ -8,7 +9,7 @@ use touch2touch_tuning::{Cast, Descent as _, Error, MaskConfig, MaskStart, MaskT
 
 use super::gather::{Drawn, Gathered};
 use super::write::{Provenance, bundle};
-use super::{HeldOut, Told, TrainPlan, TrainSetup, Trained, WHAT};
+use super::{HeldOut, NO_TOOL, Told, TrainPlan, TrainSetup, Trained, WHAT};
 use crate::domain::grid::Grid;
 use crate::domain::label::agreement;
 use crate::infer::bundle::{self, MaskSpec, Role};
@@ -103,9 +104,13 @@ pub(super) fn tune(
     kept.clear();
     let mut pairs: Vec<&str> = gathered.learned.iter().map(|drawn| drawn.pair.as_str()).collect();
     pairs.dedup();
+    let mut tools = BTreeMap::new();
+    for drawn in &gathered.learned {
+        *tools.entry(drawn.tool.clone().unwrap_or_else(|| NO_TOOL.into())).or_default() += 1;
+    }
     let mut trained = Trained {
         from: setup.start.name.clone(),
-        tools: plan.tools.clone(),
+        tools,
         masks: gathered.learned.len(),
         pairs: pairs.len(),
         persons: gathered.persons.iter().cloned().collect(),

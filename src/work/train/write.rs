@@ -30,6 +30,8 @@ pub(super) struct Provenance<'a> {
 
 /// Writes the bundle; its name. The digest in it tells trainings of the same masks apart, which are chosen by name.
 pub(super) fn bundle(setup: &TrainSetup, graph: Vec<u8>, said: &Provenance<'_>) -> Result<String, TaskError> {
+    // Another training may have taken the folder meanwhile.
+    check_folder(&setup.out, &setup.start)?;
     let root = setup.start.name.split(", trained on ").next().unwrap_or_default();
     let masks = said.gathered.learned.len();
     let digest = &sha256(&graph)[..6];
