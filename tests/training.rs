@@ -8,6 +8,7 @@ use serde_json::Value;
 use touch2touch::domain::catalog;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::diffusion::GenerateConfig;
+use touch2touch::domain::label::{DrawTool, Drawing, Ground, Paint, Provenance};
 use touch2touch::domain::postprocess::ShiftMode;
 use touch2touch::domain::sim;
 use touch2touch::infer::engine::EngineChoice;
@@ -42,7 +43,7 @@ pub(crate) fn corrected(root: &Path, grasps: u64) {
         let mut stored = labels.load(&entry.name).unwrap();
         for (pad, touch) in sample.pads.entries() {
             let truth = touch.depth().unwrap().truth.as_ref().unwrap().contact.clone();
-            let hand = HandMask { mask: Arc::new(truth), revision: Default::default(), base: "drawn".into() };
+            let hand = HandMask::new(truth, Provenance::Hand { person: "Anna".into() });
             stored.draw(&MaskPlace::measured(pad), Some(hand));
         }
         stored.review = Review::Done;
@@ -210,6 +211,41 @@ fn masks_on_predictions_are_learned_from_where_the_prediction_can_be_made_again(
         BTreeMap::from([(name.clone(), touch2touch::work::labels::PairLabels { review: Review::Flagged, ..stored })]);
     let planned = plan(&dataset, &HandMasks { labels: &labels, changed: &changed }, choice).unwrap();
     assert_eq!((planned.masks(), planned.left_out), (2, BTreeMap::from([(LeftOut::Flagged, 1)])));
+}
+
+#[test]
+fn ignored_pixels_are_neither_learned_from_nor_scored() {
+    let dir = tempfile::tempdir().unwrap();
+    let made = |name: &str, flipped: bool| {
+        let set = dir.path().join(name);
+        corrected(&set, 1);
+        let dataset = Dataset::open(&set).unwrap();
+        let labels = Labels::of(&dataset);
+        for (at, entry) in dataset.index.pairs.iter().enumerate() {
+            let sample = dataset.load(PairId(at as u32)).unwrap();
+            let mut stored = labels.load(&entry.name).unwrap();
+            for (place, hand) in &mut stored.masks {
+                let imprint = &sample.pad(place.pad).unwrap().depth().unwrap().imprint;
+                let ground = Ground::new(imprint);
+                let points = vec![[40.0, 20.0], [110.0, 90.0]];
+                let ignore = Drawing { tool: DrawTool::Rectangle, points, paint: Paint::Ignore };
+                hand.draw(&ignore, ground, Provenance::Hand { person: "Anna".into() });
+                if flipped {
+                    let ignored = hand.marks.ignored().unwrap().clone();
+                    let mask = Arc::make_mut(&mut hand.mask).as_mut_slice();
+                    mask.iter_mut().zip(ignored.as_slice()).for_each(|(bit, ignored)| *bit ^= ignored);
+                }
+            }
+            labels.save(&entry.name, &stored, &Deed::default()).unwrap();
+        }
+        let out = dir.path().join(format!("{name}-trained"));
+        let choice = TrainChoice { held_out_percent: 50, ..TrainChoice::default() };
+        let setup = TrainSetup { choice, tuning: Tuning::Steps(2), ..setup(&dataset, out.clone(), None) };
+        let trained = go(&dataset, &setup, &JobCx::unwatched()).unwrap();
+        (std::fs::read(out.join("mask_unet.onnx")).unwrap(), trained.before, trained.after)
+    };
+    let plain = made("plain", false);
+    assert!(plain == made("flipped", true) && plain.1.is_some());
 }
 
 #[test]

@@ -8,6 +8,7 @@ use touch2touch_tuning::MaskTouch;
 use super::{Entry, MOST_MASKS, Remark, TrainPlan, TrainSetup, WHAT};
 use crate::domain::dataset::PairId;
 use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::label::Provenance;
 use crate::domain::resample::{bilinear, nearest_mask};
 use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
@@ -18,7 +19,7 @@ use crate::work::error::TaskError;
 use crate::work::export::HandMasks;
 use crate::work::imprint::imprint_of;
 use crate::work::job::JobCx;
-use crate::work::labels::{ImprintOf, ImprintSource, MaskPlace};
+use crate::work::labels::{HandMask, ImprintOf, ImprintSource, MaskPlace};
 use crate::work::models::{Models, Wanted};
 
 /// Pairs in memory at a time.
@@ -104,19 +105,17 @@ pub(super) fn gather(
             let labels = masks.of_pair(&entry.name)?;
             for place in &entry.places {
                 let Some(hand) = labels.masks.get(place) else { continue };
+                gathered.persons.extend(hand.marks.layers().into_iter().filter_map(|(layer, px)| match layer {
+                    Provenance::Hand { person } if px > 0 && !person.is_empty() => Some(person.clone()),
+                    _ => None,
+                }));
                 let imprint = match imprint(&sample, place, setup, models, cx) {
                     Err(err) if err.is_cancelled() => return Err(err),
                     imprint => imprint,
                 };
-                let fits = imprint.and_then(|imprint| match (imprint.size(), hand.mask.size()) {
-                    (a, b) if a != b => Err(TaskError::new(
-                        WHAT,
-                        format!("the mask is of {} x {} pixels, the imprint of {} x {}", b[0], b[1], a[0], a[1]),
-                    )),
-                    _ if imprint.as_slice().iter().all(|v| !v.is_finite()) => {
-                        Err(TaskError::new(WHAT, "nothing of the imprint was measured"))
-                    }
-                    _ => Ok(imprint),
+                let fits = imprint.and_then(|imprint| match unfit(&imprint, hand) {
+                    Some(why) => Err(TaskError::new(WHAT, why)),
+                    None => Ok(imprint),
                 });
                 match fits {
                     Ok(imprint) => gathered.push(
@@ -129,7 +128,7 @@ pub(super) fn gather(
                             source: place.of.source(),
                             imprint,
                             mask: (*hand.mask).clone(),
-                            counted: None,
+                            counted: hand.marks.ignored().map(|ignored| ignored.map(|ignored| !ignored)),
                         },
                     ),
                     Err(err) => gathered.unusable.push(refused(format!(
@@ -155,6 +154,19 @@ impl Gathered {
             to.push(drawn);
         }
     }
+}
+
+/// Why nothing can be learned from a mask of an imprint.
+fn unfit(imprint: &DepthMap, hand: &HandMask) -> Option<String> {
+    let ([width, height], [w, h]) = (imprint.size(), hand.mask.size());
+    let all = |bits: &Mask| bits.as_slice().iter().all(|&bit| bit);
+    if [width, height] != [w, h] {
+        return Some(format!("the mask is of {w} x {h} pixels, the imprint of {width} x {height}"));
+    }
+    if imprint.as_slice().iter().all(|v| !v.is_finite()) {
+        return Some("nothing of the imprint was measured".into());
+    }
+    hand.marks.ignored().is_some_and(all).then(|| "all pixels of the mask are ignored".into())
 }
 
 /// The imprint that a mask belongs to; a prediction is made again by what decided it.
