@@ -10,6 +10,8 @@ use crate::random::Random;
 pub struct Sensors {
     /// Half of the measured imprints are drawn shallower, by factors from here to 1.
     pub shallowest: f64,
+    /// Down to this depth at most, meters: of what is shallower, the grain leaves no shape.
+    pub least_m: f64,
     /// How far the depth of the others varies, as a share.
     pub gain: f64,
     /// Standard deviation of the level, meters.
@@ -30,6 +32,7 @@ impl Default for Sensors {
     fn default() -> Self {
         Self {
             shallowest: 0.3,
+            least_m: 4e-3,
             gain: 0.1,
             level_m: 4e-4,
             distortion_m: 4e-4,
@@ -49,6 +52,7 @@ impl Sensors {
     pub fn none() -> Self {
         Self {
             shallowest: 1.0,
+            least_m: 0.0,
             gain: 0.0,
             level_m: 0.0,
             distortion_m: 0.0,
@@ -61,6 +65,7 @@ impl Sensors {
 
     pub(super) fn check(&self) -> Result<()> {
         let at_least_0 = [
+            ("sensors.least_m", self.least_m),
             ("sensors.gain", self.gain),
             ("sensors.level_m", self.level_m),
             ("sensors.distortion_m", self.distortion_m),
@@ -83,7 +88,12 @@ impl Sensors {
     pub(super) fn vary(&self, touch: &MaskTouch, size: [usize; 2], random: &mut Random) -> MaskTouch {
         // Everything is drawn in any case, so that one setting does not change what another one draws.
         let (shallow, by) = (random.happens(0.5) && !touch.predicted, random.uniform());
-        let gain = if shallow { self.shallowest.powf(by) } else { 1.0 + (2.0 * by - 1.0) * self.gain };
+        let gain = if shallow {
+            let shallowest = (self.least_m / depth(&touch.imprint_m)).clamp(self.shallowest, 1.0);
+            shallowest.powf(by)
+        } else {
+            1.0 + (2.0 * by - 1.0) * self.gain
+        };
         let level = random.normal() * self.level_m;
         let distorts = [random.happens(0.5), random.happens(0.5)];
         let [distortion, grain] = [random.uniform() * self.distortion_m, random.uniform() * self.grain_m];
@@ -119,6 +129,14 @@ impl Sensors {
             predicted: touch.predicted,
         }
     }
+}
+
+/// How deep an imprint is: a hundredth of what was measured is deeper. Meters, above 0.
+fn depth(imprint_m: &[f32]) -> f64 {
+    let mut measured: Vec<f32> = imprint_m.iter().copied().filter(|v| v.is_finite()).collect();
+    let at = measured.len() * 99 / 100;
+    let deep = if measured.is_empty() { 0.0 } else { *measured.select_nth_unstable_by(at, f32::total_cmp).1 };
+    f64::from(deep).max(1e-6)
 }
 
 /// How a picture is moved and mirrored.
@@ -235,14 +253,17 @@ mod tests {
 
     #[test]
     fn depth_varies_for_what_was_measured_and_little_for_predictions() {
-        let depths = |predicted: bool| -> Vec<f32> {
-            let touch = MaskTouch { predicted, imprint_m: vec![0.01; 54], ..touch() };
+        let depths = |depth_m: f32, predicted: bool| -> Vec<f32> {
+            let touch = MaskTouch { predicted, imprint_m: vec![depth_m; 54], ..touch() };
             let deep = Sensors { level_m: 0.0, distortion_m: 0.0, grain_m: 0.0, ..Sensors::default() };
             (0..60).map(|seed| deep.vary(&touch, SIZE, &mut random(seed)).imprint_m[0]).collect()
         };
         let least = |depths: &[f32]| depths.iter().copied().fold(f32::INFINITY, f32::min);
-        let (measured, predicted) = (depths(false), depths(true));
-        assert!(least(&measured) < 0.005 && least(&measured) >= 0.003, "{}", least(&measured));
+        let (measured, predicted) = (depths(0.015, false), depths(0.01, true));
+        assert!(least(&measured) < 0.006 && least(&measured) >= 0.0045, "{}", least(&measured));
+        // What is shallow already is not drawn shallower than what a shape is left of.
+        let shallow = [depths(0.006, false), depths(0.002, false)].map(|depths| least(&depths));
+        assert!(shallow[0] < 0.0045 && shallow[0] >= 0.004 && shallow[1] >= 0.0018, "{shallow:?}");
         assert!(least(&predicted) >= 0.009);
         let varied = Sensors::default().vary(&touch(), SIZE, &mut random(3));
         assert_eq!(
