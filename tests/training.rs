@@ -192,7 +192,7 @@ fn masks_on_predictions_are_learned_from_where_the_prediction_can_be_made_again(
     let mut stored = labels.load(name).unwrap();
     let (place, hand) = stored.masks.iter().next().map(|(place, hand)| (place.clone(), hand.clone())).unwrap();
     stored.draw(&MaskPlace { pad: place.pad, of }, Some(hand.clone()));
-    let lost = ImprintOf::predicted("a model that is gone", &config, ShiftMode::Raw);
+    let lost = ImprintOf::predicted("gone", &config, ShiftMode::Raw);
     stored.draw(&MaskPlace { pad: place.pad, of: lost }, Some(hand));
     labels.save(name, &stored, &Deed::default()).unwrap();
 

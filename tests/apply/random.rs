@@ -50,7 +50,6 @@ use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::dataset::ToolUnit;
 use touch2touch::io::statistics::ShiftStatistics;
-use touch2touch::work::adapt::{Adapted, Scored};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::export::{ExportChoice, Which};
@@ -58,10 +57,11 @@ use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
 use touch2touch::work::queue::QueueBy;
 use touch2touch::work::subject::Subject;
-use touch2touch::work::sweep::{Dial, InForce, Setting, Sweep};
+use touch2touch::work::sweep::{Dial, Setting};
 use touch2touch::work::tool::UnitSet;
-use touch2touch::work::train::{TrainChoice, Trained};
+use touch2touch::work::train::TrainChoice;
 
+use super::answered::{adapted, swept, trained};
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;
 
@@ -544,65 +544,6 @@ draws! {
         1 Trained(ticket(), Just(()).prop_map(|()| Arc::new(trained())), Just(()).prop_map(|()| {
             Box::new(Double::new(false, true).find_bundles(&[]).0.remove(1))
         })),
-    }
-}
-
-fn swept() -> Sweep {
-    Sweep {
-        dataset: "elsewhere".into(),
-        dial: Dial::Gate,
-        unit: Dial::Gate.unit(),
-        at: None,
-        in_force: InForce::default(),
-        series: Vec::new(),
-        left_out: Vec::new(),
-        notes: Vec::new(),
-        pairs: 0,
-        complete: false,
-        seconds: 0.0,
-    }
-}
-
-fn adapted() -> Adapted {
-    Adapted {
-        pairs: 1,
-        touches: 1,
-        left_out: Vec::new(),
-        doubtful: Vec::new(),
-        before: Scored::default(),
-        closed_form: None,
-        after: None,
-        steps: 0,
-        curves: Vec::new(),
-        seconds: 0.0,
-        fit_seconds: 0.0,
-        peak_mib: None,
-        pads: Vec::new(),
-        warnings: Vec::new(),
-        bundle: None,
-        held_back: Vec::new(),
-    }
-}
-
-fn trained() -> Trained {
-    Trained {
-        from: "unet".into(),
-        tools: Default::default(),
-        masks: 1,
-        pairs: 1,
-        persons: Vec::new(),
-        left_out: Default::default(),
-        unusable: Vec::new(),
-        before: None,
-        after: None,
-        held_out: Vec::new(),
-        steps: 1,
-        curves: Vec::new(),
-        seconds: 0.0,
-        peak_mib: None,
-        warnings: Vec::new(),
-        name: "unet, trained".into(),
-        bundle: PathBuf::from("no/such/folder"),
     }
 }
 
