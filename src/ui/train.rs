@@ -167,7 +167,7 @@ fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
     for remark in &trained.unusable {
         say(format!("not used: {}: {}", remark.name, remark.why), cx.p.caution);
     }
-    let change = |before: f64, after: f64| format!("{before:.3} → {after:.3}");
+    let change = |before: f64, after: f64| format!("{before:.3} to {after:.3}");
     let mut select = None;
     egui::Grid::new("held out").num_columns(3).spacing(vec2(12.0, 3.0)).striped(true).show(ui, |ui| {
         for (heading, tip) in [

@@ -51,27 +51,13 @@ impl HandMasks<'_> {
     }
 
     /// The mask of one finger, if it has one.
-<<<<<<< HEAD
     fn get(&self, pair: &str, finger: PadId) -> Result<Option<HandMask>, TaskError> {
-        let labels = match self.changed.get(pair) {
-            Some(labels) => labels.clone(),
-            None => self.labels.load(pair)?,
-        };
-        Ok(labels.measured(finger).cloned())
-    }
-
-    /// The review states that are not "todo", by pair name.
-    fn reviews(&self) -> BTreeMap<String, Review> {
-        let mut reviews = self.labels.reviews().states;
-=======
-    fn get(&self, pair: &str, finger: PadId) -> Result<Option<Mask>, TaskError> {
-        Ok(self.of_pair(pair)?.measured(finger).map(|hand| (*hand.mask).clone()))
+        Ok(self.of_pair(pair)?.measured(finger).cloned())
     }
 
     /// The review states that are not "todo", by pair name.
     pub(super) fn reviews(&self) -> BTreeMap<String, Review> {
-        let (mut reviews, _) = self.labels.reviews();
->>>>>>> 988a236 (masks train: a mask model trained on corrected masks, scored on pairs that were left out)
+        let mut reviews = self.labels.reviews().states;
         reviews.extend(self.changed.iter().map(|(pair, labels)| (pair.clone(), labels.review)));
         reviews
     }
