@@ -162,7 +162,7 @@ fn tuner(runs: &mut Runs<'_>, run: &Run<'_>, config: &Config) -> Result<Tuner, T
         None => Tuner::new(&run.start, run.pairs.clone(), config.clone()),
     };
     let times = if run.held.is_empty() { 0 } else { LOOKS };
-    runs.to_end((&run.file, &run.name), begin, &Look { unit: UNIT, times, at: &|tuner| look(tuner, run) })
+    runs.finish((&run.file, &run.name), begin, &Look { unit: UNIT, times, at: &|tuner| look(tuner, run) })
 }
 
 /// PSNR on some of the touches that were left out, as they are, dB.

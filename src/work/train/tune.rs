@@ -71,7 +71,7 @@ pub(super) fn tune(
     };
     let times = if looked_at.is_empty() { 0 } else { LOOKS };
     let mut runs = Runs::new((WHAT, fail), (&kept, cx), steps, 1);
-    let tuner = runs.to_end((FILE, "the mask model"), begun, &Look { unit: "Dice", times, at: &look })?;
+    let tuner = runs.finish((FILE, "the mask model"), begun, &Look { unit: "Dice", times, at: &look })?;
     let curves = runs.curves;
     let mut held_out = Vec::with_capacity(gathered.held.len());
     for part in gathered.held.chunks(BATCH) {

@@ -65,7 +65,7 @@ impl<'a> Runs<'a> {
 
     /// A run from where it stands to its end. `file` is what its files are called, `name` what people call it; `begin` has a
     /// state where one was kept.
-    pub(in crate::work) fn to_end<T: Descent>(
+    pub(in crate::work) fn finish<T: Descent>(
         &mut self,
         (file, name): (&str, &str),
         begin: impl Fn(Option<&[u8]>) -> Tuned<T>,
