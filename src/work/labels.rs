@@ -461,7 +461,7 @@ impl Labels {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub(super) fn persons(&self, name: &str) -> Result<BTreeSet<String>, TaskError> {
+    pub fn persons(&self, name: &str) -> Result<BTreeSet<String>, TaskError> {
         let what = format!("Labels of {name}");
         let store = self.store(&what)?;
         let fail = |err: StoreError| store_error(&what, &err);
