@@ -4,8 +4,8 @@
 //! * [`command::Command`] is what can happen to it, by room; [`apply::apply`] is the only writer and is pure:
 //!   work and files come out as [`effect::Effect`]s.
 //! * A room is a feature ([`library`], [`follow`], [`view`], [`predict`], [`seeds`], [`labels`], [`inspect`],
-//!   [`workbench`], [`evaluate`], [`export`], [`adapt`], [`dial`], [`settings`], [`tasks`]): its file has its commands and what they do,
-//!   `state.rs` in its folder what it keeps and how views find it.
+//!   [`workbench`], [`evaluate`], [`export`], [`adapt`], [`train`], [`dial`], [`settings`], [`tasks`]): its file has its commands
+//!   and what they do, `state.rs` in its folder what it keeps and how views find it.
 //! * [`results`] is the table of what is computed: each kind with its recipe, its job and its look-up in one file.
 //! * [`pane`] is the table of the panes: titles, places, which file of the window draws each and what it needs.
 //! * [`state::State::wanted`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
@@ -40,6 +40,7 @@ pub mod services;
 pub mod settings;
 pub mod state;
 pub mod tasks;
+pub mod train;
 pub mod view;
 pub mod wanted;
 pub mod workbench;

@@ -7,6 +7,7 @@ pub mod app;
 pub mod theme;
 mod thumbnail;
 mod timemachine;
+mod train;
 mod versus;
 pub mod widget;
 

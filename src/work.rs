@@ -8,7 +8,7 @@
 //! * [`imprint`], [`mask`], [`cloud`], [`pose`]: one step each. [`compare`], [`ledger`], [`layers`], [`ensemble`]: what
 //!   there is to know about their results.
 //! * [`figure`], [`pair_files`]: results as pictures for papers and as files for other programs.
-//! * [`evaluate`], [`sweep`], [`statistics`], [`adapt`], [`export`], [`training_data`]: passes over a whole data set.
+//! * [`evaluate`], [`sweep`], [`statistics`], [`adapt`], [`train`], [`export`], [`training_data`]: passes over a whole data set.
 //! * [`job`], [`error`]: how work is watched, stopped, and how it fails.
 
 pub mod adapt;
@@ -32,6 +32,7 @@ pub mod layers;
 pub mod ledger;
 pub mod mask;
 pub mod models;
+pub mod new_bundle;
 pub mod pair_files;
 pub mod pose;
 pub mod prediction;
@@ -42,5 +43,7 @@ pub mod statistics;
 pub mod subject;
 pub mod sweep;
 pub mod tool;
+pub mod train;
 pub mod training_data;
+pub mod tuning;
 mod usable;

@@ -69,6 +69,8 @@ fn how(action: Action) -> How {
         A::RunSeeds => Verb(&["generate", "demo", "--out", "folder", "--seeds", "8"]),
         A::FitPairs => Verb(&["adapt", "demo", "--out", "folder"]),
         A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
+        A::TrainMasks | A::StartTraining => Verb(&["masks", "train", "demo", "--minutes", "10", "--out", "trained"]),
+        A::UseTrained => Options(&["label", "demo", "--pair", "a", "--adopt", "--mask-bundle", "trained"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
         A::RankMasks | A::NextUncertain => Verb(&["masks", "queue", "demo"]),

@@ -1,6 +1,7 @@
 //! The application model without a window: commands in, state and effects out, jobs run one by one in the test's own
 //! thread, so that every order of events can be had on purpose.
 
+mod answered;
 mod double;
 mod generating;
 mod inspect;

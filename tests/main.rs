@@ -34,5 +34,7 @@ mod kept_scores;
 mod sensors;
 #[cfg(feature = "onnx")]
 mod sweep;
+#[cfg(all(feature = "onnx", feature = "tune"))]
+mod training;
 #[cfg(feature = "ui-test")]
 mod ui;

@@ -27,5 +27,6 @@ mod results;
 mod scene;
 mod seeds;
 mod shortcuts;
+mod train;
 mod unit;
 mod workbench;

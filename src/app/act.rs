@@ -5,8 +5,8 @@ use strum::IntoEnumIterator;
 use super::action::Action;
 use super::command::{
     AdaptCommand, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
-    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, UiRequest,
-    ViewCommand, WorkbenchCommand,
+    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, TrainCommand,
+    UiRequest, ViewCommand, WorkbenchCommand,
 };
 use super::export::state::Output;
 use super::inspect::state::Inspected;
@@ -83,6 +83,11 @@ impl Action {
                 let ready = state.can_adapt() && state.adapting().is_none();
                 when(ready, AdaptCommand::Start)
             }
+            Self::TrainMasks => ui(UiRequest::ShowPane(Pane::Train)),
+            Self::StartTraining => {
+                when(state.train_setup().is_some() && state.training().is_none(), TrainCommand::Start)
+            }
+            Self::UseTrained => when(state.trained().is_some() && !state.uses_trained(), TrainCommand::Use),
             Self::UseFit => when(state.fitted().is_some() && !state.uses_fit(), AdaptCommand::Use),
             Self::EvaluateDataset => {
                 let ready = state.evaluation_setup().is_some() && state.evaluating().is_none();

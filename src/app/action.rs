@@ -153,6 +153,9 @@ actions! {
     ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)];
     Undo, Mask, "Undo", "Takes back the last change of what is on screen", [ctrl(K::Z)];
     Redo, Mask, "Redo", "Does it again", [ctrl_shift(K::Z), ctrl(K::Y)];
+    TrainMasks, Mask, "Train mask model…", "Shows from how many corrected masks the mask model would learn, and trains it in the background", [];
+    StartTraining, Mask, "Start training", "Trains the mask model on the masks of pairs marked done; the new model makes the automatic masks when it is ready", [];
+    UseTrained, Mask, "Use the trained mask model", "Makes automatic masks with the model that was trained on these pairs", [];
     MaskVisible, Mask, "Show the mask", "Draws the mask over the images, or not", [plain(K::S)];
     MaskOutline, Mask, "Mask as outline", "Draws only the outline of the mask", [shift(K::S)];
     MaskFainter, Mask, "Mask fainter", "Makes the mask more transparent", [plain(K::Minus)];
@@ -254,6 +257,7 @@ impl Action {
             Self::Generate => "predict prediction run inference diffusion",
             Self::RunSeeds => "ensemble uncertainty spread repeat",
             Self::FitPairs => "adapt calibrate tune finetune train",
+            Self::TrainMasks | Self::StartTraining => "unet learn finetune tune segmentation",
             Self::TurnDial => "sweep threshold small multiples",
             Self::EvaluateDataset => "score metrics benchmark results table",
             Self::ExportTable => "csv markdown json save results latex",

@@ -12,7 +12,7 @@ use super::services::{Followed, Opened};
 use super::settings::state::Settings;
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use super::{adapt, dial, evaluate, export, follow, labels, library, predict, settings, tasks, workbench};
+use super::{adapt, dial, evaluate, export, follow, labels, library, predict, settings, tasks, train, workbench};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::adapt::Adapted;
 use crate::work::bundles::BundleInfo;
@@ -21,6 +21,7 @@ use crate::work::evaluate::Evaluation;
 use crate::work::job::Progress;
 use crate::work::sweep::Sweep;
 use crate::work::tool::UnitSet;
+use crate::work::train::Trained;
 
 /// What the runtime answers.
 #[derive(Clone, Debug)]
@@ -69,6 +70,8 @@ pub enum Answer {
     Swept(Ticket, Arc<Sweep>),
     /// A generator was fitted, and is this bundle where one was written.
     Adapted(Ticket, Arc<Adapted>, Option<Box<BundleInfo>>),
+    /// A mask model was trained, and is this bundle.
+    Trained(Ticket, Arc<Trained>, Box<BundleInfo>),
 }
 
 pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>) {
@@ -158,6 +161,10 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::Adapted(ticket, adapted, bundle) => {
             state.tasks.running.remove(&ticket);
             adapt::arrived(state, ticket, adapted, bundle.map(|bundle| *bundle));
+        }
+        Answer::Trained(ticket, trained, bundle) => {
+            state.tasks.running.remove(&ticket);
+            train::arrived(state, ticket, trained, *bundle, effects);
         }
         // What came too late, or needs nothing.
         Answer::Computed(..)

@@ -4,8 +4,8 @@ use super::command::Command;
 use super::effect::Effect;
 use super::state::State;
 use super::{
-    adapt, answers, dial, evaluate, export, follow, inspect, labels, library, predict, seeds, settings, tasks, view,
-    workbench,
+    adapt, answers, dial, evaluate, export, follow, inspect, labels, library, predict, seeds, settings, tasks, train,
+    view, workbench,
 };
 
 /// Carries a command out. What has to happen outside the state comes back.
@@ -26,6 +26,7 @@ pub fn apply(state: &mut State, command: Command) -> Vec<Effect> {
         Command::Export(command) => export::step(state, command, &mut effects),
         Command::Dial(command) => dial::step(state, command, &mut effects),
         Command::Adapt(command) => adapt::step(state, command, &mut effects),
+        Command::Train(command) => train::step(state, command, &mut effects),
         Command::Settings(command) => settings::step(state, command, &mut effects),
         Command::Tasks(command) => tasks::step(state, command, &mut effects),
         Command::Answer(answer) => answers::step(state, answer, &mut effects),

@@ -15,6 +15,7 @@ pub use super::seeds::SeedsCommand;
 pub use super::services::Opened;
 pub use super::settings::SettingsCommand;
 pub use super::tasks::TasksCommand;
+pub use super::train::TrainCommand;
 pub use super::view::ViewCommand;
 pub use super::view::state::{CameraPreset, Hover, UiRequest};
 pub use super::workbench::WorkbenchCommand;
@@ -58,6 +59,8 @@ commands! {
     Export(ExportCommand),
     /// The fit to one's own pairs.
     Adapt(AdaptCommand),
+    /// The training of the mask model.
+    Train(TrainCommand),
     /// To the preferences.
     Settings(SettingsCommand),
     /// To running jobs and the log.

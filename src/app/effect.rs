@@ -22,6 +22,7 @@ use crate::work::export::ExportChoice;
 use crate::work::figure::FigureSetup;
 use crate::work::labels::Deed;
 use crate::work::sweep::SweepSetup;
+use crate::work::train::TrainSetup;
 
 /// A pair whose labels are to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -141,6 +142,17 @@ pub enum Effect {
         /// What to what.
         setup: Box<AdaptSetup>,
     },
+    /// Train a mask model, and keep the new one where the program keeps models.
+    Train {
+        /// The job.
+        ticket: Ticket,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// What was said about pairs, as far as it may not be on the disk yet.
+        labels: BTreeMap<String, PairLabels>,
+        /// What on what.
+        setup: Box<TrainSetup>,
+    },
     /// Write a results table into a folder.
     ExportTable {
         /// The job.
@@ -207,6 +219,7 @@ impl std::fmt::Debug for Effect {
             Self::Evaluate { ticket, .. } => write!(f, "Evaluate({ticket:?})"),
             Self::Sweep { ticket, .. } => write!(f, "Sweep({ticket:?})"),
             Self::Adapt { ticket, .. } => write!(f, "Adapt({ticket:?})"),
+            Self::Train { ticket, .. } => write!(f, "Train({ticket:?})"),
             Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),
             Self::Figure { setup, file, .. } => write!(f, "Figure({:?}, {})", setup.pairs, file.display()),
             Self::ExportPair { folder, .. } => write!(f, "ExportPair({})", folder.display()),

@@ -19,6 +19,7 @@ use super::services::Opened;
 use super::settings::state::MAX_RECENT;
 use super::state::State;
 use super::tasks::state::Level;
+use super::train::TrainState;
 use super::{evaluate, inspect, labels, settings, tasks};
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
@@ -317,6 +318,7 @@ pub(super) fn show(
     state.library.brush = None;
     state.dial = DialState { running: None, result: None, ..state.dial.clone() };
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
+    state.train = TrainState { form: state.train.form, ..TrainState::default() };
     state.history.clear();
     state.tasks.failed.clear();
     state.document = Document {

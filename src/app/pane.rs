@@ -76,6 +76,8 @@ pub enum Need {
     Scores,
     /// How far the labeling of the data set is.
     LabelStats,
+    /// What a training of the mask model would learn from.
+    Training,
 }
 
 /// The table, given to the macro `$with`: for each file of `ui` the panes that it draws.
@@ -167,6 +169,10 @@ macro_rules! panes {
             masks {
                 Masks { "Mask", "Corrects the contact mask", Form, needs [Masks, LabelStats], at [Label Right(1)] }
             }
+            train { Train {
+                "Train the mask model" as "Train", "The mask model trained on corrected masks, and what that is worth",
+                Form, needs [Training], at [Label Right(1)]
+            } }
             results { Results {
                 "Results", "The paper's results table of the open data set", Form, needs [],
                 at [Evaluate Top(1)]
@@ -241,7 +247,7 @@ macro_rules! define {
                 use ImprintSource::{Measured, Predicted};
                 use Need::{
                     Ambiguity, Basin, Comparison, FingerPoses, Imprint, LabelStats, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
-                    Steps, Thumbnails, Versus,
+                    Steps, Thumbnails, Training, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }
@@ -280,7 +286,8 @@ impl Pane {
 
     /// Whether it shows something of the selected pair.
     pub fn is_of_pair(self) -> bool {
-        self.needs().iter().any(|need| !matches!(need, Need::Thumbnails | Need::Scores | Need::LabelStats))
+        let of_all = |need: &Need| matches!(need, Need::Thumbnails | Need::Scores | Need::LabelStats | Need::Training);
+        self.needs().iter().any(|need| !of_all(need))
     }
 }
 

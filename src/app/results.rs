@@ -40,6 +40,7 @@ pub mod sample;
 pub mod scores;
 pub mod thumbnail;
 pub mod tool;
+pub mod train_plan;
 pub mod versus;
 
 pub use cache::Cache;
@@ -261,6 +262,8 @@ results! {
     Distances(proposal::DistancesKey) in distances, 32 * MIB;
     /// A mask that is proposed.
     Proposal(proposal::ProposalKey) in proposals, 16 * MIB;
+    /// What a training of the mask model would learn from.
+    TrainPlan(train_plan::TrainPlanKey) in train_plans, MIB;
     /// A cloud.
     Cloud(cloud::CloudKey) in clouds, 128 * MIB;
     /// A pose.

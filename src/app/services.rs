@@ -25,18 +25,19 @@ use crate::infer::engine::EngineChoice;
 use crate::io::dataset::{Dataset, ToolUnit};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::adapt::{self, AdaptSetup, Adapted};
-use crate::work::bundles::BundleInfo;
+use crate::work::bundles::{self, BundleInfo};
 use crate::work::case::{self, Case, CaseSetup};
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
-use crate::work::export::{ExportChoice, Plan};
+use crate::work::export::{ExportChoice, HandMasks, Plan};
 use crate::work::job::JobCx;
 use crate::work::label_stats::LabelStats;
-use crate::work::labels::{Deed, Past};
+use crate::work::labels::{Deed, Labels, Past};
 use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
 use crate::work::sweep::{self, Sweep, SweepSetup};
 use crate::work::tool::{UnitSet, set_unit};
+use crate::work::train::{self, TrainSetup, Trained};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
@@ -280,6 +281,21 @@ pub trait Services: Send + Sync {
         Ok((adapt::adapt(dataset, setup, &Models::new(None), cx)?, None))
     }
 
+    /// Trains a mask model on corrected masks (`changed` has those that may not be on the disk yet), and opens the new
+    /// bundle.
+    ///
+    /// # Errors
+    /// As [`train::train`].
+    fn train(
+        &self,
+        dataset: &Dataset,
+        changed: &BTreeMap<String, PairLabels>,
+        setup: &TrainSetup,
+        cx: &JobCx,
+    ) -> Result<(Trained, BundleInfo), TaskError> {
+        train_and_open(dataset, changed, setup, &Models::new(None), cx)
+    }
+
     /// How long a pair stays on screen before it is predicted without being asked for.
     fn patience(&self) -> Duration {
         Duration::ZERO
@@ -309,6 +325,20 @@ pub trait Services: Send + Sync {
     /// # Errors
     /// If they cannot be written.
     fn save_settings(&self, settings: &Settings) -> Result<(), TaskError>;
+}
+
+/// Trains a mask model as the setup says, and opens the new bundle.
+fn train_and_open(
+    dataset: &Dataset,
+    changed: &BTreeMap<String, PairLabels>,
+    setup: &TrainSetup,
+    models: &Models,
+    cx: &JobCx,
+) -> Result<(Trained, BundleInfo), TaskError> {
+    let masks = HandMasks { labels: &Labels::of(dataset), changed };
+    let trained = train::train(dataset, &masks, setup, models, cx)?;
+    let bundle = bundles::open("Open the trained bundle", trained.bundle.as_path())?;
+    Ok((trained, bundle))
 }
 
 /// Shared services.

@@ -16,6 +16,7 @@ use super::results::Results;
 use super::seeds::state::Seeds;
 use super::settings::state::Settings;
 use super::tasks::state::{Log, Tasks};
+use super::train::state::TrainState;
 use super::view::state::Selection;
 use super::workbench::state::Workbench;
 use crate::domain::dataset::PairEntry;
@@ -45,6 +46,8 @@ pub struct State {
     pub dial: DialState,
     /// The fit to the open pairs.
     pub adapt: AdaptState,
+    /// The training of the mask model.
+    pub train: TrainState,
     /// What the 3D panes do and show besides.
     pub workbench: Workbench,
     /// What a person chose about seeds.

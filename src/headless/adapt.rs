@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, LimitArgs};
+use super::args::{DatasetArgs, LimitArgs, parse_minutes};
 use super::contact_mask::MaskArgs;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
@@ -49,12 +49,6 @@ pub(super) struct AdaptArgs {
 fn parse_parts(text: &str) -> Result<usize, String> {
     let parts: usize = text.parse().map_err(|_| "it must be a whole number".to_owned())?;
     if parts == 1 || parts > 1000 { Err("it must be 0 or between 2 and 1000".into()) } else { Ok(parts) }
-}
-
-fn parse_minutes(text: &str) -> Result<Duration, String> {
-    let minutes = text.parse().ok().filter(|minutes: &f64| (0.01..=100_000.0).contains(minutes));
-    let seconds = minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes));
-    seconds.ok_or_else(|| "it must be a number of minutes between 0.01 and 100,000".into())
 }
 
 #[derive(Debug, Serialize)]

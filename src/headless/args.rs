@@ -4,6 +4,7 @@ use std::convert::Infallible;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::time::Duration;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -183,6 +184,13 @@ impl FingerArg {
         })?;
         Ok(vec![finger])
     }
+}
+
+/// A time as minutes.
+pub(super) fn parse_minutes(text: &str) -> Result<Duration, String> {
+    let minutes = text.parse().ok().filter(|minutes: &f64| (0.01..=100_000.0).contains(minutes));
+    let seconds = minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes));
+    seconds.ok_or_else(|| "it must be a number of minutes between 0.01 and 100,000".into())
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
-//! `touch2touch masks`: contact masks as training folders, how far those of two people agree, and which to look at first.
+//! `touch2touch masks`: contact masks as training folders, how far those of two people agree, which to look at first, and a
+//! mask model trained on them.
 
 mod queue;
 mod stats;
+mod train;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -36,6 +38,8 @@ pub(super) enum MasksVerb {
     Stats(stats::StatsArgs),
     /// List the pairs, the most uncertain masks first.
     Queue(Box<queue::QueueArgs>),
+    /// Train a mask model on the masks of pairs marked "done", and score it on pairs that were left out.
+    Train(train::TrainArgs),
 }
 
 /// Arguments of `masks compare`.
@@ -179,6 +183,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         MasksVerb::Compare(args) => return compare(args),
         MasksVerb::Stats(args) => return stats::run(args),
         MasksVerb::Queue(args) => return queue::run(args),
+        MasksVerb::Train(args) => return train::run(args),
     };
     let Format::Unet = args.format;
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;

@@ -17,7 +17,6 @@ use crate::domain::sample::{PadTouch, Sample};
 use crate::infer::bundle::Ends;
 use crate::infer::engine::{EngineChoice, resolve};
 use crate::io::statistics::ShiftStatistics;
-use crate::work::adapt::unfinished_folder;
 use crate::work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
 use crate::work::error::TaskError;
 use crate::work::imprint::{self, chain_of, imprint_of};
@@ -26,6 +25,7 @@ use crate::work::labels::{ImprintOf, ImprintSource};
 use crate::work::mask::{Contact, MaskChoice, MaskInputs, MaskSource};
 use crate::work::models::{Masking, Models, Wanted};
 use crate::work::prediction::Prediction;
+use crate::work::tuning::unfinished_folder;
 
 use args::SpacingArg;
 pub(super) use args::{AnyShiftArg, ModelArgs, RuntimeArg, ShiftArg};

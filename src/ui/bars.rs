@@ -71,6 +71,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             Action::ExportMeasured,
             Action::ExportPredicted,
             Action::ExportMasks,
+            Action::TrainMasks,
             Action::Save,
             Action::Reload,
             Action::Follow,
@@ -84,7 +85,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
     });
-    response.on_hover_text("Open a data set, export masks");
+    response.on_hover_text("Open a data set, export masks, train on them");
 }
 
 /// Shows and hides panes of the workspace; whether it did.

@@ -2,8 +2,6 @@
 
 mod adapted;
 mod gather;
-#[cfg(feature = "tune")]
-mod kept;
 mod pose;
 mod score;
 #[cfg(feature = "tune")]
@@ -12,9 +10,7 @@ mod write;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
-
-use serde::Serialize;
+use std::time::Instant;
 
 use super::bundles::BundleInfo;
 use super::error::TaskError;
@@ -35,10 +31,10 @@ use crate::domain::sample::Scale;
 use crate::infer::bundle::Role;
 use crate::infer::engine::EngineChoice;
 use crate::io::dataset::Dataset;
-use crate::io::folders;
 use crate::io::memory::peak_mib;
 
 pub use super::error::Remark;
+pub use super::tuning::Tuning;
 pub use adapted::{Adapted, HeldBack, MOST_SHOWN, PadSummary};
 use gather::{Touch, gather};
 pub use score::Scored;
@@ -55,16 +51,6 @@ const LEAST_GAIN_DB: f64 = 0.2;
 /// Most touches that a closed form takes; more change nothing and fill the memory.
 const MOST_TOUCHES: usize = 1500;
 
-/// How long the networks themselves are tuned after the closed form.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Tuning {
-    /// So many steps, once for each part that is left out and once for all.
-    Steps(u32),
-    /// As many steps as fit into this time, all these runs together; a few of them are timed first.
-    Within(Duration),
-}
-
 /// What is fitted, to what, and how it is tried.
 #[derive(Clone, Debug)]
 pub struct AdaptSetup {
@@ -80,17 +66,13 @@ pub struct AdaptSetup {
     pub folds: usize,
     /// How contact is found where the data have poses, and with which model.
     pub mask: (MaskChoice, Option<BundleInfo>),
-    /// Whether and how long the networks themselves are tuned.
+    /// Whether and how long the networks themselves are tuned after the closed form: once for each part that is left out,
+    /// and once for all.
     pub tuning: Option<Tuning>,
     /// Where a run of tuning that is stopped is kept, to go on from there when the same is asked for again.
     pub unfinished: Option<PathBuf>,
     /// The folder of the new bundle; `None` only tries.
     pub out: Option<PathBuf>,
-}
-
-/// The user's folder for runs that were stopped; `None` without a folder for such files.
-pub fn unfinished_folder() -> Option<PathBuf> {
-    folders::program_cache().map(|folder| folder.join("unfinished"))
 }
 
 /// Predicts the pairs, fits the closed form, tries it on what was left out, and writes the new bundle.

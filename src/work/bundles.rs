@@ -25,7 +25,12 @@ pub struct BundleInfo {
     pub origin: Origin,
     /// What can be chosen, if it is a generator.
     pub generator: Option<GeneratorInfo>,
+    /// Whether the program trained it, on masks that people corrected.
+    pub trained: bool,
 }
+
+/// The key of a bundle's provenance under which stands what the program trained it on.
+pub(super) const TRAINED: &str = "trained";
 
 /// The choices that a generator's bundle leaves.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,6 +88,7 @@ impl BundleInfo {
                 sensors: spec.sensors(),
                 fit: spec.fit.as_ref().map(|fit| fit.source.clone()),
             }),
+            trained: bundle.provenance().get(TRAINED).is_some(),
         }
     }
 
@@ -109,6 +115,12 @@ impl BundleInfo {
     /// Whether it was fitted to a rig.
     pub fn is_fitted(&self) -> bool {
         self.fit().is_some()
+    }
+
+    /// Whether it was made with the program from another one, for one's own data: then it is used where it is named or
+    /// chosen.
+    pub fn is_own(&self) -> bool {
+        self.is_fitted() || self.trained
     }
 
     /// What it was fitted to, where it was.
@@ -186,8 +198,8 @@ impl FoundBundles {
             return open(&what, folder)?.of_kind(kind, &what);
         }
         let fitting = || self.bundles.iter().filter(|bundle| bundle.kind == kind && bundle.fits(rig));
-        // What was fitted to a rig is used where it is named.
-        let first = fitting().find(|bundle| !bundle.is_fitted()).or_else(|| fitting().next());
+        // What was made for one's own data is used where it is named.
+        let first = fitting().find(|bundle| !bundle.is_own()).or_else(|| fitting().next());
         first.cloned().ok_or_else(|| {
             let refused: Vec<String> =
                 self.problems.iter().map(|p| format!("\n- {}: {}", p.file.display(), p.what)).collect();

@@ -31,7 +31,7 @@ pub struct HandMasks<'a> {
 
 impl HandMasks<'_> {
     /// The pairs and fingers that have one.
-    fn all(&self, rig: &Rig) -> BTreeSet<(String, PadId)> {
+    pub(super) fn all(&self, rig: &Rig) -> BTreeSet<(String, PadId)> {
         let mut all: BTreeSet<(String, PadId)> = self.labels.masks().into_iter().collect();
         for (pair, labels) in self.changed {
             for finger in rig.pads() {
@@ -45,17 +45,18 @@ impl HandMasks<'_> {
         all
     }
 
+    /// What a person said about a pair.
+    pub(super) fn of_pair(&self, pair: &str) -> Result<PairLabels, TaskError> {
+        self.changed.get(pair).map_or_else(|| self.labels.load(pair), |labels| Ok(labels.clone()))
+    }
+
     /// The mask of one finger, if it has one.
     fn get(&self, pair: &str, finger: PadId) -> Result<Option<HandMask>, TaskError> {
-        let labels = match self.changed.get(pair) {
-            Some(labels) => labels.clone(),
-            None => self.labels.load(pair)?,
-        };
-        Ok(labels.measured(finger).cloned())
+        Ok(self.of_pair(pair)?.measured(finger).cloned())
     }
 
     /// The review states that are not "todo", by pair name.
-    fn reviews(&self) -> BTreeMap<String, Review> {
+    pub(super) fn reviews(&self) -> BTreeMap<String, Review> {
         let mut reviews = self.labels.reviews().states;
         reviews.extend(self.changed.iter().map(|(pair, labels)| (pair.clone(), labels.review)));
         reviews
@@ -149,7 +150,7 @@ pub struct Plan {
 }
 
 /// A number of things in words: `1 mask`, `3 masks`.
-fn counted(n: usize, thing: &str) -> String {
+pub(super) fn counted(n: usize, thing: &str) -> String {
     format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
 }
 

@@ -7,7 +7,7 @@ mod record;
 pub use journal::{Act, Change, Deed, Past};
 pub use record::{Base, MaskRecord, PAUSE_S, Record, working_seconds};
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -154,6 +154,15 @@ impl ImprintOf {
     pub fn predicted(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> Self {
         let choices = serde_json::to_string(&(config, shift)).unwrap_or_else(|_| format!("{config:?} {shift:?}"));
         Self::Predicted(format!("{bundle} {choices}").into())
+    }
+
+    /// Bundle and choices of a prediction, as [`Self::predicted`] took them; `None` for what was measured, and for what another
+    /// version of the program wrote otherwise.
+    pub fn prediction(&self) -> Option<(&str, GenerateConfig, ShiftMode)> {
+        let Self::Predicted(of) = self else { return None };
+        let (bundle, choices) = of.split_once(' ')?;
+        let (config, shift) = serde_json::from_str(choices).ok()?;
+        Some((bundle, config, shift))
     }
 
     /// Which of the two it is.
@@ -446,6 +455,22 @@ impl Labels {
     /// The pairs and fingers that have a mask drawn by hand.
     pub fn masks(&self) -> Vec<(String, PadId)> {
         (*self.store).as_ref().map_or_else(|_| Vec::new(), MaskStore::masks)
+    }
+
+    /// Who drew the masks of a pair that are on the disk.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn persons(&self, name: &str) -> Result<BTreeSet<String>, TaskError> {
+        let what = format!("Labels of {name}");
+        let store = self.store(&what)?;
+        let fail = |err: StoreError| store_error(&what, &err);
+        let mut persons = BTreeSet::new();
+        for pad in store.rig().pads() {
+            persons.extend(store.load(name, pad).map_err(fail)?.map(|stored| stored.person));
+            persons.extend(store.load_predicted(name, pad).map_err(fail)?.into_iter().map(|(_, stored)| stored.person));
+        }
+        Ok(persons)
     }
 
     /// Reads the labels of a pair; empty if there are none.

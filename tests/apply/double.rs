@@ -293,6 +293,7 @@ impl Services for Double {
                 guided: false,
                 sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
             }),
+            trained: false,
         };
         match self.bundles {
             true => (vec![bundle("gen", BundleKind::Generator), bundle("unet", BundleKind::Mask)], Vec::new()),

@@ -196,6 +196,7 @@ fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
             guided,
             sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
         }),
+        trained: false,
     };
     let own = GenerateSettings { preset: None, guidance: 4.0, sampler: Sampler::Ddpm, ..GenerateSettings::default() };
     assert_eq!(own.config(&bundle(true)).guidance, 4.0);

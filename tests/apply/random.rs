@@ -15,7 +15,7 @@ use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
     AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
     InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
-    UiRequest, ViewCommand, WorkbenchCommand,
+    TrainCommand, UiRequest, ViewCommand, WorkbenchCommand,
 };
 use touch2touch::app::dial::DialPairs;
 use touch2touch::app::evaluate::ScoreChoice;
@@ -35,6 +35,7 @@ use touch2touch::app::settings::{
     SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::tasks::Ticket;
+use touch2touch::app::train::TrainForm;
 use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};
 use touch2touch::domain::align::basin::Plane;
 use touch2touch::domain::dataset::PairId;
@@ -49,7 +50,6 @@ use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::dataset::ToolUnit;
 use touch2touch::io::statistics::ShiftStatistics;
-use touch2touch::work::adapt::{Adapted, Scored};
 use touch2touch::work::error::TaskError;
 use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::export::{ExportChoice, Which};
@@ -57,9 +57,11 @@ use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
 use touch2touch::work::queue::QueueBy;
 use touch2touch::work::subject::Subject;
-use touch2touch::work::sweep::{Dial, InForce, Setting, Sweep};
+use touch2touch::work::sweep::{Dial, Setting};
 use touch2touch::work::tool::UnitSet;
+use touch2touch::work::train::TrainChoice;
 
+use super::answered::{adapted, swept, trained};
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;
 
@@ -452,6 +454,13 @@ draws! {
         1 Start,
         1 Use,
     }
+    train: TrainCommand {
+        1 SetForm((any::<bool>(), any::<u32>(), any::<u8>(), any::<u64>()).prop_map(|(by_steps, n, held_out_percent, seed)| {
+            TrainForm { choice: TrainChoice { held_out_percent, seed, test_in_train: by_steps }, by_steps, minutes: n, steps: n }
+        })),
+        1 Start,
+        1 Use,
+    }
     settings: SettingsCommand {
         1 SetTheme(any_of::<Theme>()),
         1 SetUiZoom(number()),
@@ -532,43 +541,9 @@ draws! {
         1 Evaluated(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(evaluation()))),
         1 Swept(ticket(), Just(()).prop_map(|()| Arc::new(swept()))),
         1 Adapted(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(adapted())), Just(None)),
-    }
-}
-
-fn swept() -> Sweep {
-    Sweep {
-        dataset: "elsewhere".into(),
-        dial: Dial::Gate,
-        unit: Dial::Gate.unit(),
-        at: None,
-        in_force: InForce::default(),
-        series: Vec::new(),
-        left_out: Vec::new(),
-        notes: Vec::new(),
-        pairs: 0,
-        complete: false,
-        seconds: 0.0,
-    }
-}
-
-fn adapted() -> Adapted {
-    Adapted {
-        pairs: 1,
-        touches: 1,
-        left_out: Vec::new(),
-        doubtful: Vec::new(),
-        before: Scored::default(),
-        closed_form: None,
-        after: None,
-        steps: 0,
-        curves: Vec::new(),
-        seconds: 0.0,
-        fit_seconds: 0.0,
-        peak_mib: None,
-        pads: Vec::new(),
-        warnings: Vec::new(),
-        bundle: None,
-        held_back: Vec::new(),
+        1 Trained(ticket(), Just(()).prop_map(|()| Arc::new(trained())), Just(()).prop_map(|()| {
+            Box::new(Double::new(false, true).find_bundles(&[]).0.remove(1))
+        })),
     }
 }
 
@@ -586,6 +561,7 @@ fn command() -> impl Strategy<Value = Command> {
         (2, dial().boxed()),
         (1, export().boxed()),
         (1, adapt().boxed()),
+        (1, train().boxed()),
         (8, settings().boxed()),
         (2, tasks().boxed()),
         (3, answers().boxed()),
@@ -600,7 +576,8 @@ fn command() -> impl Strategy<Value = Command> {
             | Command::Evaluate(_)
             | Command::Dial(_)
             | Command::Export(_)
-            | Command::Adapt(_) => {}
+            | Command::Adapt(_)
+            | Command::Train(_) => {}
             Command::Settings(_) | Command::Tasks(_) | Command::Answer(_) => {}
         }
         command

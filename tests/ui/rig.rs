@@ -96,6 +96,7 @@ impl Services for QuickGenerator {
                 guided: false,
                 sensors: SensorPair::of(&lab::GELSLIM, &lab::BUBBLE),
             }),
+            trained: false,
         };
         (vec![info], Vec::new())
     }

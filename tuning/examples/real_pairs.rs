@@ -17,7 +17,9 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use touch2touch_tuning::{Augment, Config, NoiseSchedule, Pair, Placement, Sampler, Start, Trained, Tuner};
+use touch2touch_tuning::{
+    Augment, Config, Descent as _, NoiseSchedule, Pair, Placement, Sampler, Start, Trained, Tuner,
+};
 
 const SIDE: usize = 128;
 const BUNDLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/models/generator_ldm");

@@ -59,8 +59,16 @@ pub enum Error {
         must: &'static str,
     },
     /// There is nothing to learn from.
-    #[error("there are no pairs to tune on")]
+    #[error("there is nothing to tune on")]
     NoPairs,
+    /// An imprint with its mask cannot be learned from.
+    #[error("mask {index}: {why}")]
+    Mask {
+        /// Its place among the masks, from 0.
+        index: usize,
+        /// What is wrong.
+        why: String,
+    },
     /// A pair cannot be learned from.
     #[error("pair {index}: {why}")]
     Pair {

@@ -1,9 +1,12 @@
 //! Fine-tuning on a CPU, inside the program: the shipped generator learns a sensor from a few measured pairs.
 //!
-//! [`Tuner`] is the whole of it: it takes a bundle's three graphs ([`Start`]) and [`Pair`]s, makes one step at a time,
+//! [`Tuner`] is the whole of it for the generator: it takes a bundle's three graphs ([`Start`]) and [`Pair`]s, makes one step at a time,
 //! and gives the graphs back with other weights in them, together with what lies behind the decoder ([`Placement`]).
 //!
-//! Below it, nothing knows of the generator: [`trainer::Trainer`] descends any [`trainer::Objective`] over named weights
+//! [`MaskTuner`] does the same for the mask network, from imprints with [`MaskTouch`]es that people corrected. Both are a
+//! [`Descent`].
+//!
+//! Below them, nothing knows of either network: [`trainer::Trainer`] descends any [`trainer::Objective`] over named weights
 //! ([`params::Params`]) that [`onnx::Onnx`] reads and writes; [`tape`] differentiates, [`ops`] and [`optim`] do the
 //! arithmetic, [`state`] keeps a run across a stop. A further network is one more file in [`nets`] and an objective of its own.
 //!
@@ -15,6 +18,7 @@ mod closed_form;
 mod config;
 mod error;
 mod image;
+mod masks;
 pub mod nets;
 pub mod onnx;
 pub mod ops;
@@ -32,8 +36,9 @@ pub use augment::Augment;
 pub use closed_form::Placement;
 pub use config::{Config, Trained};
 pub use error::{Error, Result};
+pub use masks::{Cast, MaskConfig, MaskStart, MaskTouch, MaskTuner, Sensors};
 pub use pair::Pair;
-pub use trainer::StepReport;
+pub use trainer::{Descent, StepReport};
 pub use tuner::{NoiseSchedule, Query, Sampler, Start, Tuned, Tuner};
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 mod arithmetic;
 mod arrange;
 mod attention;
+mod contact;
 mod conv;
 mod distance;
 mod linear;
@@ -17,6 +18,7 @@ mod unet;
 pub use arithmetic::{add, add_each, blend, line, mul, rescaled, silu};
 pub use arrange::{beside, channels, doubled, repeated, swapped};
 pub use attention::attention;
+pub use contact::contact_loss;
 pub use conv::conv2d;
 pub use distance::distance;
 pub use linear::{Weights, linear};

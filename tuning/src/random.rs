@@ -87,6 +87,13 @@ impl Random {
     }
 }
 
+/// The `k`-th item of a sequence in which all of `of` come once, in random order, before any comes again; sequences of
+/// different `kind` have nothing to do with each other.
+pub(crate) fn dealt(seed: u64, of: &[usize], k: usize, kind: usize) -> usize {
+    let (round, place) = (k / of.len(), k % of.len());
+    of[Random::new(seed, Purpose::Order, round, kind).order(of.len())[place]]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

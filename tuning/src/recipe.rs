@@ -8,9 +8,9 @@ use crate::ops;
 use crate::optim::Rate;
 use crate::pair::Pair;
 use crate::params::Leaves;
-use crate::random::{Purpose, Random};
+use crate::random::{Purpose, Random, dealt};
 use crate::tape::Tensor;
-use crate::trainer::Objective;
+use crate::trainer::{Objective, PARTS};
 
 /// The straight line behind the decoder: factor and offset.
 pub(crate) const LINE: &str = "line";
@@ -18,9 +18,6 @@ pub(crate) const LINE: &str = "line";
 pub(crate) const SHIFT: &str = "shift";
 /// What each pad's imprints have beside the touch, `[pads, side · side]`.
 pub(crate) const FIELD: &str = "field";
-
-/// Parts of a batch. Fixed: their number decides the order of additions, and so the last bits.
-const PARTS: usize = 4;
 
 /// The generator's objective over a set of pairs.
 #[derive(Debug)]
@@ -113,19 +110,13 @@ impl Recipe {
             (_, true) => 0,
             _ => (self.config.simulated * batch as f64).round() as usize,
         };
-        let simulated = (0..of_simulated).map(|i| self.dealt(&self.simulated, step * of_simulated + i, 1));
+        let simulated = (0..of_simulated).map(|i| dealt(self.config.seed, &self.simulated, step * of_simulated + i, 1));
         let of_real = batch - of_simulated;
-        let real = (0..of_real).map(|i| self.dealt(&self.real, step * of_real + i, 0));
+        let real = (0..of_real).map(|i| dealt(self.config.seed, &self.real, step * of_real + i, 0));
         // Simulated pairs are spread over the parts.
         let all: Vec<usize> = real.chain(simulated).collect();
         let order = Random::new(self.config.seed, Purpose::Batch, step, 1).order(batch);
         order.into_iter().map(|place| all[place]).collect()
-    }
-
-    /// The `k`-th pair of a sequence in which all come once, in random order, before any comes again.
-    fn dealt(&self, of: &[usize], k: usize, kind: usize) -> usize {
-        let (round, place) = (k / of.len(), k % of.len());
-        of[Random::new(self.config.seed, Purpose::Order, round, kind).order(of.len())[place]]
     }
 }
 

@@ -11,6 +11,9 @@ use crate::optim::{AdamW, Average, Ramp, Rate, norm};
 use crate::params::{Leaves, Params};
 use crate::tape::{Tensor, backward};
 
+/// Parts of a batch. Fixed: their number decides the order of additions, and so the last bits.
+pub(crate) const PARTS: usize = 4;
+
 /// What is to be made small.
 pub trait Objective: Sync {
     /// A part of a batch, ready to be run.
@@ -27,6 +30,25 @@ pub trait Objective: Sync {
 
     /// The part's share of the loss: the sum over the parts is the loss of the batch.
     fn loss(&self, leaves: &Leaves<'_>, part: Self::Part) -> Tensor;
+}
+
+/// A run that is made step by step and can be kept in between: [`crate::Tuner`], [`crate::MaskTuner`].
+pub trait Descent {
+    /// One step.
+    ///
+    /// # Errors
+    /// [`Error::Done`] after the last step of the plan; [`Error::Diverged`] where the loss is not a number, with
+    /// everything as it was before.
+    fn step(&mut self) -> Result<StepReport>;
+
+    /// Steps done.
+    fn steps_done(&self) -> usize;
+
+    /// Steps of the plan.
+    fn steps(&self) -> usize;
+
+    /// The whole state of the run. Write it to another file and rename that.
+    fn to_bytes(&self) -> Vec<u8>;
 }
 
 /// What a step did.
@@ -88,6 +110,11 @@ impl<O: Objective> Trainer<O> {
         self.average.params()
     }
 
+    /// The weights before the first step.
+    pub fn start(&self) -> &Params {
+        &self.start
+    }
+
     /// Steps done.
     pub fn steps_done(&self) -> usize {
         self.step
@@ -138,6 +165,11 @@ impl<O: Objective> Trainer<O> {
     pub fn side_by_side<T: Send>(&self, count: usize, act: impl Fn(usize) -> T + Sync) -> Vec<T> {
         self.workers.run(count, act)
     }
+}
+
+/// More threads than parts of a batch would have nothing to do.
+pub(crate) fn threads(asked: Option<usize>) -> usize {
+    asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get)).clamp(1, PARTS)
 }
 
 fn add(sum: &mut Option<Vec<f32>>, part: Option<Vec<f32>>) {

@@ -11,7 +11,7 @@ use crate::params::{Leaves, Params};
 use crate::random::Random;
 use crate::recipe::{FIELD, LINE, Model, Recipe, SHIFT};
 use crate::state::{Origin, OriginBuilder};
-use crate::trainer::{Plan, StepReport, Trainer};
+use crate::trainer::{Descent, Plan, StepReport, Trainer, threads};
 
 /// A generator as its bundle describes it, and where tuning begins.
 #[derive(Clone, Debug)]
@@ -76,7 +76,7 @@ pub struct Tuned {
 /// A picture to predict from, in the scale of [`Pair::picture`], and its pad; `None` for a simulated one.
 pub type Query<'a> = (&'a [f32], Option<usize>);
 
-/// A generator on its way from its bundle to a sensor. To cancel, stop calling [`Tuner::step`]: what
+/// A generator on its way from its bundle to a sensor. To cancel, stop calling [`Descent::step`]: what
 /// [`Tuner::tuned`] returns is always usable.
 #[derive(Debug)]
 pub struct Tuner {
@@ -103,7 +103,7 @@ impl Tuner {
         Ok(Self { files, sampler: start.sampler, origin, trainer })
     }
 
-    /// Goes on with a run that [`Tuner::to_bytes`] kept; to the last bit as if it had not been stopped.
+    /// Goes on with a run that [`Descent::to_bytes`] kept; to the last bit as if it had not been stopped.
     ///
     /// # Errors
     /// As [`Tuner::new`], and if the state is damaged or of another start, other pairs or other settings.
@@ -111,30 +111,6 @@ impl Tuner {
         let mut tuner = Self::new(start, pairs, config)?;
         tuner.trainer.restore(tuner.origin, state)?;
         Ok(tuner)
-    }
-
-    /// The whole state of the run; about 100 MB for the shipped bundle. Write it to another file and rename that.
-    pub fn to_bytes(&self) -> Vec<u8> {
-        self.trainer.to_bytes(self.origin)
-    }
-
-    /// One step.
-    ///
-    /// # Errors
-    /// [`Error::Done`] after the last step of the plan; [`Error::Diverged`] where the loss is not a number, with
-    /// everything as it was before.
-    pub fn step(&mut self) -> Result<StepReport> {
-        self.trainer.step()
-    }
-
-    /// Steps done.
-    pub fn steps_done(&self) -> usize {
-        self.trainer.steps_done()
-    }
-
-    /// Steps of the plan.
-    pub fn steps(&self) -> usize {
-        self.trainer.objective().config.steps
     }
 
     /// The generator as it is now: the running mean of the weights.
@@ -164,6 +140,25 @@ impl Tuner {
         check_queries(queries, model)?;
         let draw = |i: usize| draw(model, &self.trainer.average().leaves(|_| false), self.sampler, queries[i]);
         Ok(self.trainer.side_by_side(queries.len(), draw))
+    }
+}
+
+/// The state of a run is about 100 MB for the shipped bundle.
+impl Descent for Tuner {
+    fn step(&mut self) -> Result<StepReport> {
+        self.trainer.step()
+    }
+
+    fn steps_done(&self) -> usize {
+        self.trainer.steps_done()
+    }
+
+    fn steps(&self) -> usize {
+        self.trainer.objective().config.steps
+    }
+
+    fn to_bytes(&self) -> Vec<u8> {
+        self.trainer.to_bytes(self.origin)
     }
 }
 
@@ -259,11 +254,6 @@ fn origin(start: &Start, pairs: &[Pair], config: &Config) -> Origin {
         origin.numbers(&pair.picture).numbers(&pair.imprint).told(&(pair.frame, pair.weight))
     };
     pairs.iter().fold(begun, pair).finish()
-}
-
-/// More threads than parts of a batch would have nothing to do.
-fn threads(asked: Option<usize>) -> usize {
-    asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get)).clamp(1, 4)
 }
 
 fn check_queries(queries: &[Query<'_>], model: &Model) -> Result<()> {

@@ -137,6 +137,19 @@ impl State {
                 let words = words.option_if(self.adapt.tune, "--tune", self.adapt.steps);
                 self.model_words(self.mask_words(words))
             }
+            (Pane::Train, _) => {
+                let form = self.train.form;
+                let words = Words::new("masks").word("train").word(&path);
+                let words = words.option_if(form.by_steps, "--steps", form.steps);
+                let words = words.option_if(!form.by_steps, "--minutes", form.minutes);
+                let words = words.option("--held-out", form.choice.held_out_percent);
+                let words = words.option("--seed", form.choice.seed);
+                let words = if form.choice.test_in_train { words.word("--test-in-train") } else { words };
+                match (&self.settings.mask.bundle, self.bundle(BundleKind::Mask)) {
+                    (Some(_), Ok(bundle)) => words.option("--start", bundle.origin.path().display()),
+                    _ => words,
+                }
+            }
             _ => return None,
         };
         Some(words.0)

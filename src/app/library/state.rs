@@ -169,8 +169,8 @@ impl Library {
     /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind.
     pub fn bundle_named(&self, kind: BundleKind, name: Option<&str>, rig: &Rig) -> Option<&BundleInfo> {
         let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind && b.fits(rig));
-        // What was fitted to a rig is used where it is chosen.
-        let first = of_kind.clone().find(|bundle| !bundle.is_fitted()).or_else(|| of_kind.clone().next());
+        // What was made for one's own data is used where it is chosen.
+        let first = of_kind.clone().find(|bundle| !bundle.is_own()).or_else(|| of_kind.clone().next());
         match name {
             Some(name) => of_kind.find(|b| b.name == name).or(first),
             None => first,

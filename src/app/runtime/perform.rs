@@ -175,6 +175,17 @@ impl Runtime {
                 });
                 self.task(Lane::Batch, ticket, "Fit the model".into(), body);
             }
+            Effect::Train { ticket, source, labels, setup } => {
+                let services = self.services.clone();
+                let body = Box::new(move |cx: &JobCx| {
+                    let dataset = source.as_dataset().ok_or_else(|| {
+                        TaskError::new("Train the mask model", "this kind of source cannot be read outside the studio")
+                    })?;
+                    let (trained, bundle) = services.train(dataset, &labels, &setup, cx)?;
+                    Ok(Answer::Trained(ticket, Arc::new(trained), Box::new(bundle)))
+                });
+                self.task(Lane::Batch, ticket, "Train the mask model".into(), body);
+            }
             Effect::ExportTable { ticket, evaluation, published, folder } => {
                 let body = Box::new(move |_: &JobCx| {
                     let folder = evaluate::export(&evaluation, published, &absolute(folder))?;

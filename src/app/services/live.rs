@@ -14,7 +14,7 @@ use super::super::labels::state::{PairLabels, Review};
 use super::super::library::state::Place;
 use super::super::services::Opened;
 use super::super::settings::state::{SETTINGS_VERSION, Settings};
-use super::{DataSource, Following, Services};
+use super::{DataSource, Following, Services, train_and_open};
 use crate::domain::contact::ContactMask;
 use crate::domain::dataset::{Index, PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
@@ -39,9 +39,12 @@ use crate::work::job::JobCx;
 use crate::work::label_stats::{LabelStats, label_stats};
 use crate::work::labels::{Deed, Labels, Past, Reviews};
 use crate::work::models::{KeptPrediction, Models, Wanted};
+use crate::work::new_bundle::models_folder;
 use crate::work::prediction::Prediction;
 use crate::work::sweep::{self, Sweep, SweepSetup};
 use crate::work::tool::tool_file;
+use crate::work::train::{TrainSetup, Trained, new_folder};
+use crate::work::tuning::unfinished_folder;
 
 /// Longer than a key that is held down leaves a pair on screen.
 const PATIENCE: Duration = Duration::from_millis(150);
@@ -65,8 +68,7 @@ impl LiveServices {
     /// With settings in the user's configuration folder.
     pub fn new() -> Self {
         let store = store::user_folder().map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
-        let models_folder = folders::program_data().map(|folder| folder.join("models"));
-        let unfinished = adapt::unfinished_folder();
+        let (models_folder, unfinished) = (models_folder(), unfinished_folder());
         Self { config_folder: folders::config(), models_folder, unfinished, models: Models::new(store) }
     }
 
@@ -295,6 +297,22 @@ impl Services for LiveServices {
             .map(|folder| bundles::open("Open the fitted bundle", folder.as_path()))
             .transpose()?;
         Ok((adapted, bundle))
+    }
+
+    fn train(
+        &self,
+        dataset: &Dataset,
+        changed: &BTreeMap<String, PairLabels>,
+        setup: &TrainSetup,
+        cx: &JobCx,
+    ) -> Result<(Trained, BundleInfo), TaskError> {
+        let models = self.models_folder.as_ref().ok_or_else(|| {
+            TaskError::new("Train the mask model", "this system names no folder for models")
+                .with_hint("Train with touch2touch masks train --out FOLDER.")
+        })?;
+        let setup =
+            TrainSetup { out: new_folder(models, dataset), unfinished: self.unfinished.clone(), ..setup.clone() };
+        train_and_open(dataset, changed, &setup, &self.models, cx)
     }
 
     fn mask_by_model(

@@ -14,7 +14,7 @@ use crate::tape::Tensor;
 /// In front of the names of the mask network's weights.
 pub const MASK: &str = "mask/";
 
-const NETWORK: &str = "mask network";
+pub(crate) const NETWORK: &str = "mask network";
 const LEVELS: usize = 4;
 /// Classes of a pixel: no contact, contact.
 const CLASSES: usize = 2;
@@ -35,7 +35,7 @@ pub fn read(file: &Onnx) -> Result<Params> {
     Ok(params)
 }
 
-fn layout(width: usize) -> Layout {
+pub(crate) fn layout(width: usize) -> Layout {
     let mut l = Layout::default();
     let widths: [usize; LEVELS] = std::array::from_fn(|level| width << level);
     for level in 0..LEVELS {

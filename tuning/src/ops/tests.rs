@@ -365,3 +365,41 @@ fn what_a_unet_needs_and_its_gradients() {
     let flat = Tensor::new(&[1, 1, 2, 2], vec![1.0; 4]).tracked(&tape);
     assert_eq!(backward(&halved(&flat)).take(&flat), Some(vec![1.0, 0.0, 0.0, 0.0]));
 }
+
+#[test]
+fn the_loss_of_contact_and_its_gradients() {
+    let (h, w, pixels, weights) = (3, 5, 15, [0.25, 0.5, 0.75]);
+    let mut random = random(4);
+    let mut bits = |share: f64| (0..3 * pixels).map(|_| f32::from(u8::from(random.happens(share)))).collect::<Vec<_>>();
+    // The second picture has no contact; of the third no pixel counts.
+    let (mut masks, mut counted) = (bits(0.4), bits(0.7));
+    masks[pixels..2 * pixels].fill(0.0);
+    counted[2 * pixels..].fill(0.0);
+    let plain = |inputs: &[Array]| {
+        let mut loss = 0.0;
+        for (item, weight) in weights.iter().enumerate() {
+            let at = |class: usize, i: usize| inputs[0].values[(2 * item + class) * pixels + i];
+            let counts: Vec<usize> = (0..pixels).filter(|i| counted[item * pixels + i] == 1.0).collect();
+            let truth = |i: usize| f64::from(masks[item * pixels + i]);
+            let p = |i: usize| at(1, i).exp() / (at(0, i).exp() + at(1, i).exp());
+            if counts.is_empty() {
+                continue;
+            }
+            let right = |i: usize| if truth(i) == 1.0 { p(i) } else { 1.0 - p(i) };
+            let cross = counts.iter().map(|&i| -right(i).ln()).sum::<f64>() / counts.len() as f64;
+            let both: f64 = counts.iter().map(|&i| p(i) * truth(i)).sum();
+            let sides: f64 = counts.iter().map(|&i| p(i) + truth(i)).sum();
+            loss += weight * (cross + 1.0 - (2.0 * both + 1.0) / (sides + 1.0));
+        }
+        vec![loss]
+    };
+    let of_weights: Vec<f32> = weights.iter().map(|&v: &f64| v as f32).collect();
+    let loss = |x: &[Tensor]| contact_loss(&x[0], &masks, &counted, &of_weights);
+    run(vec![Array::random(&[3, 2, h, w], 7)], &plain, loss).check(1e-5);
+    // Logits far beyond any exponent stay numbers.
+    let tape = Rc::new(Tape::default());
+    let far = Tensor::new(&[1, 2, 1, 2], vec![-3e4, 3e4, 3e4, -3e4]).tracked(&tape);
+    let loss = contact_loss(&far, &[0.0, 1.0], &[1.0; 2], &[1.0]);
+    assert!(loss.values()[0].is_finite());
+    assert!(backward(&loss).take(&far).unwrap().iter().all(|v| v.is_finite()));
+}

@@ -6,39 +6,32 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use serde_json::json;
-use sha2::{Digest as _, Sha256};
-
-use super::AdaptSetup;
-use super::gather::Touch;
-use crate::infer::recipe::input_digest;
-use crate::io::digest::hex;
 use crate::io::{atomic, files};
 
 /// Runs that nobody went on with for so long are removed.
 const OLD: Duration = Duration::from_secs(14 * 24 * 3600);
 
-pub(super) struct Kept {
+pub(in crate::work) struct Kept {
     /// `None` where nothing is kept.
     folder: Option<PathBuf>,
 }
 
 impl Kept {
-    /// What was kept of this run, if anything.
-    pub(super) fn of(setup: &AdaptSetup, touches: &[Touch]) -> Self {
-        let folder = setup.unfinished.as_deref().map(|root| {
+    /// What was kept in a folder of runs of the one with this digest, if anything.
+    pub(in crate::work) fn of(root: Option<&Path>, digest: &str) -> Self {
+        let folder = root.map(|root| {
             remove_old(root);
-            root.join(&key(setup, touches)[..16])
+            root.join(&digest[..16])
         });
         Self { folder }
     }
 
-    pub(super) fn read(&self, name: &str) -> Option<Vec<u8>> {
+    pub(in crate::work) fn read(&self, name: &str) -> Option<Vec<u8>> {
         files::read(&self.folder.as_ref()?.join(name), files::MODEL).ok()
     }
 
     /// Keeps a file. A disk that is full costs the kept run and not the run.
-    pub(super) fn write(&self, name: &str, bytes: &[u8]) {
+    pub(in crate::work) fn write(&self, name: &str, bytes: &[u8]) {
         let Some(folder) = &self.folder else { return };
         let written = std::fs::create_dir_all(folder).and_then(|()| atomic::write_bytes(&folder.join(name), bytes));
         if let Err(err) = written {
@@ -46,34 +39,18 @@ impl Kept {
         }
     }
 
-    pub(super) fn remove(&self, name: &str) {
+    pub(in crate::work) fn remove(&self, name: &str) {
         if let Some(folder) = &self.folder {
             std::fs::remove_file(folder.join(name)).ok();
         }
     }
 
     /// The run is finished: nothing is left of it.
-    pub(super) fn clear(&self) {
+    pub(in crate::work) fn clear(&self) {
         if let Some(folder) = &self.folder {
             std::fs::remove_dir_all(folder).ok();
         }
     }
-}
-
-fn key(setup: &AdaptSetup, touches: &[Touch]) -> String {
-    let mut all = Sha256::new();
-    let asked = json!({
-        "program": env!("CARGO_PKG_VERSION"), "bundle": *setup.bundle.id, "config": setup.config,
-        "tuning": setup.tuning, "folds": setup.folds,
-    });
-    all.update(asked.to_string());
-    for touch in touches {
-        all.update(touch.name.as_bytes());
-        all.update([touch.pad.index() as u8]);
-        all.update(input_digest(&touch.picture));
-        touch.target.as_slice().iter().for_each(|v| all.update(v.to_le_bytes()));
-    }
-    hex(&all.finalize())
 }
 
 fn remove_old(root: &Path) {

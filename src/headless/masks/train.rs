@@ -1,0 +1,152 @@
+//! `touch2touch masks train`: a mask model trained on corrected masks.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::super::args::{DatasetArgs, parse_minutes};
+use super::super::predict::RuntimeArg;
+use super::super::{Common, Output, VerbResult, cache};
+use crate::work::bundles::{self, BundleKind};
+use crate::work::export::HandMasks;
+use crate::work::labels::Labels;
+use crate::work::models::Models;
+use crate::work::new_bundle::models_folder;
+use crate::work::train::{Told, TrainChoice, TrainSetup, Trained, new_folder, plan, train};
+use crate::work::tuning::{Tuning, unfinished_folder};
+
+/// Trained for so long where nothing is said.
+const MINUTES: f64 = 10.0;
+
+/// Arguments of `masks train`.
+#[derive(Debug, Args)]
+pub(in crate::headless) struct TrainArgs {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// The folder of the mask model's bundle to begin from; else the first mask model found.
+    #[arg(long, value_name = "BUNDLE")]
+    start: Option<PathBuf>,
+    /// Train for so long (10 where nothing is said); a few steps are timed first. A run that was stopped goes on when the
+    /// same is asked for again.
+    #[arg(long, value_name = "M", conflicts_with = "steps", value_parser = parse_minutes)]
+    minutes: Option<Duration>,
+    /// Train with so many steps of eight masks each.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    steps: Option<u32>,
+    /// Percent of the pairs that are left out of the training, for the score; 0 learns from all, and what that is worth is
+    /// not known.
+    #[arg(long, value_name = "PERCENT", default_value_t = TrainChoice::default().held_out_percent, value_parser = clap::value_parser!(u8).range(0..=90))]
+    held_out: u8,
+    /// Divides pairs that the data set keeps for tests (test_only) like the rest; else they are left out.
+    #[arg(long)]
+    test_in_train: bool,
+    /// Decides which pairs are left out, and the order and variation of the masks.
+    #[arg(long, default_value_t = TrainChoice::default().seed)]
+    seed: u64,
+    /// The folder of the new bundle, empty or new; else one among the models that the program looks for at its start.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Says what would be learned from, and trains nothing.
+    #[arg(long)]
+    dry_run: bool,
+    /// What makes predictions again on which masks were drawn.
+    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    runtime: RuntimeArg,
+    /// Neither keep a run that is stopped, nor look for one, nor for predictions that were made before.
+    #[arg(long)]
+    no_cache: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(args: &TrainArgs) -> VerbResult {
+    let dataset = args.dataset.open()?;
+    let output = Output::new(args.common, "training", 1);
+    let labels = Labels::of(&dataset);
+    let masks = HandMasks { labels: &labels, changed: &BTreeMap::new() };
+    let choice = TrainChoice { held_out_percent: args.held_out, seed: args.seed, test_in_train: args.test_in_train };
+    let planned = plan(&dataset, &masks, choice)?;
+    for line in planned.lines() {
+        output.note(&line);
+    }
+    if args.dry_run {
+        for warning in planned.warnings() {
+            output.note(&format!("note: {warning}"));
+        }
+        let [held_masks, held_pairs] = planned.held_out;
+        let said = serde_json::json!({
+            "masks": planned.masks(), "pairs": planned.pairs, "tools": planned.tools, "predicted": planned.predicted,
+            "held_out": {"masks": held_masks, "pairs": held_pairs}, "left_out": planned.left_out,
+            "unusable": planned.unreadable,
+        });
+        output.finish(&said, || "nothing was trained (--dry-run)".into())?;
+        return Ok(planned.unreadable.is_empty());
+    }
+    planned.check()?;
+    let found = bundles::find(&[]);
+    let out = match &args.out {
+        Some(out) => out.clone(),
+        None => {
+            let models = models_folder()
+                .ok_or_else(|| anyhow::anyhow!("this system names no folder for models; name one with --out"))?;
+            new_folder(&models, &dataset)
+        }
+    };
+    let tuning = match (args.steps, args.minutes) {
+        (Some(steps), _) => Tuning::Steps(steps),
+        (None, minutes) => Tuning::Within(minutes.unwrap_or(Duration::from_secs_f64(60.0 * MINUTES))),
+    };
+    let setup = TrainSetup {
+        start: found.take(BundleKind::Mask, args.start.as_deref(), &dataset.rig)?,
+        generators: found.bundles.iter().filter(|bundle| bundle.kind == BundleKind::Generator).cloned().collect(),
+        engine: args.runtime.choice(),
+        choice,
+        tuning,
+        unfinished: if args.no_cache { None } else { unfinished_folder() },
+        out,
+    };
+    let models = Models::new(if args.no_cache { None } else { cache::store() });
+    let trained = train(&dataset, &masks, &setup, &models, &output.job())?;
+    for remark in &trained.unusable {
+        output.note(&format!("left out: {}: {}", remark.name, remark.why));
+    }
+    for warning in &trained.warnings {
+        output.note(&format!("note: {warning}"));
+    }
+    let complete = trained.unusable.is_empty();
+    output.finish(&trained, || text(&trained))?;
+    Ok(complete)
+}
+
+fn text(trained: &Trained) -> String {
+    let mut lines = Vec::new();
+    if !trained.held_out.is_empty() {
+        lines.push(format!("{:>15} {:>15}  on pairs that were left out, the worst first", "IoU", "Dice"));
+    }
+    let change = |before: f64, after: f64| format!("{before:.3} -> {after:.3}");
+    let row = |before: Told, after: Told, name: &str| {
+        format!("{:>15} {:>15}  {name}", change(before.iou, after.iou), change(before.dice, after.dice))
+    };
+    for one in &trained.held_out {
+        let imprint = match one.imprint {
+            crate::work::labels::ImprintSource::Measured => "",
+            crate::work::labels::ImprintSource::Predicted => ", predicted",
+        };
+        lines.push(row(one.before, one.after, &format!("{}, {}{imprint}", one.pair, one.finger)));
+    }
+    if let (Some(before), Some(after)) = (trained.before, trained.after) {
+        lines.push(row(before, after, &format!("mean of {}", trained.held_out.len())));
+    }
+    lines.push(format!(
+        "{} masks of {} pairs by {}, {} steps, {:.0} s",
+        trained.masks,
+        trained.pairs,
+        if trained.persons.is_empty() { "nobody named".to_owned() } else { trained.persons.join(", ") },
+        trained.steps,
+        trained.seconds
+    ));
+    lines.push(format!("{}: {}", trained.name, trained.bundle.display()));
+    lines.join("\n")
+}

@@ -1,0 +1,72 @@
+//! What is left out, and what is said before anything starts.
+
+use super::*;
+
+fn entries(count: usize, for_tests: usize) -> Vec<Entry> {
+    let entry = |at: usize| Entry {
+        id: PairId(at as u32),
+        name: format!("data_{at}"),
+        tool: None,
+        held_out: at < for_tests,
+        places: Vec::new(),
+    };
+    (0..count).map(entry).collect()
+}
+
+fn held(entries: &[Entry]) -> Vec<&str> {
+    entries.iter().filter(|entry| entry.held_out).map(|entry| entry.name.as_str()).collect()
+}
+
+fn divided(count: usize, for_tests: usize, held_out_percent: u8, seed: u64) -> Vec<Entry> {
+    let mut entries = entries(count, for_tests);
+    divide(&mut entries, TrainChoice { held_out_percent, seed, test_in_train: false });
+    entries
+}
+
+#[test]
+fn a_share_of_the_pairs_is_left_out_by_the_seed_and_never_all() {
+    for (count, percent, expected) in
+        [(0, 20, 0), (1, 20, 0), (2, 20, 1), (3, 20, 1), (20, 20, 4), (20, 0, 0), (20, 100, 19), (1, 100, 0)]
+    {
+        assert_eq!(held(&divided(count, 0, percent, 3)).len(), expected, "{percent} % of {count}");
+    }
+    assert_eq!(held(&divided(20, 0, 20, 3)), held(&divided(20, 0, 20, 3)));
+    assert_ne!(held(&divided(20, 0, 20, 3)), held(&divided(20, 0, 20, 4)));
+    // One more pair changes at most one of those before.
+    let (few, more) = (divided(20, 0, 20, 3), divided(21, 0, 20, 3));
+    assert!(held(&few).iter().filter(|name| !held(&more).contains(name)).count() <= 1);
+}
+
+#[test]
+fn pairs_kept_for_tests_are_always_left_out() {
+    let entries = divided(12, 2, 20, 0);
+    assert_eq!(held(&entries).len(), 4);
+    assert!(entries[0].held_out && entries[1].held_out);
+    // They are a score by themselves: of two others none need be given up for one.
+    assert_eq!(held(&divided(4, 2, 20, 0)).len(), 2);
+    assert_eq!(held(&divided(3, 3, 20, 0)).len(), 3);
+}
+
+#[test]
+fn a_plan_says_what_is_learned_from_and_warns_of_little() {
+    let tools = BTreeMap::from([("rod".to_owned(), 4), (NO_TOOL.to_owned(), 1)]);
+    let left_out = BTreeMap::from([(LeftOut::NotDone, 1), (LeftOut::Skip, 2)]);
+    let plan = TrainPlan { tools, predicted: 2, pairs: 3, held_out: [2, 1], left_out, ..TrainPlan::default() };
+    assert_eq!(
+        plan.lines(),
+        [
+            "to learn from: 5 masks of 3 pairs, 2 of them on predictions",
+            "by tool: no tool named 1, rod 4",
+            "left out for the score: 2 masks of 1 pair",
+            "no part: 1 pair begun and not marked \"done\"",
+            "no part: 2 pairs marked \"skip\"",
+        ]
+    );
+    assert!(plan.check().is_ok() && plan.warnings()[0].starts_with("5 masks are few"));
+    let alone = TrainPlan { held_out: [0, 0], ..plan };
+    assert!(alone.warnings()[1].starts_with("nothing is left out"));
+    let nothing = TrainPlan { tools: BTreeMap::new(), ..alone };
+    let err = nothing.check().unwrap_err();
+    assert!(err.why.contains("begun and not marked") && err.hint.is_some(), "{err}");
+    assert!(nothing.warnings().is_empty());
+}

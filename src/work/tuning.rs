@@ -1,0 +1,34 @@
+//! What runs of training have in common, whichever network they tune: how long ([`Tuning`]), what is kept across a stop,
+//! and how far a run is.
+
+#[cfg(feature = "tune")]
+mod kept;
+#[cfg(feature = "tune")]
+mod runs;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use serde::Serialize;
+
+use crate::io::folders;
+
+#[cfg(feature = "tune")]
+pub(super) use kept::Kept;
+#[cfg(feature = "tune")]
+pub(super) use runs::{Look, Runs, steps_within};
+
+/// How long networks are tuned.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Tuning {
+    /// So many steps in each run.
+    Steps(u32),
+    /// As many steps as fit into this time, all runs together; a few of them are timed first.
+    Within(Duration),
+}
+
+/// The user's folder for runs that were stopped; `None` without a folder for such files.
+pub fn unfinished_folder() -> Option<PathBuf> {
+    folders::program_cache().map(|folder| folder.join("unfinished"))
+}

@@ -1,0 +1,340 @@
+//! [`MaskTuner`]: tunes a mask network on imprints whose contact masks people corrected, step by step.
+
+mod sensors;
+
+pub use sensors::Sensors;
+
+use crate::error::{Error, Result};
+use crate::nets::mask::{self, MASK};
+use crate::onnx::Onnx;
+use crate::ops;
+use crate::optim::{Ramp, Rate};
+use crate::params::{Leaves, Params};
+use crate::random::{Purpose, Random, dealt};
+use crate::state::{Origin, OriginBuilder};
+use crate::tape::Tensor;
+use crate::trainer::{Descent, Objective, PARTS, Plan, StepReport, Trainer, threads};
+
+/// A mask network as its bundle describes it: where tuning begins.
+#[derive(Clone, Debug)]
+pub struct MaskStart {
+    /// Its ONNX file.
+    pub file: Vec<u8>,
+    /// `[columns, rows]` of imprints and masks.
+    pub size: [usize; 2],
+    /// Meters at 0 and 1 of the network's input.
+    pub range_m: [f32; 2],
+    /// What becomes of values between and beyond them.
+    pub cast: Cast,
+}
+
+/// How the unit interval reaches the network.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Cast {
+    /// As it is, held at 0 and 1.
+    #[default]
+    None,
+    /// In 8 bits, held at 0 and 255.
+    Saturate,
+    /// In 8 bits, of which higher ones are lost.
+    Wrap,
+}
+
+impl MaskStart {
+    /// Meters as the network sees them.
+    pub fn scaled(&self, meters: f32) -> f32 {
+        let [min, max] = self.range_m;
+        let unit = (meters - min) / (max - min);
+        match self.cast {
+            // `as u8` saturates; through i32 the low eight bits stay.
+            Cast::Saturate => f32::from((unit * 255.0) as u8) / 255.0,
+            Cast::Wrap => f32::from((unit * 255.0) as i32 as u8) / 255.0,
+            Cast::None => unit.clamp(0.0, 1.0),
+        }
+    }
+}
+
+/// An imprint with the mask that is right for it, as large as the network's input and turned as that.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskTouch {
+    /// Meters, row by row; NaN where nothing was measured, which the network sees as 0 m.
+    pub imprint_m: Vec<f32>,
+    /// Which pixels are contact.
+    pub contact: Vec<bool>,
+    /// Which pixels count; all without it.
+    pub counted: Option<Vec<bool>>,
+    /// Whether a network predicted the imprint: then it is not drawn shallower, because predictions have one depth.
+    pub predicted: bool,
+}
+
+/// How a mask network is tuned. The defaults are for some twenty masks and ten minutes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskConfig {
+    /// Steps of the whole plan; the rates follow it.
+    pub steps: usize,
+    /// Imprints per step.
+    pub batch: usize,
+    /// Decides order and variations.
+    pub seed: u64,
+    /// Rate of the weights.
+    pub rate: f32,
+    /// Pull of the weights toward zero.
+    pub decay: f32,
+    /// Pull of the weights toward where they began.
+    pub anchor: f32,
+    /// Steps of rising rates.
+    pub warm_up: usize,
+    /// What is left of the rates at the end.
+    pub rest: f32,
+    /// Longest gradient.
+    pub clip: f32,
+    /// Which other sensors the imprints are varied to.
+    pub sensors: Sensors,
+    /// Threads; `None` for as many as there are cores, four at most. The result does not depend on it.
+    pub threads: Option<usize>,
+}
+
+impl Default for MaskConfig {
+    fn default() -> Self {
+        Self {
+            steps: 300,
+            batch: 8,
+            seed: 42,
+            rate: 6e-4,
+            decay: 0.01,
+            anchor: 0.0,
+            warm_up: 10,
+            rest: 0.02,
+            clip: 1.0,
+            sensors: Sensors::default(),
+            threads: None,
+        }
+    }
+}
+
+impl MaskConfig {
+    fn check(&self) -> Result<()> {
+        let numbers = [
+            ("rate", self.rate),
+            ("decay", self.decay),
+            ("anchor", self.anchor),
+            ("rest", self.rest),
+            ("clip", self.clip),
+        ];
+        let refuse = |setting, found: String, must| Err(Error::Config { setting, found, must });
+        for (setting, value) in numbers {
+            if !(value.is_finite() && value >= 0.0) {
+                return refuse(setting, value.to_string(), "a number of at least 0");
+            }
+        }
+        self.sensors.check()?;
+        match (self.batch, self.steps) {
+            (1..=1024, 1..=1_000_000) => Ok(()),
+            (1..=1024, steps) => refuse("steps", steps.to_string(), "between 1 and 1,000,000"),
+            (batch, _) => refuse("batch", batch.to_string(), "between 1 and 1024"),
+        }
+    }
+}
+
+/// The objective: cross-entropy + (1 − Dice) over variations of the touches.
+#[derive(Debug)]
+struct Recipe {
+    start: MaskStart,
+    touches: Vec<MaskTouch>,
+    all: Vec<usize>,
+    config: MaskConfig,
+}
+
+/// A part of a batch.
+#[derive(Default)]
+struct Part {
+    inputs: Vec<f32>,
+    masks: Vec<f32>,
+    counted: Vec<f32>,
+}
+
+impl Objective for Recipe {
+    type Part = Part;
+
+    fn rate(&self, _: &str) -> Option<Rate> {
+        let c = &self.config;
+        (c.rate > 0.0).then_some(Rate { rate: c.rate, decay: c.decay, anchor: c.anchor })
+    }
+
+    fn parts(&self, _: usize) -> usize {
+        PARTS.min(self.config.batch)
+    }
+
+    fn part(&self, step: usize, part: usize) -> Part {
+        let c = &self.config;
+        let parts = self.parts(step);
+        let mut made = Part::default();
+        for place in part * c.batch / parts..(part + 1) * c.batch / parts {
+            let touch = &self.touches[dealt(c.seed, &self.all, step * c.batch + place, 0)];
+            let random = &mut Random::new(c.seed, Purpose::Variation, step, place);
+            let varied = c.sensors.vary(touch, self.start.size, random);
+            let bit = |&v: &bool| f32::from(u8::from(v));
+            made.inputs
+                .extend(varied.imprint_m.iter().map(|&m| self.start.scaled(if m.is_finite() { m } else { 0.0 })));
+            made.masks.extend(varied.contact.iter().map(bit));
+            match &varied.counted {
+                Some(counted) => made.counted.extend(counted.iter().map(bit)),
+                None => made.counted.extend(vec![1.0; varied.contact.len()]),
+            }
+        }
+        made
+    }
+
+    fn loss(&self, leaves: &Leaves<'_>, part: Part) -> Tensor {
+        let [width, height] = self.start.size;
+        let count = part.inputs.len() / (width * height);
+        let logits = mask::segment(leaves, &Tensor::new(&[count, 1, height, width], part.inputs));
+        let weights = vec![1.0 / self.config.batch as f32; count];
+        ops::contact_loss(&logits, &part.masks, &part.counted, &weights)
+    }
+}
+
+/// A mask network on its way from its bundle to what people drew. To cancel, stop calling [`Descent::step`]: what
+/// [`MaskTuner::tuned`] returns is always usable.
+#[derive(Debug)]
+pub struct MaskTuner {
+    file: Onnx,
+    origin: Origin,
+    trainer: Trainer<Recipe>,
+}
+
+impl MaskTuner {
+    /// Before the first step.
+    ///
+    /// # Errors
+    /// If the network is of another architecture (which weight says so), a setting is out of range, there are no touches,
+    /// or one cannot be learned from (which one).
+    pub fn new(start: &MaskStart, touches: Vec<MaskTouch>, config: MaskConfig) -> Result<Self> {
+        config.check()?;
+        let [low, high] = start.range_m;
+        let span = high - low;
+        if !(span.is_finite() && span > 0.0) {
+            return Err(Error::Start { what: "range", why: "it must rise".into() });
+        }
+        let unread = |why| Error::Onnx { network: mask::NETWORK, why };
+        let file = Onnx::parse(start.file.clone()).map_err(unread)?;
+        let params = mask::read(&file)?;
+        check(&touches, start.size)?;
+        let origin = origin(start, &touches, &config);
+        let ramp = Ramp { warm_up: config.warm_up, steps: config.steps, rest: config.rest };
+        let plan = Plan { ramp, clip: config.clip, threads: threads(config.threads) };
+        let start = MaskStart { file: Vec::new(), ..start.clone() };
+        let recipe = Recipe { start, all: (0..touches.len()).collect(), touches, config };
+        Ok(Self { file, origin, trainer: Trainer::new(recipe, params, plan) })
+    }
+
+    /// Goes on with a run that [`Descent::to_bytes`] kept; to the last bit as if it had not been stopped.
+    ///
+    /// # Errors
+    /// As [`MaskTuner::new`], and if the state is damaged or of another start, other touches or other settings.
+    pub fn resume(start: &MaskStart, touches: Vec<MaskTouch>, config: MaskConfig, state: &[u8]) -> Result<Self> {
+        let mut tuner = Self::new(start, touches, config)?;
+        tuner.trainer.restore(tuner.origin, state)?;
+        Ok(tuner)
+    }
+
+    /// The network's ONNX file as it is now (the running mean of the weights), as long as before.
+    pub fn tuned(&self) -> Vec<u8> {
+        let params = self.trainer.average();
+        self.file
+            .with(|name| params.get(&format!("{MASK}{name}")).map(|entry| entry.values.to_vec()).unwrap_or_default())
+    }
+
+    /// What the network says of imprints (meters, as in [`MaskTouch::imprint_m`]) now: the probability of contact of each
+    /// pixel.
+    ///
+    /// # Errors
+    /// [`Error::Mask`] with the place of an imprint that has another size.
+    pub fn probabilities(&self, imprints: &[&[f32]]) -> Result<Vec<Vec<f32>>> {
+        self.ask(self.trainer.average(), imprints)
+    }
+
+    /// What it said before the first step.
+    ///
+    /// # Errors
+    /// As [`MaskTuner::probabilities`].
+    pub fn probabilities_at_start(&self, imprints: &[&[f32]]) -> Result<Vec<Vec<f32>>> {
+        self.ask(self.trainer.start(), imprints)
+    }
+
+    fn ask(&self, params: &Params, imprints: &[&[f32]]) -> Result<Vec<Vec<f32>>> {
+        let start = &self.trainer.objective().start;
+        let [width, height] = start.size;
+        let pixels = width * height;
+        if let Some(index) = imprints.iter().position(|imprint| imprint.len() != pixels) {
+            let why = format!("its imprint has {} values instead of {pixels}", imprints[index].len());
+            return Err(Error::Mask { index, why });
+        }
+        Ok(self.trainer.side_by_side(imprints.len(), |i| {
+            let meters = imprints[i].iter();
+            let input: Vec<f32> = meters.map(|&m| start.scaled(if m.is_finite() { m } else { 0.0 })).collect();
+            let logits = mask::segment(&params.leaves(|_| false), &Tensor::new(&[1, 1, height, width], input));
+            let (no, yes) = logits.values().split_at(pixels);
+            no.iter().zip(yes).map(|(no, yes)| 1.0 / (1.0 + (no - yes).exp())).collect()
+        }))
+    }
+}
+
+/// The state of a run is about 3 MB for the shipped bundle.
+impl Descent for MaskTuner {
+    fn step(&mut self) -> Result<StepReport> {
+        self.trainer.step()
+    }
+
+    fn steps_done(&self) -> usize {
+        self.trainer.steps_done()
+    }
+
+    fn steps(&self) -> usize {
+        self.trainer.objective().config.steps
+    }
+
+    fn to_bytes(&self) -> Vec<u8> {
+        self.trainer.to_bytes(self.origin)
+    }
+}
+
+/// Refuses touches that cannot be learned from, and sets without any.
+fn check(touches: &[MaskTouch], [width, height]: [usize; 2]) -> Result<()> {
+    if touches.is_empty() {
+        return Err(Error::NoPairs);
+    }
+    let pixels = width * height;
+    for (index, touch) in touches.iter().enumerate() {
+        let counted = touch.counted.as_ref().map_or(pixels, Vec::len);
+        let sizes =
+            [("imprint", touch.imprint_m.len()), ("mask", touch.contact.len()), ("map of what counts", counted)];
+        if let Some((what, found)) = sizes.into_iter().find(|(_, found)| *found != pixels) {
+            return Err(Error::Mask { index, why: format!("its {what} has {found} values instead of {pixels}") });
+        }
+        if touch.imprint_m.iter().all(|v| !v.is_finite()) {
+            return Err(Error::Mask { index, why: "its imprint holds no measurement".into() });
+        }
+    }
+    if touches.iter().all(|touch| touch.counted.as_ref().is_some_and(|counted| !counted.contains(&true))) {
+        return Err(Error::NoPairs);
+    }
+    Ok(())
+}
+
+/// Everything that decides the outcome. Threads do not.
+fn origin(start: &MaskStart, touches: &[MaskTouch], config: &MaskConfig) -> Origin {
+    let begun = OriginBuilder::default()
+        .bytes(&start.file)
+        .told(&(start.size, start.range_m, start.cast))
+        .told(&MaskConfig { threads: None, ..config.clone() });
+    let bits = |bits: &[bool]| bits.iter().map(|&v| u8::from(v)).collect::<Vec<u8>>();
+    let touch = |origin: OriginBuilder, touch: &MaskTouch| {
+        let counted = touch.counted.as_deref().map(bits);
+        origin.numbers(&touch.imprint_m).bytes(&bits(&touch.contact)).told(&(counted, touch.predicted))
+    };
+    touches.iter().fold(begun, touch).finish()
+}
+
+#[cfg(test)]
+mod tests;
