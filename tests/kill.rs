@@ -85,8 +85,8 @@ impl DataSource for Source {
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {
         self.live.load_labels(name)
     }
-    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
-        if self.saves { self.live.save_labels(name, labels, deed) } else { Ok(()) }
+    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError> {
+        if self.saves { self.live.save_labels(name, labels, deed) } else { Ok(None) }
     }
     fn plan_masks(&self, _: &BTreeMap<String, PairLabels>, _: ExportChoice) -> Result<Plan, TaskError> {
         Err(TaskError::new("Export masks", "it is not tried here"))

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::effect::Effect;
 use super::keys::{DatasetSeq, Revision};
+use super::labels::state::Merged;
 use super::library::state::Place;
 use super::results::prediction::Keyed;
 use super::results::{Computed, Preview, Request};
@@ -59,7 +60,7 @@ pub enum Answer {
     /// A result that a pane asked for could not be made.
     RequestFailed(DatasetSeq, Request, TaskError),
     /// The labels of a pair are on the disk, as they were when this writing was asked for.
-    LabelsSaved(String, Revision),
+    LabelsSaved(String, Revision, Option<Box<Merged>>),
     /// The settings are on the disk.
     SettingsSaved,
     /// A job failed that is neither of a ticket nor of a request.
@@ -143,11 +144,16 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         }
         Answer::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
         Answer::RequestFailed(seq, request, err) if is_open(state, seq) => failed_request(state, request, err),
-        // An answer to anything but the last request: what was changed since is not on the disk yet.
-        Answer::LabelsSaved(name, revision) if state.document.asked.get(&name) == Some(&revision) => {
-            state.document.asked.remove(&name);
-            state.document.unsaved.remove(&name);
-            labels::saved(state);
+        Answer::LabelsSaved(name, revision, merged) => {
+            // An answer to anything but the last request: what was changed since is not on the disk yet.
+            if state.document.asked.get(&name) == Some(&revision) {
+                state.document.asked.remove(&name);
+                state.document.unsaved.remove(&name);
+                labels::saved(state);
+            }
+            if let Some(merged) = merged {
+                labels::merged(state, &name, &merged, effects);
+            }
         }
         Answer::JobFailed(err) => state.log.error(&err),
         Answer::Evaluated(ticket, evaluation) => {
@@ -170,7 +176,6 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::Computed(..)
         | Answer::RequestFailed(..)
         | Answer::Previewed(..)
-        | Answer::LabelsSaved(..)
         | Answer::SettingsSaved
         | Answer::Revealed => {}
     }

@@ -4,7 +4,7 @@ mod repeat;
 pub mod state;
 
 pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
-pub use state::{Changed, Document, HandMask, MaskPlace, PairLabels, Repeating, Review, Stored, Stroke};
+pub use state::{Changed, Document, HandMask, MaskPlace, Merged, PairLabels, Repeating, Review, Stored, Stroke};
 
 use std::borrow::Cow;
 
@@ -248,6 +248,30 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
 /// The angle that is registered now, and its error.
 fn angle(state: &State, source: ImprintSource) -> Option<(f64, Option<f64>)> {
     state.pose(source).shown().map(|pose| (pose.angle_rad, pose.error_rad))
+}
+
+/// Takes in what somebody else made of a pair's masks meanwhile. What was done here before cannot be taken back any more: it
+/// would take theirs back as well.
+pub(super) fn merged(state: &mut State, name: &str, merged: &Merged, effects: &mut Vec<Effect>) {
+    if state.document.stroke.as_ref().is_some_and(|stroke| stroke.pair == name) {
+        end_stroke(state, effects);
+    }
+    for (place, theirs) in &merged.now.masks {
+        let (given, mine) = (merged.given.masks.get(place), state.document.hand_mask(name, place));
+        let mut both = match (mine, given) {
+            (Some(mine), given) => mine.merged(given, theirs),
+            (None, None) => theirs.clone(),
+            // Removed since: the next writing says so.
+            (None, Some(_)) => continue,
+        };
+        if mine.is_none_or(|mine| !mine.is_same(&both)) {
+            both.revision = state.document.next_revision();
+            state.document.labels.entry(name.to_owned()).or_default().put(place, Some(both));
+        }
+    }
+    state.history.forget(name);
+    let text = format!("{name}: somebody else labeled it as well; both are kept, and what was done before stays");
+    state.log.push(Level::Warning, text, None, None);
 }
 
 fn cancel_stroke(state: &mut State) {

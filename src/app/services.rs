@@ -101,11 +101,12 @@ pub trait DataSource: Send + Sync {
         Default::default()
     }
 
-    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones, and says what was done.
+    /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones, and says what was done. The
+    /// labels as they are then, where somebody else changed them as well.
     ///
     /// # Errors
     /// If they cannot be written.
-    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError>;
+    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError>;
 
     /// Reads what a person drew a second time of a pair; empty if there is nothing.
     ///

@@ -25,6 +25,8 @@ use crate::domain::rig::{PadId, Rig};
 /// Name of the folder beside a data set.
 pub const FOLDER: &str = "touch2touch_masks";
 const REPEATS: &str = "repeats";
+/// The file that is locked while labels are written.
+const LOCK: &str = ".lock";
 const JOURNAL_SUFFIX: &str = ".journal.jsonl";
 const FORMAT: &str = "touch2touch-mask";
 const REVIEW_FORMAT: &str = "touch2touch-review";
@@ -248,6 +250,16 @@ impl MaskStore {
         let within = |folder: &PathBuf| folder.join(REPEATS).join(names::label(person));
         let also_read = self.also_read.as_ref().map(within);
         Self { folder: within(&self.folder), also_read, rig: self.rig.clone() }
+    }
+
+    /// Keeps other programs that ask as well from writing here until the answer is dropped. Where the disk knows no locks
+    /// nothing is kept out.
+    pub fn hold(&self) -> Option<std::fs::File> {
+        std::fs::create_dir_all(&self.folder).ok()?;
+        let open = std::fs::OpenOptions::new().create(true).truncate(false).write(true).open(self.folder.join(LOCK));
+        let file = open.ok()?;
+        file.lock().ok()?;
+        Some(file)
     }
 
     /// Where files are written.

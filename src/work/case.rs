@@ -393,7 +393,7 @@ impl OpenedCase {
         if self.labels.is_empty() || !store.load(&self.case.pair)?.is_empty() {
             return Ok(());
         }
-        store.save(&self.case.pair, &self.labels, &Deed::named("opened with a case"))
+        store.save(&self.case.pair, &self.labels, &Deed::named("opened with a case")).map(drop)
     }
 }
 

@@ -19,7 +19,7 @@ use crate::domain::dataset::Problem;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{CleanUp, Drawing, Ground, Marks, PackError, PackedMask, Provenance};
+use crate::domain::label::{CleanUp, Drawing, Ground, Marks, PackError, PackedMask, Provenance, merge};
 use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::{PadId, Rig};
 use crate::io::dataset::Dataset;
@@ -281,6 +281,19 @@ impl HandMask {
         changed || was_drawn && self.marks != start.marks
     }
 
+    /// What was made of `base` here, and by somebody else there (`theirs`), in one; see [`merge`].
+    #[must_use]
+    pub fn merged(&self, base: Option<&Self>, theirs: &Self) -> Self {
+        let nothing = || Self::new(Mask::filled(self.mask.width(), self.mask.height(), false), Provenance::Nothing);
+        let base = base.cloned().unwrap_or_else(nothing);
+        let parts = [&base, self, theirs].map(|hand| (&*hand.mask, &*hand.marks));
+        match merge(parts[0], parts[1], parts[2]) {
+            Some((mask, marks)) => Self { mask: mask.into(), marks: marks.into(), revision: self.revision },
+            // Of another imprint: the journal has it.
+            None => self.clone(),
+        }
+    }
+
     /// In few bytes.
     pub fn pack(&self) -> PackedMask {
         PackedMask::pack(&self.mask, &self.marks)
@@ -377,12 +390,17 @@ impl PairLabels {
 #[derive(Clone, Debug)]
 pub struct Labels {
     store: Arc<Result<MaskStore, StoreError>>,
-    /// What is on the disk, as far as it was read or written here: only differences are written.
+    /// What whoever saves here holds, as far as it was read or given here: only differences are written, over what
+    /// somebody else may have written meanwhile.
     saved: Arc<Mutex<BTreeMap<String, PairLabels>>>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn hand_of(stored: StoredMask) -> HandMask {
+    HandMask { mask: Arc::new(stored.mask), marks: Arc::new(stored.marks), revision: Revision::default() }
 }
 
 fn store_error(what: &str, err: &StoreError) -> TaskError {
@@ -483,17 +501,12 @@ impl Labels {
         let Ok(store) = &*self.store else { return Ok(PairLabels::default()) };
         let fail = |err: StoreError| store_error(&what, &err);
         let mut labels = PairLabels::default();
-        let hand = |stored: StoredMask| HandMask {
-            mask: Arc::new(stored.mask),
-            marks: Arc::new(stored.marks),
-            revision: Revision::default(),
-        };
         for pad in store.rig().pads() {
             if let Some(stored) = store.load(name, pad).map_err(fail)? {
-                labels.masks.insert(MaskPlace::measured(pad), hand(stored));
+                labels.masks.insert(MaskPlace::measured(pad), hand_of(stored));
             }
             for (of, stored) in store.load_predicted(name, pad).map_err(fail)? {
-                labels.masks.insert(MaskPlace { pad, of: ImprintOf::Predicted(of.into()) }, hand(stored));
+                labels.masks.insert(MaskPlace { pad, of: ImprintOf::Predicted(of.into()) }, hand_of(stored));
             }
         }
         if let Some(stored) = store.load_review(name).map_err(fail)? {
@@ -508,6 +521,17 @@ impl Labels {
         Ok(labels)
     }
 
+    /// The mask that lies on the disk in a place now.
+    fn there(&self, store: &MaskStore, name: &str, place: &MaskPlace) -> Result<Option<HandMask>, StoreError> {
+        let stored = match &place.of {
+            ImprintOf::Measured => store.load(name, place.pad)?,
+            ImprintOf::Predicted(of) => {
+                store.load_predicted(name, place.pad)?.into_iter().find(|(other, _)| **other == **of).map(|(_, m)| m)
+            }
+        };
+        Ok(stored.map(hand_of))
+    }
+
     /// What was done to the labels of a pair before they were read, and what was taken back of it, the oldest first; as
     /// far as the journal tells and it leads to `labels`.
     pub fn past(&self, name: &str, labels: &PairLabels) -> (Vec<Past>, Vec<Past>) {
@@ -518,18 +542,31 @@ impl Labels {
     }
 
     /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones, and says in the pair's
-    /// journal what was done.
+    /// journal what was done. Where somebody else changed a mask since it was read here, both are kept, by pixel; then the
+    /// labels as they are now are returned.
     ///
     /// # Errors
     /// If they cannot be written.
-    pub fn save(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
+    pub fn save(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError> {
         let what = format!("Save the labels of {name}");
         let store = self.store(&what)?;
         let fail = |err: StoreError| store_error(&what, &err);
         let before = lock(&self.saved).get(name).cloned().unwrap_or_default();
-        let change = Change::between(&before, labels);
+        let mut change = Change::between(&before, labels);
         let person = deed.person.clone().or_else(masks::person).unwrap_or_default();
-        for (place, [_, new]) in &change.masks {
+        // Held until all is written: two windows that save at once come one after the other.
+        let _held = (before != *labels).then(|| store.hold());
+        let mut merged = labels.clone();
+        for (place, [old, new]) in &mut change.masks {
+            let there = self.there(store, name, place).map_err(fail)?;
+            if !journal::same(there.as_ref(), old.as_ref()) {
+                *new = match (&*new, &there) {
+                    (Some(ours), Some(theirs)) => Some(ours.merged(old.as_ref(), theirs)),
+                    (ours, theirs) => ours.clone().or_else(|| theirs.clone()),
+                };
+                *old = there;
+                merged.put(place, new.clone());
+            }
             let stored = new.as_ref().map(|hand| StoredMask {
                 mask: (*hand.mask).clone(),
                 marks: (*hand.marks).clone(),
@@ -552,6 +589,6 @@ impl Labels {
             let line = journal::Line::new(deed, &change, store.rig(), person, masks::now_unix_s());
             store.append_journal(name, &line).map_err(fail)?;
         }
-        Ok(())
+        Ok((!Change::between(labels, &merged).is_empty()).then_some(merged))
     }
 }

@@ -151,3 +151,50 @@ fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() 
     }
     assert!(touched > 200, "{touched}");
 }
+
+#[test]
+fn two_windows_on_one_folder_lose_nothing_of_each_other() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let mut windows = [open(&folder, home.path()), open(&folder, home.path())];
+    let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
+    let name = windows[0].state.pair_name().to_owned();
+    for (window, person) in windows.iter_mut().zip(["anna", "ben"]) {
+        let mask = MaskSettings { choice, radius_px: 3.0, tool: MaskTool::Rectangle, ..MaskSettings::default() };
+        window.send(SettingsCommand::SetMask(mask).into());
+        window.send(SettingsCommand::SetPerson(person.into()).into());
+        assert_eq!(window.state.pair_name(), name);
+    }
+    let rectangle = |window: &mut Studio, from: [f32; 2], to: [f32; 2]| {
+        window.send(
+            LabelsCommand::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px: from, erase: false }.into(),
+        );
+        window.send(LabelsCommand::StrokeTo(to).into());
+        window.send(LabelsCommand::EndStroke.into());
+    };
+    let [anna, ben] = &mut windows;
+    rectangle(anna, [2.0, 2.0], [20.0, 20.0]);
+    rectangle(ben, [150.0, 100.0], [170.0, 130.0]);
+    let who = |hand: &HandMask, x, y| match hand.marks.at(x, y) {
+        Some(Provenance::Hand { person }) => person.clone(),
+        _ => String::new(),
+    };
+    let both = |hand: &HandMask| {
+        assert!(hand.mask[(10, 10)] && hand.mask[(160, 110)]);
+        assert_eq!([who(hand, 10, 10), who(hand, 160, 110)], ["anna", "ben"]);
+    };
+    let stored =
+        || Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap().measured(lab::RIGHT).cloned().unwrap();
+    both(&stored());
+    both(&hand(ben).unwrap());
+    assert!(ben.state.log.entries.iter().any(|entry| entry.text.contains("somebody else")));
+    // Who saved first learns of it with the next change.
+    rectangle(anna, [2.0, 120.0], [9.0, 130.0]);
+    for hand in [stored(), hand(anna).unwrap()] {
+        both(&hand);
+        assert!(hand.mask[(5, 125)]);
+    }
+    // What was taken in is not taken back.
+    anna.send(LabelsCommand::Undo.into());
+    both(&stored());
+}

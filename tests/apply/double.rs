@@ -168,14 +168,14 @@ impl DataSource for Source {
         Ok(self.labels.lock().unwrap().get(name).cloned().unwrap_or_default())
     }
 
-    fn save_labels(&self, name: &str, labels: &PairLabels, _: &Deed) -> Result<(), TaskError> {
+    fn save_labels(&self, name: &str, labels: &PairLabels, _: &Deed) -> Result<Option<PairLabels>, TaskError> {
         assert!(!self.damaged.lock().unwrap().contains(name), "a damaged file must not be written over");
         if self.full_disk.load(Ordering::Relaxed) {
             return Err(TaskError::new("Save the labels", "no space left"));
         }
         self.saves.fetch_add(1, Ordering::Relaxed);
         self.labels.lock().unwrap().insert(name.to_owned(), labels.clone());
-        Ok(())
+        Ok(None)
     }
 
     fn load_repeat(&self, _: &str, name: &str) -> Result<PairLabels, TaskError> {

@@ -214,7 +214,7 @@ fn an_answer_to_an_earlier_saving_confirms_nothing_newer() {
     let unsaved = |bench: &Bench| bench.state.document.unsaved.contains("tool_a/data_0");
     stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
     // What an earlier request, which was being carried out when this one came, is answered with.
-    bench.send(Answer::LabelsSaved("tool_a/data_0".into(), Revision(0)));
+    bench.send(Answer::LabelsSaved("tool_a/data_0".into(), Revision(0), None));
     assert!(unsaved(&bench), "the stroke is not on the disk");
     bench.settle();
     assert!(!unsaved(&bench));

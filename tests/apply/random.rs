@@ -535,7 +535,7 @@ draws! {
         1 Revealed,
         1 TaskFailed(ticket(), error()),
         1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Request::Sample(t.pair)), error()),
-        1 LabelsSaved(Just("tool_a/data_0".to_owned()), Just(Revision(u64::MAX))),
+        1 LabelsSaved(Just("tool_a/data_0".to_owned()), Just(Revision(u64::MAX)), Just(None)),
         1 SettingsSaved,
         1 JobFailed(error()),
         1 Evaluated(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(evaluation()))),

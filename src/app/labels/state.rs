@@ -69,6 +69,15 @@ pub struct Changed {
     pub before: Option<(f64, Option<f64>)>,
 }
 
+/// Labels that somebody else changed while they were being changed here.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Merged {
+    /// What was to be written.
+    pub given: PairLabels,
+    /// What lies on the disk now: both.
+    pub now: PairLabels,
+}
+
 /// A stroke between pointer down and pointer up.
 #[derive(Clone, Debug)]
 pub struct Stroke {

@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::super::answers::Answer;
-use super::super::effect::Effect;
+use super::super::effect::{Effect, LabelsToSave};
 use super::super::jobs::{Body, Lane};
+use super::super::labels::state::Merged;
 use super::super::results::Preview;
 use super::super::results::prediction::generate;
 use super::super::results::preview::{Onlooker, PreviewSink};
@@ -116,11 +117,16 @@ impl Runtime {
                     id,
                     "Save the labels",
                     Box::new(move |_| {
-                        match &save.repeat {
+                        let now = match &save.repeat {
                             None => source.save_labels(&save.name, &save.labels, &save.deed)?,
-                            Some(person) => source.save_repeat(person, &save.name, &save.labels, &save.deed)?,
-                        }
-                        Ok(Answer::LabelsSaved(save.name, save.revision))
+                            Some(person) => {
+                                source.save_repeat(person, &save.name, &save.labels, &save.deed)?;
+                                None
+                            }
+                        };
+                        let LabelsToSave { name, revision, labels: given, .. } = *save;
+                        let merged = now.map(|now| Box::new(Merged { given, now }));
+                        Ok(Answer::LabelsSaved(name, revision, merged))
                     }),
                 );
             }

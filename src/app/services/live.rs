@@ -188,7 +188,7 @@ impl DataSource for LiveSource {
         self.labels.past(name, labels)
     }
 
-    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
+    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError> {
         self.labels.save(name, labels, deed)
     }
 
@@ -197,7 +197,7 @@ impl DataSource for LiveSource {
     }
 
     fn save_repeat(&self, person: &str, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
-        self.repeats_of(person)?.save(name, labels, deed)
+        self.repeats_of(person)?.save(name, labels, deed).map(drop)
     }
 
     fn label_stats(&self, reviews: &BTreeMap<String, Review>, whose: (&str, f64)) -> Result<LabelStats, TaskError> {

@@ -116,6 +116,17 @@ impl Marks {
         }
     }
 
+    /// Sets what stands behind one pixel, which must be inside.
+    pub(super) fn put(&mut self, at: (usize, usize), ignored: bool, provenance: &Provenance) {
+        let known = self.layers.iter().position(|layer| layer == provenance);
+        let layer = known.map_or_else(|| self.layer(provenance.clone()), |at| at as u8);
+        self.set_ignored(at, ignored);
+        self.of[at] = layer;
+        if !ignored {
+            self.tidy();
+        }
+    }
+
     /// Paints the pixels of `rect` that `touched` names. All are from then on of `by`, also those whose value was right:
     /// who paints over a pixel has looked at it.
     ///

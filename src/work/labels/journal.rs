@@ -58,7 +58,7 @@ pub struct Change {
 }
 
 /// The same pixels from the same source; the revision is of one run of the program.
-fn same(a: Option<&HandMask>, b: Option<&HandMask>) -> bool {
+pub(super) fn same(a: Option<&HandMask>, b: Option<&HandMask>) -> bool {
     match (a, b) {
         (None, None) => true,
         (Some(a), Some(b)) => a.is_same(b),
