@@ -26,6 +26,21 @@ fn open(folder: &Path, home: &Path) -> Studio {
     studio
 }
 
+/// Why no proposal is shown.
+fn why(studio: &Studio) -> String {
+    let state = &studio.state;
+    let finger = state.selection.finger;
+    format!(
+        "proposing {}, finger {finger:?}, imprint {:?}, {:?}; {:?}; failed: {:?}; log: {:?}",
+        state.proposes(),
+        state.worked_on(finger),
+        state.proposal_key(MEASURED, finger),
+        matches!(state.proposal(MEASURED, finger), Lookup::Waiting),
+        state.tasks.failed,
+        state.log.entries,
+    )
+}
+
 fn hand(studio: &Studio) -> Option<HandMask> {
     studio.state.hand_mask(MEASURED, lab::RIGHT).cloned()
 }
@@ -64,7 +79,7 @@ fn what_is_proposed_is_the_same_on_the_screen_and_by_verb() {
         let before = hand(&studio);
         studio.send(ViewCommand::Propose(true).into());
         let proposal = studio.state.shown_proposal(MEASURED, lab::RIGHT).cloned();
-        let proposal = proposal.unwrap_or_else(|| panic!("{source:?}: {:?}", studio.state.log.entries));
+        let proposal = proposal.unwrap_or_else(|| panic!("{source:?}: {}", why(&studio)));
         assert!(proposal.mask.as_slice().contains(&true), "{source:?}");
         assert_eq!(hand(&studio), before, "{source:?}: looking changes nothing");
         // Nor does going elsewhere and back.
@@ -109,7 +124,8 @@ fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() 
     let checked = painted.marks.hand_checked();
     let accept = |studio: &mut Studio| {
         studio.send(ViewCommand::Propose(true).into());
-        let proposed = studio.state.shown_proposal(MEASURED, lab::RIGHT).unwrap().mask.clone();
+        let proposed = studio.state.shown_proposal(MEASURED, lab::RIGHT).cloned();
+        let proposed = proposed.unwrap_or_else(|| panic!("{}", why(studio))).mask.clone();
         studio.send(LabelsCommand::AcceptProposal.into());
         proposed
     };

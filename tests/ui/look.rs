@@ -3,16 +3,21 @@
 use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{
-    Command, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
+    Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
 };
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::inspect::{BasinColor, InspectCommand};
+use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
-use touch2touch::app::settings::{LayerLook, MaskSource, SceneLayer, SceneLook, Theme, Versus, VersusMode, Workspace};
+use touch2touch::app::settings::{
+    LayerLook, MaskSource, MaskTool, ProposalSource, SceneLayer, SceneLook, Theme, Versus, VersusMode, Workspace,
+};
 use touch2touch::app::workbench::{Layer, SceneTool, Section, SectionAxis, WorkbenchCommand};
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::hand::HandAxis;
+use touch2touch::domain::label::Paint;
+use touch2touch::domain::rig::lab;
 use touch2touch::domain::sim::Fault;
 use touch2touch::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch::work::subject::Subject;
@@ -88,6 +93,24 @@ fn pictures_for_the_docs() {
         rig.shoot(&format!("{name}-demo-label-unet"));
         rig.send(SettingsCommand::SetMaskSource(MaskSource::Cad));
         rig.shoot(&format!("{name}-demo-label-cad"));
+        rig.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+        rig.send(SettingsCommand::SetMaskTool(MaskTool::Rectangle));
+        for (paint, from, to) in
+            [(Paint::Ignore, [8.0, 8.0], [40.0, 30.0]), (Paint::Contact, [90.0, 60.0], [100.0, 90.0])]
+        {
+            rig.send(SettingsCommand::SetPaint(paint));
+            let source = ImprintSource::Measured;
+            rig.send(LabelsCommand::BeginStroke { finger: lab::RIGHT, source, at_px: from, erase: false });
+            rig.send(LabelsCommand::StrokeTo(to));
+            rig.send(LabelsCommand::EndStroke);
+        }
+        let mut mask = rig.harness.state().state().settings.mask.clone();
+        mask.proposal = ProposalSource::CadTruth;
+        rig.send(SettingsCommand::SetMask(mask));
+        rig.send(ViewCommand::Propose(true));
+        rig.shoot(&format!("{name}-demo-label-propose"));
+        rig.send(ViewCommand::Propose(false));
+        rig.send(LabelsCommand::ResetMask);
         rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
         for _ in 0..5 {
             rig.send(LibraryCommand::Step(7));
