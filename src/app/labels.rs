@@ -225,7 +225,7 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     let Some(stroke) = doc.stroke.take() else { return };
     let labels = doc.labels.entry(stroke.pair.clone()).or_default();
     let Some(now) = labels.masks.get(&stroke.place) else { return };
-    if !now.is_worth_keeping(&stroke.start, stroke.before.is_some()) {
+    if now.is_same(&stroke.start) {
         labels.put(&stroke.place, stroke.before);
         return;
     }

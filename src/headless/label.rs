@@ -222,7 +222,7 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
                 for clean_up in &args.clean {
                     hand.clean(*clean_up, &dataset.rig);
                 }
-                if makes || hand.is_worth_keeping(&start, labels.masks.contains_key(&place(pad))) {
+                if makes || !hand.is_same(&start) {
                     labels.draw(&place(pad), Some(hand));
                 }
             }

@@ -274,18 +274,11 @@ impl HandMask {
         self.mask == other.mask && self.marks == other.marks
     }
 
-    /// Whether what was done to `start` is worth keeping. Of a mask that a person drew, who looked at which pixel counts as
-    /// well; of an automatic one, a stroke that changes no pixel makes no drawn one.
-    pub fn is_worth_keeping(&self, start: &Self, was_drawn: bool) -> bool {
-        let changed = self.mask != start.mask || self.marks.ignored() != start.marks.ignored();
-        changed || was_drawn && self.marks != start.marks
-    }
-
     /// What was made of `base` here, and by somebody else there (`theirs`), in one; see [`merge`].
     #[must_use]
     pub fn merged(&self, base: Option<&Self>, theirs: &Self) -> Self {
-        let nothing = || Self::new(Mask::filled(self.mask.width(), self.mask.height(), false), Provenance::Nothing);
-        let base = base.cloned().unwrap_or_else(nothing);
+        // Where nobody had drawn, it is the automatic mask that this one began from.
+        let base = base.cloned().unwrap_or_else(|| Self::new(self.mask.clone(), self.marks.base().clone()));
         let parts = [&base, self, theirs].map(|hand| (&*hand.mask, &*hand.marks));
         match merge(parts[0], parts[1], parts[2]) {
             Some((mask, marks)) => Self { mask: mask.into(), marks: marks.into(), revision: self.revision },

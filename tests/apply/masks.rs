@@ -81,10 +81,10 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
 }
 
 #[test]
-fn a_stroke_that_changes_nothing_leaves_nothing() {
+fn a_stroke_that_touches_nothing_leaves_nothing() {
     let mut bench = bench();
     bench.send(SettingsCommand::SetMaskTool(MaskTool::Eraser));
-    stroke(&mut bench, lab::RIGHT, [21.0, 1.0], [22.0, 1.0]);
+    stroke(&mut bench, lab::RIGHT, [-900.0, 1.0], [-800.0, 1.0]);
     bench.send(SettingsCommand::SetMaskTool(MaskTool::Brush));
     stroke(&mut bench, lab::RIGHT, [900.0, -900.0], [f32::NAN, 1.0]);
     bench.settle();
@@ -92,6 +92,14 @@ fn a_stroke_that_changes_nothing_leaves_nothing() {
     assert!(Action::Undo.command(&bench.state).is_none());
     assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0);
     assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
+    // Over what is right already it says that somebody looked: the pixels stay, and are theirs.
+    let before = mask(&bench, lab::RIGHT);
+    bench.send(SettingsCommand::SetMaskTool(MaskTool::Eraser));
+    stroke(&mut bench, lab::RIGHT, [21.0, 1.0], [22.0, 1.0]);
+    assert_eq!(mask(&bench, lab::RIGHT), before);
+    let hand = bench.state.document.hand_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).unwrap();
+    assert!(hand.marks.has_hand_work());
+    assert!(Action::Undo.command(&bench.state).is_some());
 }
 
 #[test]
