@@ -42,14 +42,15 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             return;
         }
         ScrollArea::vertical().id_salt("masks").show(ui, |ui| {
+            // What every mask takes comes first, so that it is on screen without scrolling.
             tools(cx, ui);
-            source(cx, ui);
+            correct(cx, ui);
+            review(cx, ui);
             proposal::show(cx, ui);
+            source(cx, ui);
             if system_person().is_none() {
                 super::settings_pane::person(cx, ui);
             }
-            correct(cx, ui);
-            review(cx, ui);
             note(cx, ui, memory);
             clean_ups(cx, ui);
             look(cx, ui);

@@ -1,4 +1,4 @@
-//! A bundle made from another one: where it may lie ([`check_folder`]), and how it is written ([`write`]).
+//! A bundle made from another one: where it may lie ([`check_folder`]), and how it is written ([`write()`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

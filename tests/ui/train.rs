@@ -86,7 +86,6 @@ fn a_training_that_is_cancelled_changes_nothing() {
         std::thread::sleep(std::time::Duration::from_millis(50));
         rig.harness.step();
     }
-    rig.shoot("train-running");
     rig.harness.get_by_label("Cancel").click();
     while rig.harness.state().state().training().is_some() {
         std::thread::sleep(std::time::Duration::from_millis(50));
