@@ -4,6 +4,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Pane, SettingsCommand, TrainCommand, UiRequest, ViewCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
+use touch2touch::app::state::State;
 use touch2touch::app::train::TrainForm;
 use touch2touch::work::bundles::BundleKind;
 use touch2touch::work::train::TrainChoice;
@@ -82,15 +83,11 @@ fn a_training_that_is_cancelled_changes_nothing() {
     // Not sent and waited for: it would take a day.
     rig.harness.state_mut().push(TrainCommand::Start);
     rig.harness.step();
-    while rig.harness.state().state().training_curves().is_empty() {
-        std::thread::sleep(std::time::Duration::from_millis(50));
-        rig.harness.step();
-    }
+    let begun = |state: &State| state.training().is_some_and(|(_, task)| task.progress.done > 0);
+    rig.until("the first steps", begun);
     rig.harness.get_by_label("Cancel").click();
-    while rig.harness.state().state().training().is_some() {
-        std::thread::sleep(std::time::Duration::from_millis(50));
-        rig.harness.step();
-    }
+    rig.harness.step();
+    rig.until("the end of the training", |state| state.training().is_none());
     rig.settle();
     let state = rig.harness.state().state();
     assert!(state.training().is_none() && state.train.result.is_none());
