@@ -4,7 +4,6 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Pane, SettingsCommand, TrainCommand, UiRequest, ViewCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
-use touch2touch::app::state::State;
 use touch2touch::app::train::TrainForm;
 use touch2touch::work::bundles::BundleKind;
 use touch2touch::work::train::TrainChoice;
@@ -66,32 +65,4 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
     let made = run(&verb, folder.path());
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     assert!(bytes(&out) == bytes(&found.bundle));
-}
-
-#[test]
-fn a_training_that_is_cancelled_changes_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let data = folder.path().join("grasps");
-    corrected(&data, 1);
-    let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data)) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
-    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Train)));
-    rig.send(TrainCommand::SetForm(TrainForm { by_steps: true, steps: 100_000, ..TrainForm::default() }));
-    rig.settle();
-    let shipped = rig.harness.state().state().bundle(BundleKind::Mask).unwrap().id.clone();
-    // Not sent and waited for: it would take a day.
-    rig.harness.state_mut().push(TrainCommand::Start);
-    rig.harness.step();
-    let begun = |state: &State| state.training().is_some_and(|(_, task)| task.progress.done > 0);
-    rig.until("the first steps", begun);
-    rig.harness.get_by_label("Cancel").click();
-    rig.harness.step();
-    rig.until("the end of the training", |state| state.training().is_none());
-    rig.settle();
-    let state = rig.harness.state().state();
-    assert!(state.training().is_none() && state.train.result.is_none());
-    assert_eq!(state.bundle(BundleKind::Mask).unwrap().id, shipped);
-    let models = rig.config.join("models");
-    assert!(!models.exists() || std::fs::read_dir(models).unwrap().count() == 0, "no bundle is left");
 }
