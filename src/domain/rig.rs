@@ -237,6 +237,11 @@ impl Rig {
         self.sensor(self.first(SensorKind::Depth)?)
     }
 
+    /// The first pad besides this one; `None` where there is no other.
+    pub fn other_pad(&self, pad: PadId) -> Option<PadId> {
+        self.pads().find(|other| *other != pad)
+    }
+
     /// Pixels to the millimeter of depth images; NaN where there is no such sensor, so that a size in millimeters says nothing.
     pub fn depth_px_per_mm(&self) -> f64 {
         self.depth().map_or(f64::NAN, |sensor| sensor.px_per_m * 1e-3)

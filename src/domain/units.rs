@@ -1,5 +1,10 @@
 //! Meters and radians inside, millimeters and degrees on screen: the only place that converts and formats.
 
+/// A number of things in words: `1 mask`, `3 masks`.
+pub fn counted(n: usize, thing: &str) -> String {
+    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
+}
+
 /// Meters to millimeters.
 pub fn mm(meters: f64) -> f64 {
     meters * 1e3

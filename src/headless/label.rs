@@ -12,6 +12,7 @@ use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
+use crate::domain::grid::DepthMap;
 use crate::domain::hand::{AcceptedPose, HandPose};
 use crate::domain::label::{CadPose, Ground, Provenance};
 use crate::domain::pose::ToolModel;
@@ -40,7 +41,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
         let entry = &dataset.index.pairs[id.0 as usize];
         let mut stored = labels.load(&entry.name)?;
         let before = stored.clone();
-        change(args, &dataset, id, &mut stored)?;
+        change(args, (&dataset, &labels, id), &mut stored)?;
         if stored != before {
             labels.save(&entry.name, &stored, &Deed { person: args.person.clone(), ..Deed::named("label") })?;
         }
@@ -103,22 +104,26 @@ impl<'a> Touch<'a> {
 }
 
 impl Touch<'_> {
+    fn near_cad(
+        &self,
+        (at, pose): (CadPose, HandPose),
+        (imprint, pad): (&DepthMap, PadId),
+    ) -> anyhow::Result<Proposal> {
+        let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
+        let distances = propose::cad_distances((imprint, self.args.imprint), (&self.sample, pad), tool, pose)?;
+        Ok(propose::near_cad(&distances, self.args.mask.choice().cad_distance_m, at))
+    }
+
     /// What `--propose` asks for, for a pad of the pair `id`; `found` has the imprints with the masks in force.
     fn proposal(
         &mut self,
-        (dataset, id): (&Dataset, PairId),
+        (dataset, all, id): (&Dataset, &Labels, PairId),
         found: &Contact,
         pad: PadId,
         labels: &PairLabels,
     ) -> anyhow::Result<Proposal> {
         let args = self.args;
         let imprint = found.imprints[pad].as_ref().ok_or_else(|| anyhow::anyhow!("there is no imprint"))?;
-        let to = Side { sample: &self.sample, pad, imprint };
-        let near_cad = |at: CadPose, pose: HandPose| -> anyhow::Result<Proposal> {
-            let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
-            let distances = propose::cad_distances((imprint, args.imprint), (&self.sample, pad), tool, pose)?;
-            Ok(propose::near_cad(&distances, args.mask.choice().cad_distance_m, at))
-        };
         Ok(match args.propose.unwrap_or_default() {
             ProposalSource::Automatic => {
                 let made = self.contact(args.imprint, None)?;
@@ -129,18 +134,15 @@ impl Touch<'_> {
             ProposalSource::CadTruth => {
                 let truth = self.sample.grasp_from_object;
                 let truth = truth.ok_or_else(|| anyhow::anyhow!("the true pose of this pair is not known"))?;
-                near_cad(CadPose::Truth, truth.into())?
+                self.near_cad((CadPose::Truth, truth.into()), (imprint, pad))?
             }
             ProposalSource::CadHand => {
                 let pose = args.pose.ok_or_else(|| anyhow::anyhow!("name the pose with --pose DEG,MM,MM"))?;
-                near_cad(CadPose::Nudged(pose.into()), pose.into())?
+                self.near_cad((CadPose::Nudged(pose.into()), pose.into()), (imprint, pad))?
             }
             ProposalSource::CadRegistered => {
                 let pose = self.pose(args.imprint, labels)?;
-                let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
-                let at = (&self.sample, pad);
-                let distances = propose::cad_distances((imprint, args.imprint), at, tool, pose.into())?;
-                propose::near_cad(&distances, args.mask.choice().cad_distance_m, CadPose::Registered(pose))
+                self.near_cad((CadPose::Registered(pose), pose.into()), (imprint, pad))?
             }
             ProposalSource::Grow => {
                 let of = self.predictor.of(args.imprint)?;
@@ -149,21 +151,23 @@ impl Touch<'_> {
             ProposalSource::Carry => {
                 let from = match &args.carry_from {
                     Some(name) => find_pair(dataset, name)?,
-                    None => carried_from(dataset, id).ok_or_else(|| {
+                    None => carried_from(dataset, all, id).ok_or_else(|| {
                         anyhow::anyhow!("nobody worked on another pair of this tool yet: name one with --carry-from")
                     })?,
                 };
                 let name = &dataset.index.pairs[from.0 as usize].name;
-                let (sample, labels) = (dataset.load(from)?, Labels::of(dataset).load(name)?);
+                let (sample, labels) = (dataset.load(from)?, all.load(name)?);
+                let to = Side { sample: &self.sample, pad, imprint };
                 propose::carried_from_pair(name, (&sample, &labels), to)?
             }
             ProposalSource::OtherFinger => {
-                let other = dataset.rig.pads().find(|other| *other != pad);
+                let other = dataset.rig.other_pad(pad);
                 let other = other.ok_or_else(|| anyhow::anyhow!("there is no other finger"))?;
-                let (Some(imprint), Some(mask)) = (&found.imprints[other], &found.masks[other]) else {
+                let (Some(there), Some(mask)) = (&found.imprints[other], &found.masks[other]) else {
                     anyhow::bail!("the other finger has no mask");
                 };
-                let from = Side { sample: &self.sample, pad: other, imprint };
+                let side = |pad, imprint| Side { sample: &self.sample, pad, imprint };
+                let (from, to) = (side(other, there), side(pad, imprint));
                 propose::carried_across(&dataset.rig.pad_key(other), (from, &mask.mask), to)?
             }
         })
@@ -171,8 +175,8 @@ impl Touch<'_> {
 }
 
 /// The pair whose mask is carried to another: the nearest of the same tool that somebody worked on.
-fn carried_from(dataset: &Dataset, to: PairId) -> Option<PairId> {
-    let reviews = Labels::of(dataset).reviews().states;
+fn carried_from(dataset: &Dataset, labels: &Labels, to: PairId) -> Option<PairId> {
+    let reviews = labels.reviews().states;
     let begun = |name: &str| reviews.get(name).is_some_and(|review| propose::is_begun(*review));
     let tool = dataset.index.pairs[to.0 as usize].tool.as_ref()?;
     let pairs = dataset.index.pairs.iter().enumerate();
@@ -182,7 +186,11 @@ fn carried_from(dataset: &Dataset, to: PairId) -> Option<PairId> {
 
 /// Makes the changes that the arguments name, masks first: an accepted pose is then of the new ones. The pair itself is
 /// only read where something is made from it.
-fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabels) -> anyhow::Result<()> {
+fn change(
+    args: &LabelArgs,
+    (dataset, all, id): (&Dataset, &Labels, PairId),
+    labels: &mut PairLabels,
+) -> anyhow::Result<()> {
     let pads = args.finger.fingers(&dataset.rig)?;
     let mut touch = None;
     let makes = args.adopt || args.from.is_some() || args.propose.is_some();
@@ -209,7 +217,7 @@ fn change(args: &LabelArgs, dataset: &Dataset, id: PairId, labels: &mut PairLabe
                 };
                 let mut hand = args.from.map_or_else(|| start.clone(), |from| start.copied(from));
                 if args.propose.is_some() {
-                    let proposal = touch.proposal((dataset, id), &found, pad, labels)?;
+                    let proposal = touch.proposal((dataset, all, id), &found, pad, labels)?;
                     let imprint = found.imprints[pad].as_ref();
                     let drawn = imprint.and_then(|imprint| labels.drawn(&place(pad), imprint));
                     hand = accepted(drawn, &proposal, args.over_hand);

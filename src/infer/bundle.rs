@@ -120,6 +120,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::dataset::Problem;
 use crate::domain::fit::Fitted;
+use crate::domain::units::counted;
 use crate::io::digest::sha256;
 use crate::io::files;
 
@@ -189,8 +190,7 @@ pub struct BundleError {
 
 impl fmt::Display for BundleError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let count = self.problems.len();
-        write!(f, "the model bundle {} cannot be used: {count} problem{}", self.origin, plural(count))?;
+        write!(f, "the model bundle {} cannot be used: {}", self.origin, counted(self.problems.len(), "problem"))?;
         let dir = self.origin.path();
         for problem in &self.problems {
             let file = problem.file.strip_prefix(&dir).unwrap_or(&problem.file);
@@ -198,10 +198,6 @@ impl fmt::Display for BundleError {
         }
         Ok(())
     }
-}
-
-fn plural(count: usize) -> &'static str {
-    if count == 1 { "" } else { "s" }
 }
 
 /// A checked bundle.

@@ -52,8 +52,10 @@ impl Agreements {
 /// # Errors
 /// If a mask that both drew cannot be read, or the data set has no depth sensor.
 pub fn compare_labels(dataset: &Dataset, a: &Labels, b: &Labels) -> Result<Agreements, TaskError> {
-    let sensor = dataset.rig.depth().ok_or_else(|| TaskError::new(WHAT, "the data set has no depth sensor"))?;
-    let px_per_mm = sensor.px_per_m * 1e-3;
+    if dataset.rig.depth().is_none() {
+        return Err(TaskError::new(WHAT, "the data set has no depth sensor"));
+    }
+    let px_per_mm = dataset.rig.depth_px_per_mm();
     let [drawn_a, drawn_b] = [a, b].map(|labels| labels.masks().into_iter().collect::<std::collections::BTreeSet<_>>());
     let mut out = Agreements {
         only: [drawn_a.difference(&drawn_b).count(), drawn_b.difference(&drawn_a).count()],

@@ -14,6 +14,7 @@ use crate::domain::dataset::{PairId, Split};
 use crate::domain::grid::Mask;
 use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::Sample;
+use crate::domain::units::counted;
 use crate::io::dataset::Dataset;
 use crate::io::export_unet::{self, Content, ExportConfig, ExportEntry, ExportReport, LoadFailure, PARTS};
 
@@ -147,11 +148,6 @@ pub struct Plan {
     entries: Vec<ExportEntry>,
     ids: Vec<PairId>,
     drawn: BTreeSet<(String, PadId)>,
-}
-
-/// A number of things in words: `1 mask`, `3 masks`.
-pub(super) fn counted(n: usize, thing: &str) -> String {
-    format!("{n} {thing}{}", if n == 1 { "" } else { "s" })
 }
 
 impl Plan {

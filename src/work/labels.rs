@@ -231,7 +231,8 @@ impl HandMask {
 
     /// Draws on it, as the person `by`.
     pub fn draw(&mut self, drawing: &Drawing, ground: Ground<'_>, by: Provenance) {
-        drawing.apply(Arc::make_mut(&mut self.mask), Arc::make_mut(&mut self.marks), ground, by);
+        let mut touched = Mask::filled(self.mask.width(), self.mask.height(), false);
+        self.draw_on(drawing, &mut touched, ground, 0, by);
     }
 
     /// Draws what comes after the first `from` points of a drawing that grows, as the person `by`. `touched` holds what was

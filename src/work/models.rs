@@ -26,6 +26,7 @@ use crate::infer::mask::{MaskError, MaskModel};
 use crate::infer::recipe::{Recipe, input_digest};
 use crate::infer::sheets::Sheets;
 use crate::infer::store::{Inputs, Store};
+use crate::io::caught::caught;
 
 /// Predictions of one touch that are read back; older ones stay on the disk.
 const LISTED: usize = 16;
@@ -174,6 +175,33 @@ impl Models {
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
         self.make(self.store.as_ref(), bundle, engine, config, wanted, cx)
+    }
+
+    /// The same, where a picture that fails, or makes a model panic, does not take the others with it. `None` once told to
+    /// stop.
+    pub fn predict_each(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[Wanted<'_>],
+        cx: &JobCx,
+    ) -> Option<Vec<Result<Prediction, TaskError>>> {
+        let what = || format!("Generate with {}", bundle.name);
+        let run = |wanted: &[Wanted<'_>]| {
+            let predict = || self.predict(bundle, engine, config, wanted, cx);
+            caught(predict).unwrap_or_else(|message| Err(TaskError::panicked(&what(), &message)))
+        };
+        let one = |wanted: &Wanted<'_>| {
+            let made = run(std::slice::from_ref(wanted))?.pop();
+            made.ok_or_else(|| TaskError::new(&what(), "the generator gave no prediction"))
+        };
+        let made = match run(wanted) {
+            Ok(made) => made.into_iter().map(Ok).collect(),
+            Err(err) if err.is_cancelled() => return None,
+            Err(_) => wanted.iter().map(one).collect(),
+        };
+        (!cx.cancel.is_cancelled()).then_some(made)
     }
 
     fn make(

@@ -338,26 +338,14 @@ impl<'a> Job<'a> {
             .iter()
             .map(|(.., picture)| Wanted { difference: picture, seed: config.seed, size: [0, 0] })
             .collect();
-        let run = |wanted: &[Wanted<'_>]| {
-            let made = caught(|| self.models.predict(bundle, self.setup.engine, config, wanted, &self.cx.quiet()));
-            made.unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message)))
-        };
-        let one = |wanted: &Wanted<'_>| {
-            let made = run(std::slice::from_ref(wanted)).map_err(|err| err.why)?.pop();
-            made.ok_or_else(|| "the generator gave no prediction".to_owned())
-        };
-        // One picture that fails does not take the others with it.
-        let made: Vec<Result<Prediction, String>> = match run(&wanted) {
-            Ok(made) => made.into_iter().map(Ok).collect(),
-            Err(err) if err.is_cancelled() => return Ok(Vec::new()),
-            Err(_) => wanted.iter().map(one).collect(),
-        };
+        let made = self.models.predict_each(bundle, self.setup.engine, config, &wanted, &self.cx.quiet());
+        let Some(made) = made else { return Ok(Vec::new()) };
         let mut out: Vec<Option<Made>> = pairs.iter().map(|_| None).collect();
         for ((at, pad, _), made) in touches.iter().zip(made) {
             let slot = out[*at].get_or_insert_with(|| Ok(PerPad::default()));
             match (made, slot) {
                 (Ok(made), Ok(pads)) => pads[*pad] = Some(made),
-                (Err(why), slot) => *slot = Err(why),
+                (Err(err), slot) => *slot = Err(err.why),
                 (Ok(_), Err(_)) => {}
             }
         }

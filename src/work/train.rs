@@ -14,12 +14,13 @@ use std::path::{Path, PathBuf};
 
 use super::bundles::BundleInfo;
 use super::error::TaskError;
-use super::export::{HandMasks, LeftOut, counted};
+use super::export::{HandMasks, LeftOut};
 use super::job::JobCx;
 use super::labels::{ImprintOf, MaskPlace, Review};
 use super::models::Models;
 use super::tuning::Tuning;
 use crate::domain::dataset::{PairId, Split};
+use crate::domain::units::counted;
 use crate::infer::engine::EngineChoice;
 use crate::io::dataset::Dataset;
 use crate::io::digest::sha256;

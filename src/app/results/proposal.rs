@@ -245,7 +245,7 @@ impl State {
                 Ingredients::Carry(from, hand.map(|hand| hand.revision))
             }
             ProposalSource::OtherFinger => {
-                let other = self.rig().pads().find(|pad| *pad != finger).ok_or(Absent::NoFinger)?;
+                let other = self.rig().other_pad(finger).ok_or(Absent::NoFinger)?;
                 let key = self.imprint_key(source, other)?;
                 match self.mask_in_force(source, other) {
                     Ok(mask) => Ingredients::Across(key, mask.version),
@@ -286,7 +286,7 @@ impl Wanted<'_> {
             return self.tool();
         }
         if state.settings.mask.proposal == ProposalSource::OtherFinger
-            && let Some(other) = state.rig().pads().find(|pad| *pad != finger)
+            && let Some(other) = state.rig().other_pad(finger)
         {
             self.mask(source, other);
         }

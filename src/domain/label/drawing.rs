@@ -4,9 +4,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::marks::Marks;
 use super::paint::Paint;
-use super::provenance::Provenance;
 use super::{Rect, paint_where, region};
 use crate::domain::grid::{DepthMap, Mask};
 
@@ -148,18 +146,12 @@ impl Drawing {
         }
         changed
     }
-
-    /// Draws all of it on a mask and its marks, as the person `by`.
-    pub fn apply(&self, mask: &mut Mask, marks: &mut Marks, ground: Ground<'_>, by: Provenance) -> Option<Rect> {
-        let mut touched = Mask::filled(mask.width(), mask.height(), false);
-        let rect = self.touch(&mut touched, ground, 0)?;
-        marks.paint(mask, (&touched, rect), self.paint, ground.proposed, by);
-        Some(rect)
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::marks::Marks;
+    use super::super::provenance::Provenance;
     use super::*;
 
     fn imprint() -> DepthMap {
@@ -176,9 +168,10 @@ mod tests {
         let (imprint, before) = (imprint(), mask.clone());
         let paint = if add { Paint::Contact } else { Paint::Free };
         let mut marks = Marks::all(mask.size(), Provenance::Nothing);
-        let ground = Ground::new(&imprint);
-        let rect =
-            Drawing { tool, points: points.to_vec(), paint }.apply(mask, &mut marks, ground, Provenance::hand(""))?;
+        let mut touched = Mask::filled(mask.width(), mask.height(), false);
+        let drawing = Drawing { tool, points: points.to_vec(), paint };
+        let rect = drawing.touch(&mut touched, Ground::new(&imprint), 0)?;
+        marks.paint(mask, (&touched, rect), paint, None, Provenance::hand(""));
         let hand = marks.hand_checked();
         let kept = |i: usize| hand.as_slice()[i] || mask.as_slice()[i] == before.as_slice()[i];
         assert!((0..mask.len()).all(kept), "what was not painted stays");

@@ -118,7 +118,7 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
                 let one = &mut found[place];
                 for pad in lab::PADS {
                     if let (Some(mask), Some(truth)) = (&masks[pad], &truth[pad]) {
-                        one.ious.extend(agreement(mask, truth, lab_px_per_mm()).map(|found| found.iou));
+                        one.ious.extend(agreement(mask, truth, Rig::lab().depth_px_per_mm()).map(|found| found.iou));
                     }
                 }
                 let at = registered(case, &imprints, &masks);
@@ -135,10 +135,6 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
     args.json.write(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(true)
-}
-
-fn lab_px_per_mm() -> f64 {
-    Rig::lab().depth_px_per_mm()
 }
 
 fn apart_deg(a: PlanarPose, b: PlanarPose) -> f64 {

@@ -16,7 +16,6 @@ use crate::domain::turn::Turn;
 use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::engine::{EngineChoice, resolve};
-use crate::io::caught::caught;
 use crate::io::dataset::{Dataset, SourceKind};
 use crate::work::bundles::{self, BundleInfo, BundleKind};
 use crate::work::error::TaskError;
@@ -354,20 +353,6 @@ impl GeneratorMethod {
         let seed = self.config.seed;
         let wanted: Vec<Wanted<'_>> =
             images.iter().map(|difference| Wanted { difference, seed, size: [0, 0] }).collect();
-        let cx = cx.quiet();
-        let run = |wanted: &[Wanted<'_>]| {
-            let predict = || self.models.predict(&self.bundle, self.engine, &self.config, wanted, &cx);
-            caught(predict).unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message)))
-        };
-        let one = |image: &Wanted<'_>| {
-            let made = run(std::slice::from_ref(image))?.pop();
-            made.ok_or_else(|| TaskError::new(WHAT, "the generator gave no prediction"))
-        };
-        let made = match run(&wanted) {
-            Ok(made) => made.into_iter().map(Ok).collect(),
-            Err(err) if err.is_cancelled() => return None,
-            Err(_) => wanted.iter().map(one).collect::<Vec<_>>(),
-        };
-        (!cx.cancel.is_cancelled()).then_some(made)
+        self.models.predict_each(&self.bundle, self.engine, &self.config, &wanted, &cx.quiet())
     }
 }
