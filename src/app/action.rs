@@ -148,6 +148,7 @@ actions! {
     AdoptAutomatic, Mask, "Threshold to mask", "Makes the mask of the chosen automatic source the corrected one", [plain(K::T)];
     Propose, Mask, "Propose a mask", "Shows the mask of the chosen source over the one in force, to accept or to let through by brush; nothing changes before", [plain(K::G)];
     NextProposal, Mask, "Next proposal source", "Goes through what proposes masks: the automatic source, CAD distance, strokes, other masks", [shift(K::G)];
+    ProposeAll, Mask, "Propose for all listed", "Makes what the source proposes the mask of every pair in the list that is not marked done, flagged or skipped; hand work stays, and each pair can be undone", [];
     LetThrough, Mask, "Let the proposal through", "Tools let what is proposed through where they paint, or paint contact again", [shift(K::L)];
     TakeOver, Mask, "Take the other imprint's mask", "Copies the mask of the measured imprint to the predicted one, or the other way round; each keeps its own", [];
     ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)];
@@ -266,7 +267,7 @@ impl Action {
             Self::Refit => "statistics mean deviation shift",
             Self::AdoptAutomatic => "use copy automatic mask",
             Self::PaintIgnore => "unknown unsure void class",
-            Self::Propose | Self::NextProposal => "prelabel pre-label suggest auto cad",
+            Self::Propose | Self::NextProposal | Self::ProposeAll => "prelabel batch pre-label suggest auto cad",
             Self::Accept => "confirm take yes",
             Self::TakeOver => "copy mask across measured predicted",
             Self::ResetMask => "clear delete mask",

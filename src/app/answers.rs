@@ -20,6 +20,7 @@ use crate::work::bundles::BundleInfo;
 use crate::work::error::{TaskError, TaskErrorKind};
 use crate::work::evaluate::Evaluation;
 use crate::work::job::Progress;
+use crate::work::propose::Batch;
 use crate::work::sweep::Sweep;
 use crate::work::tool::UnitSet;
 use crate::work::train::Trained;
@@ -69,6 +70,8 @@ pub enum Answer {
     Evaluated(Ticket, Arc<Evaluation>),
     /// The dial was turned.
     Swept(Ticket, Arc<Sweep>),
+    /// Masks were proposed for many pairs.
+    ProposedAll(Ticket, Box<Batch>),
     /// A generator was fitted, and is this bundle where one was written.
     Adapted(Ticket, Arc<Adapted>, Option<Box<BundleInfo>>),
     /// A mask model was trained, and is this bundle.
@@ -163,6 +166,10 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::Swept(ticket, sweep) => {
             state.tasks.running.remove(&ticket);
             dial::arrived(state, ticket, sweep);
+        }
+        Answer::ProposedAll(ticket, batch) => {
+            state.tasks.running.remove(&ticket);
+            labels::proposed(state, ticket, &batch);
         }
         Answer::Adapted(ticket, adapted, bundle) => {
             state.tasks.running.remove(&ticket);

@@ -21,6 +21,7 @@ use crate::work::evaluate::{Evaluation, Setup};
 use crate::work::export::ExportChoice;
 use crate::work::figure::FigureSetup;
 use crate::work::labels::Deed;
+use crate::work::propose::BatchSetup;
 use crate::work::sweep::SweepSetup;
 use crate::work::train::TrainSetup;
 
@@ -133,6 +134,15 @@ pub enum Effect {
         /// Which one, and how.
         setup: Box<SweepSetup>,
     },
+    /// Propose masks for many pairs of the open data set.
+    ProposeAll {
+        /// The job.
+        ticket: Ticket,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// Which, and how.
+        setup: Box<BatchSetup>,
+    },
     /// Fit a generator to pairs, where the program keeps models.
     Adapt {
         /// The job.
@@ -218,6 +228,7 @@ impl std::fmt::Debug for Effect {
             Self::SetUnit { tool, unit, .. } => write!(f, "SetUnit({tool}, {unit:?})"),
             Self::Evaluate { ticket, .. } => write!(f, "Evaluate({ticket:?})"),
             Self::Sweep { ticket, .. } => write!(f, "Sweep({ticket:?})"),
+            Self::ProposeAll { ticket, .. } => write!(f, "ProposeAll({ticket:?})"),
             Self::Adapt { ticket, .. } => write!(f, "Adapt({ticket:?})"),
             Self::Train { ticket, .. } => write!(f, "Train({ticket:?})"),
             Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),

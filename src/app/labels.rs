@@ -1,8 +1,10 @@
 //! The room of the document: strokes, clean-ups, review states, accepted poses, undo, saving.
 
+mod batch;
 mod repeat;
 pub mod state;
 
+pub(super) use batch::proposed;
 pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
 pub use state::{Changed, Document, HandMask, MaskPlace, Merged, PairLabels, Repeating, Review, Stored, Stroke};
 
@@ -52,6 +54,8 @@ pub enum LabelsCommand {
     TakeOver,
     /// Makes the proposal that is shown the corrected mask; what was painted by hand stays, unless the preferences say.
     AcceptProposal,
+    /// Makes what the source proposes the mask of every pair in the list that nobody judged yet.
+    ProposeAll,
     /// Removes the corrected mask: the automatic source is in force again.
     ResetMask,
     /// Takes back the last change of what is on screen.
@@ -83,6 +87,7 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         LabelsCommand::AdoptAutomatic => adopt_automatic(state, effects),
         LabelsCommand::TakeOver => take_over(state, effects),
         LabelsCommand::AcceptProposal => accept_proposal(state, effects),
+        LabelsCommand::ProposeAll => batch::propose_all(state, effects),
         LabelsCommand::ResetMask => reset(state, effects),
         LabelsCommand::Undo => undo(state, effects),
         LabelsCommand::Redo => redo(state, effects),

@@ -35,6 +35,7 @@ use crate::work::label_stats::LabelStats;
 use crate::work::labels::{Deed, Labels, Past};
 use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
+use crate::work::propose::{self, Batch, BatchSetup};
 use crate::work::sweep::{self, Sweep, SweepSetup};
 use crate::work::tool::{UnitSet, set_unit};
 use crate::work::train::{self, TrainSetup, Trained};
@@ -267,6 +268,14 @@ pub trait Services: Send + Sync {
     /// As [`sweep::sweep`].
     fn sweep(&self, dataset: &Dataset, setup: &SweepSetup, cx: &JobCx) -> Result<Sweep, TaskError> {
         sweep::sweep(dataset, setup, &Models::new(None), cx)
+    }
+
+    /// Proposes masks for many pairs, and stores them.
+    ///
+    /// # Errors
+    /// As [`propose::propose_all`].
+    fn propose_all(&self, dataset: &Dataset, setup: &BatchSetup, cx: &JobCx) -> Result<Batch, TaskError> {
+        propose::propose_all(dataset, setup, &Models::new(None), cx)
     }
 
     /// Fits a generator to pairs; the new bundle, where one is kept.

@@ -5,7 +5,6 @@ mod report;
 
 use strum::IntoEnumIterator as _;
 
-use super::output::says;
 use super::predict::Predictor;
 use super::{Output, VerbResult, find_pair};
 use crate::domain::align::Ask;
@@ -13,18 +12,21 @@ use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::DepthMap;
-use crate::domain::hand::{AcceptedPose, HandPose};
-use crate::domain::label::{CadPose, Ground, Provenance};
+use crate::domain::hand::AcceptedPose;
+use crate::domain::label::{Ground, Provenance};
 use crate::domain::pose::ToolModel;
-use crate::domain::rig::PadId;
+use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
+use crate::work::error::TaskError;
 use crate::work::job::JobCx;
 use crate::work::label_stats::LabelStats;
-use crate::work::labels::{Deed, HandMask, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person};
+use crate::work::labels::{
+    Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person,
+};
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
-use crate::work::propose::{self, Proposal, ProposalSource, Side, accepted};
+use crate::work::propose::{self, Proposal, ProposeSetup, accepted};
 use crate::work::tool::load_tool;
 
 pub(super) use args::LabelArgs;
@@ -74,7 +76,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
 struct Touch<'a> {
     args: &'a LabelArgs,
     sample: Sample,
-    tool: anyhow::Result<ToolModel>,
+    tool: Result<ToolModel, TaskError>,
     predictor: Predictor,
 }
 
@@ -82,8 +84,8 @@ impl<'a> Touch<'a> {
     fn load(args: &'a LabelArgs, dataset: &Dataset, id: PairId) -> anyhow::Result<Self> {
         let entry = &dataset.index.pairs[id.0 as usize];
         let tool = match &entry.tool {
-            Some(name) => load_tool(dataset, name).map(|(tool, _)| tool).map_err(Into::into),
-            None => Err(anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name)),
+            Some(name) => load_tool(dataset, name).map(|(tool, _)| tool),
+            None => Err(TaskError::new("Label", format!("{}: no tool is named, so there is no CAD model", entry.name))),
         };
         Ok(Self { args, sample: dataset.load(id)?, tool, predictor: Predictor::new(&args.model, &dataset.rig) })
     }
@@ -97,91 +99,39 @@ impl<'a> Touch<'a> {
 
     fn pose(&mut self, imprint: ImprintSource, labels: &PairLabels) -> anyhow::Result<PlanarPose> {
         let contact = self.contact(imprint, self.args.mask.drawn(labels))?;
-        let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
+        let tool = self.tool.as_ref().map_err(Clone::clone)?;
         let (points, registration) = (contact.points(&self.sample)?, self.args.engine.method());
         Ok(pose(&points, tool, &*registration, Ask::default(), self.sample.grasp_from_object)?.grasp_from_object)
     }
 }
 
 impl Touch<'_> {
-    fn near_cad(
-        &self,
-        (at, pose): (CadPose, HandPose),
-        (imprint, pad): (&DepthMap, PadId),
-    ) -> anyhow::Result<Proposal> {
-        let tool = self.tool.as_ref().map_err(|err| anyhow::anyhow!("{}", says(err)))?;
-        let distances = propose::cad_distances((imprint, self.args.imprint), (&self.sample, pad), tool, pose)?;
-        Ok(propose::near_cad(&distances, self.args.mask.choice().cad_distance_m, at))
-    }
-
-    /// What `--propose` asks for, for a pad of the pair `id`; `found` has the imprints with the masks in force.
+    /// What `--propose` asks for, for a pad of the pair; `imprints` are those of `of`.
     fn proposal(
         &mut self,
-        (dataset, all, id): (&Dataset, &Labels, PairId),
-        found: &Contact,
+        (dataset, all, pair): (&Dataset, &Labels, PairId),
+        (imprints, of): (&PerPad<DepthMap>, &ImprintOf),
         pad: PadId,
         labels: &PairLabels,
     ) -> anyhow::Result<Proposal> {
-        let args = self.args;
-        let imprint = found.imprints[pad].as_ref().ok_or_else(|| anyhow::anyhow!("there is no imprint"))?;
-        Ok(match args.propose.unwrap_or_default() {
-            ProposalSource::Automatic => {
-                let made = self.contact(args.imprint, None)?;
-                let one = made.masks[pad].as_ref().ok_or_else(|| anyhow::anyhow!("there is no mask"))?;
-                let provenance = made.recipe.provenance(made.model.as_deref().unwrap_or_default(), one.basis);
-                Proposal { mask: one.mask.clone(), provenance, note: one.basis.note().unwrap_or_default() }
-            }
-            ProposalSource::CadTruth => {
-                let truth = self.sample.grasp_from_object;
-                let truth = truth.ok_or_else(|| anyhow::anyhow!("the true pose of this pair is not known"))?;
-                self.near_cad((CadPose::Truth, truth.into()), (imprint, pad))?
-            }
-            ProposalSource::CadHand => {
-                let pose = args.pose.ok_or_else(|| anyhow::anyhow!("name the pose with --pose DEG,MM,MM"))?;
-                self.near_cad((CadPose::Nudged(pose.into()), pose.into()), (imprint, pad))?
-            }
-            ProposalSource::CadRegistered => {
-                let pose = self.pose(args.imprint, labels)?;
-                self.near_cad((CadPose::Registered(pose), pose.into()), (imprint, pad))?
-            }
-            ProposalSource::Grow => {
-                let of = self.predictor.of(args.imprint)?;
-                propose::grown(imprint, labels.drawn(&MaskPlace { pad, of }, imprint))?
-            }
-            ProposalSource::Carry => {
-                let from = match &args.carry_from {
-                    Some(name) => find_pair(dataset, name)?,
-                    None => carried_from(dataset, all, id).ok_or_else(|| {
-                        anyhow::anyhow!("nobody worked on another pair of this tool yet: name one with --carry-from")
-                    })?,
-                };
-                let name = &dataset.index.pairs[from.0 as usize].name;
-                let (sample, labels) = (dataset.load(from)?, all.load(name)?);
-                let to = Side { sample: &self.sample, pad, imprint };
-                propose::carried_from_pair(name, (&sample, &labels), to)?
-            }
-            ProposalSource::OtherFinger => {
-                let other = dataset.rig.other_pad(pad);
-                let other = other.ok_or_else(|| anyhow::anyhow!("there is no other finger"))?;
-                let (Some(there), Some(mask)) = (&found.imprints[other], &found.masks[other]) else {
-                    anyhow::bail!("the other finger has no mask");
-                };
-                let side = |pad, imprint| Side { sample: &self.sample, pad, imprint };
-                let (from, to) = (side(other, there), side(pad, imprint));
-                propose::carried_across(&dataset.rig.pad_key(other), (from, &mask.mask), to)?
-            }
-        })
+        let (args, choice) = (self.args, self.args.mask.choice());
+        let carry_from = args.carry_from.as_ref().map(|name| find_pair(dataset, name)).transpose()?;
+        let setup = ProposeSetup {
+            source: args.propose.unwrap_or_default(),
+            imprint: args.imprint,
+            mask: choice,
+            mask_model: self.predictor.mask_model(&choice)?,
+            engine: self.predictor.engine(),
+            registration: args.engine,
+            hand: !args.mask.no_hand,
+            pose: args.pose.map(Into::into),
+            carry_from,
+        };
+        let (sample, tool) = (&self.sample, self.tool.as_ref());
+        let touch = propose::Touch { dataset, all, pair, sample, tool, imprints, of, labels };
+        let made = propose::propose(touch, &[pad], &setup, self.predictor.models())?.pop();
+        Ok(made.ok_or_else(|| anyhow::anyhow!("there is no imprint"))?.1?)
     }
-}
-
-/// The pair whose mask is carried to another: the nearest of the same tool that somebody worked on.
-fn carried_from(dataset: &Dataset, labels: &Labels, to: PairId) -> Option<PairId> {
-    let reviews = labels.reviews().states;
-    let begun = |name: &str| reviews.get(name).is_some_and(|review| propose::is_begun(*review));
-    let tool = dataset.index.pairs[to.0 as usize].tool.as_ref()?;
-    let pairs = dataset.index.pairs.iter().enumerate();
-    let pairs = pairs.filter(|(_, other)| other.tool.as_ref() == Some(tool) && begun(&other.name));
-    propose::nearest_before(to.0 as usize, pairs.map(|(at, _)| (at, PairId(at as u32))))
 }
 
 /// Makes the changes that the arguments name, masks first: an accepted pose is then of the new ones. The pair itself is
@@ -217,7 +167,7 @@ fn change(
                 };
                 let mut hand = args.from.map_or_else(|| start.clone(), |from| start.copied(from));
                 if args.propose.is_some() {
-                    let proposal = touch.proposal((dataset, all, id), &found, pad, labels)?;
+                    let proposal = touch.proposal((dataset, all, id), (&found.imprints, &of), pad, labels)?;
                     let imprint = found.imprints[pad].as_ref();
                     let drawn = imprint.and_then(|imprint| labels.drawn(&place(pad), imprint));
                     hand = accepted(drawn, &proposal, args.over_hand);

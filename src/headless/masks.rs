@@ -1,6 +1,7 @@
 //! `touch2touch masks`: contact masks as training folders, how far those of two people agree, which to look at first, and a
 //! mask model trained on them.
 
+mod propose;
 mod queue;
 mod stats;
 mod train;
@@ -34,6 +35,8 @@ pub(super) enum MasksVerb {
     Export(ExportArgs),
     /// Compare the masks of two people, the worst first.
     Compare(CompareMasksArgs),
+    /// Propose masks for many pairs at once. What was painted by hand stays, and every pair is still to be looked at.
+    Propose(Box<propose::ProposeArgs>),
     /// How many pairs of each tool are in which review state, and what the masks took: seconds, edits, repeats.
     Stats(stats::StatsArgs),
     /// List the pairs, the most uncertain masks first.
@@ -181,6 +184,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let args = match verb {
         MasksVerb::Export(args) => args,
         MasksVerb::Compare(args) => return compare(args),
+        MasksVerb::Propose(args) => return propose::run(args),
         MasksVerb::Stats(args) => return stats::run(args),
         MasksVerb::Queue(args) => return queue::run(args),
         MasksVerb::Train(args) => return train::run(args),

@@ -3,6 +3,9 @@
 //! Masks by threshold, share and mask model are those of [`super::mask`]; what comes here takes more than one imprint: a pose,
 //! strokes, another pair's mask.
 
+mod batch;
+mod touch;
+
 use std::borrow::Cow;
 
 use glam::DAffine3;
@@ -20,6 +23,9 @@ use crate::domain::label::{CadPose, Provenance, Surface, across, carry, grow_fro
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::{DepthCamera, PadTouch, Sample};
+
+pub use batch::{Batch, BatchSetup, propose_all};
+pub use touch::{ProposeSetup, Touch, propose};
 
 const WHAT: &str = "Propose a mask";
 

@@ -1,7 +1,7 @@
 //! Proposals: nothing changes before they are accepted, hand work stays, and the verb makes the same masks.
 
 use touch2touch::app::command::ViewCommand;
-use touch2touch::app::labels::HandMask;
+use touch2touch::app::labels::{HandMask, Review};
 use touch2touch::domain::label::{Paint, Provenance};
 use touch2touch::work::propose::ProposalSource;
 
@@ -213,4 +213,60 @@ fn two_windows_on_one_folder_lose_nothing_of_each_other() {
     // What was taken in is not taken back.
     anna.send(LabelsCommand::Undo.into());
     both(&stored());
+}
+
+#[test]
+fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_did() {
+    let (home, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (folder, copy) = (lab_folder(home.path()), lab_folder(second.path()));
+    let name =
+        |studio: &Studio, at: usize| studio.state.library.open.as_ref().unwrap().source.index().pairs[at].name.clone();
+    let mut studio = open(&folder, home.path());
+    let (first, judged) = (name(&studio, 0), name(&studio, 1));
+    let mask = MaskSettings { proposal: ProposalSource::CadTruth, radius_px: 3.0, ..MaskSettings::default() };
+    studio.send(SettingsCommand::SetMask(mask).into());
+    studio.send(LibraryCommand::Select(PairId(1)).into());
+    studio.send(LabelsCommand::SetReview(Review::Done).into());
+    studio.send(LibraryCommand::Select(PairId(0)).into());
+    strokes(&mut studio);
+    let painted = hand(&studio).unwrap();
+    studio.send(LabelsCommand::ProposeAll.into());
+    assert!(studio.state.batching().is_none());
+    let said = &studio.state.log.entries.back().unwrap().text;
+    assert!(said.contains("proposed in") && said.contains("1 pair judged before"), "{said}");
+
+    // On screen at once, hand work as it was, and one undo takes it back.
+    let made = hand(&studio).unwrap();
+    let checked = painted.marks.hand_checked();
+    assert!(!made.is_same(&painted) && checked.as_slice().contains(&true));
+    let kept = |(i, by_hand): (usize, &bool)| !by_hand || made.mask.as_slice()[i] == painted.mask.as_slice()[i];
+    assert!(checked.as_slice().iter().enumerate().all(kept), "what was painted stays");
+    let stored = |folder: &Path, name: &str| Labels::of(&Dataset::open(folder).unwrap()).load(name).unwrap();
+    assert_eq!(stored(&folder, &judged).masks.len(), 0, "a pair that somebody judged");
+    studio.send(LabelsCommand::Undo.into());
+    assert!(hand(&studio).unwrap().is_same(&painted), "undo");
+    studio.send(LabelsCommand::Redo.into());
+    assert!(hand(&studio).unwrap().is_same(&made), "redo");
+    let pairs = studio.state.library.open.as_ref().unwrap().source.index().pairs.len();
+    let names: Vec<String> = (0..pairs).map(|at| name(&studio, at)).collect();
+    drop(studio);
+
+    // The verb, over the same folder as it was.
+    let path = copy.to_str().unwrap();
+    json(&["label", path, "--pair", &judged, "--review", "done"], second.path());
+    let made = json(&["masks", "propose", path, "--source", "cad_truth"], second.path());
+    assert_eq!((made["judged"].as_u64(), made["complete"].as_bool()), (Some(1), Some(true)));
+    assert_eq!(made["changed"].as_array().unwrap().len(), pairs - 1);
+    for name in names.iter().filter(|name| **name != first) {
+        let (by_studio, by_verb) = (stored(&folder, name), stored(&copy, name));
+        assert_eq!(by_studio.review, by_verb.review, "{name}");
+        assert_eq!(by_studio.masks.len(), by_verb.masks.len(), "{name}");
+        for (place, mask) in &by_studio.masks {
+            assert!(mask.is_same(&by_verb.masks[place]), "{name}");
+        }
+    }
+    // A second time there is nothing to change.
+    let again = json(&["masks", "propose", path, "--source", "cad_truth"], second.path());
+    assert_eq!(again["masks"].as_u64(), Some(0));
+    assert_eq!(again["same"], made["masks"]);
 }

@@ -55,6 +55,7 @@ use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::figure::FigurePane;
 use touch2touch::work::job::{PreviewPicture, Progress};
+use touch2touch::work::propose::Batch;
 use touch2touch::work::queue::QueueBy;
 use touch2touch::work::subject::Subject;
 use touch2touch::work::sweep::{Dial, Setting};
@@ -378,6 +379,7 @@ draws! {
         2 AdoptAutomatic,
         1 TakeOver,
         3 AcceptProposal,
+        1 ProposeAll,
         1 ResetMask,
         3 Undo,
         3 Redo,
@@ -540,6 +542,9 @@ draws! {
         1 JobFailed(error()),
         1 Evaluated(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(evaluation()))),
         1 Swept(ticket(), Just(()).prop_map(|()| Arc::new(swept()))),
+        1 ProposedAll(ticket(), select(vec!["tool_a/data_0", "elsewhere"]).prop_map(|name| {
+            Box::new(Batch { masks: 1, changed: vec![name.to_owned()], ..Batch::default() })
+        })),
         1 Adapted(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(adapted())), Just(None)),
         1 Trained(ticket(), Just(()).prop_map(|()| Arc::new(trained())), Just(()).prop_map(|()| {
             Box::new(Double::new(false, true).find_bundles(&[]).0.remove(1))

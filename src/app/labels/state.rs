@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::super::keys::{ImprintSource, Revision};
+use super::super::tasks::state::Ticket;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::label::{DrawTool, Drawing, Ground, Provenance};
 use crate::work::error::TaskError;
@@ -44,6 +45,8 @@ pub struct Document {
     pub(in crate::app) marked: bool,
     /// What was counted last.
     pub stats: Option<Arc<LabelStats>>,
+    /// Masks being proposed for many pairs.
+    pub(in crate::app) batch: Option<Ticket>,
     /// Pairs whose last change is not on the disk yet.
     pub unsaved: BTreeSet<String>,
     /// The last request to write each of them.

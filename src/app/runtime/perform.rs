@@ -170,6 +170,16 @@ impl Runtime {
                 });
                 self.task(Lane::Batch, ticket, "Dial".into(), body);
             }
+            Effect::ProposeAll { ticket, source, setup } => {
+                let services = self.services.clone();
+                let body = Box::new(move |cx: &JobCx| {
+                    let dataset = source.as_dataset().ok_or_else(|| {
+                        TaskError::new("Propose masks", "this kind of source cannot be read outside the studio")
+                    })?;
+                    Ok(Answer::ProposedAll(ticket, Box::new(services.propose_all(dataset, &setup, cx)?)))
+                });
+                self.task(Lane::Batch, ticket, "Propose masks".into(), body);
+            }
             Effect::Adapt { ticket, source, setup } => {
                 let services = self.services.clone();
                 let body = Box::new(move |cx: &JobCx| {

@@ -41,6 +41,7 @@ use crate::work::labels::{Deed, Labels, Past, Reviews};
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::new_bundle::models_folder;
 use crate::work::prediction::Prediction;
+use crate::work::propose::{self, Batch, BatchSetup};
 use crate::work::sweep::{self, Sweep, SweepSetup};
 use crate::work::tool::tool_file;
 use crate::work::train::{TrainSetup, Trained, new_folder};
@@ -278,6 +279,10 @@ impl Services for LiveServices {
 
     fn sweep(&self, dataset: &Dataset, setup: &SweepSetup, cx: &JobCx) -> Result<Sweep, TaskError> {
         sweep::sweep(dataset, setup, &self.models, cx)
+    }
+
+    fn propose_all(&self, dataset: &Dataset, setup: &BatchSetup, cx: &JobCx) -> Result<Batch, TaskError> {
+        propose::propose_all(dataset, setup, &self.models, cx)
     }
 
     fn adapt(

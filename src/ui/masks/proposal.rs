@@ -5,12 +5,13 @@ use strum::IntoEnumIterator as _;
 
 use super::slider_mm;
 use crate::app::action::Action;
-use crate::app::command::SettingsCommand;
+use crate::app::command::{SettingsCommand, TasksCommand};
 use crate::app::settings::ProposalSource;
 use crate::app::state::Lookup;
 use crate::ui::cx::Cx;
 use crate::ui::images::PROPOSED;
 use crate::ui::theme::{SMALL, section};
+use crate::ui::widget::progress;
 use crate::work::propose::FARTHEST_M;
 
 /// Source, number, and the way to accept or reject.
@@ -48,8 +49,27 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     if cx.state.proposes() {
         said(cx, ui);
     }
+    for_all(cx, ui);
     if new != *settings {
         cx.push(SettingsCommand::SetMask(new));
+    }
+}
+
+/// The same for every pair in the list, with how far it is.
+fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
+    if let Some((ticket, task)) = cx.state.batching() {
+        let (fraction, cancelling) = (task.progress.fraction(), task.cancelling);
+        let text = if cancelling { "stopping" } else { task.progress.text.as_str() };
+        ui.horizontal(|ui| {
+            progress::bar(ui, (ui.available_width() - 70.0).clamp(60.0, 300.0), fraction, text);
+            let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
+            if cancel.on_hover_text("Stop; the pairs that were done until then keep their masks").clicked() {
+                cx.push(TasksCommand::Cancel(ticket));
+            }
+        });
+    } else {
+        let pairs = cx.state.library.order.len();
+        cx.action_button(ui, Action::ProposeAll, &format!("Propose for {pairs} listed"));
     }
 }
 

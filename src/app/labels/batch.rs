@@ -1,0 +1,89 @@
+//! Proposals for all pairs of the list at once.
+
+use super::super::effect::Effect;
+use super::super::state::State;
+use super::super::tasks::state::{Level, Task, Ticket};
+use super::end_stroke;
+use crate::work::bundles::BundleKind;
+use crate::work::labels::ImprintSource;
+use crate::work::propose::{Batch, BatchSetup, ProposeSetup};
+
+impl State {
+    /// What proposing masks for the listed pairs would do.
+    ///
+    /// # Errors
+    /// Why it cannot be done, in words.
+    pub fn batch_setup(&self) -> Result<BatchSetup, String> {
+        if self.library.open.is_none() || self.library.order.is_empty() {
+            return Err("There are no pairs in the list".into());
+        }
+        let imprint = self.worked_on(self.selection.finger);
+        let generator = match (imprint, self.bundle(BundleKind::Generator)) {
+            (ImprintSource::Measured, _) => None,
+            (ImprintSource::Predicted, Ok(bundle)) => Some((bundle.clone(), self.settings.generate.config(bundle))),
+            (ImprintSource::Predicted, Err(_)) => return Err("There is no generator to predict with".into()),
+        };
+        let mask = &self.settings.mask;
+        Ok(BatchSetup {
+            propose: ProposeSetup {
+                source: mask.proposal,
+                imprint,
+                mask: mask.choice,
+                mask_model: self.bundle(BundleKind::Mask).ok().cloned(),
+                engine: self.settings.runtime,
+                registration: self.settings.pose_engine,
+                hand: true,
+                pose: None,
+                carry_from: None,
+            },
+            pairs: self.library.order.clone(),
+            generator,
+            shift: self.settings.shift,
+            over_hand: mask.over_hand,
+            person: Some(self.person()).filter(|name| !name.is_empty()),
+        })
+    }
+
+    /// The proposing for many pairs that is under way.
+    pub fn batching(&self) -> Option<(Ticket, &Task)> {
+        let ticket = self.document.batch?;
+        Some((ticket, self.tasks.running.get(&ticket)?))
+    }
+}
+
+/// Starts it.
+pub(super) fn propose_all(state: &mut State, effects: &mut Vec<Effect>) {
+    end_stroke(state, effects);
+    if state.batching().is_some() {
+        return;
+    }
+    let (Ok(setup), Some(open)) = (state.batch_setup(), &state.library.open) else { return };
+    let source = open.source.clone();
+    let ticket = state.tasks.start(format!("Propose masks for {} pairs", setup.pairs.len()), Vec::new());
+    state.document.batch = Some(ticket);
+    effects.push(Effect::ProposeAll { ticket, source, setup: Box::new(setup) });
+}
+
+/// Has the masks that were proposed read again where they are looked at. What was done to those pairs is in their journals,
+/// so that undo takes the proposals back too.
+pub(in crate::app) fn proposed(state: &mut State, ticket: Ticket, batch: &Batch) {
+    if state.document.batch.take_if(|running| *running == ticket).is_none() {
+        return;
+    }
+    for name in &batch.changed {
+        let doc = &mut state.document;
+        let drawn_on = doc.stroke.as_ref().is_some_and(|stroke| stroke.pair == *name);
+        // What is on its way to the disk is merged there, and comes back merged.
+        if drawn_on || doc.unsaved.contains(name) || doc.repeats.contains_key(name) {
+            continue;
+        }
+        doc.labels.remove(name);
+        doc.stored.remove(name);
+        doc.changed = None;
+        state.history.forget(name);
+    }
+    state.selection.proposing &= batch.masks == 0;
+    let level = if batch.left_out.is_empty() { Level::Info } else { Level::Warning };
+    let why = batch.left_out.first().map(|first| format!("the first: {}: {}", first.name, first.why));
+    state.log.push(level, batch.text(), why, None);
+}

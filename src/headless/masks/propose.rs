@@ -1,0 +1,94 @@
+//! `touch2touch masks propose`: masks proposed for many pairs at once.
+
+use clap::Args;
+
+use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser, keyed};
+use super::super::contact_mask::MaskArgs;
+use super::super::predict::{ModelArgs, Predictor};
+use super::super::{Common, Output, ToolArgs, VerbResult, find_pair};
+use crate::domain::dataset::PairId;
+use crate::domain::pose::RegistrationChoice;
+use crate::work::labels::ImprintSource;
+use crate::work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
+
+/// Arguments of `masks propose`.
+#[derive(Debug, Args)]
+pub(in super::super) struct ProposeArgs {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// What proposes. `cad_hand` takes the poses that were set by hand and accepted.
+    #[arg(long, default_value = ProposalSource::default().key(), value_parser = keyed::<ProposalSource>())]
+    source: ProposalSource,
+    /// The imprints that masks are proposed for.
+    #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
+    imprint: ImprintSource,
+    /// Replace what was painted by hand as well. Pairs marked "done", "flagged" or "skip" stay as they are all the same.
+    #[arg(long)]
+    over_hand: bool,
+    /// Only pairs of this tool.
+    #[arg(long, value_name = "TOOL")]
+    of_tool: Option<String>,
+    /// The pair whose masks are carried; else for each pair the nearest one before of the same tool that somebody worked on.
+    #[arg(long, value_name = "PAIR")]
+    carry_from: Option<String>,
+    /// The registration of `cad_registered`.
+    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    engine: RegistrationChoice,
+    /// Who labels; else whom the system says.
+    #[arg(long, value_name = "NAME")]
+    person: Option<String>,
+    #[command(flatten)]
+    mask: MaskArgs,
+    #[command(flatten)]
+    tool: ToolArgs,
+    #[command(flatten)]
+    model: ModelArgs,
+    #[command(flatten)]
+    limit: LimitArgs,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(args: &ProposeArgs) -> VerbResult {
+    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let is_meant = |entry: &crate::domain::dataset::PairEntry| {
+        args.of_tool.as_ref().is_none_or(|tool| entry.tool.as_ref() == Some(tool))
+    };
+    let meant: Vec<u32> = (0u32..).zip(&dataset.index.pairs).filter(|(_, e)| is_meant(e)).map(|(at, _)| at).collect();
+    if meant.is_empty() {
+        let tool = args.of_tool.as_deref().unwrap_or_default();
+        anyhow::bail!("there are no pairs of the tool \"{tool}\"; `touch2touch doctor` lists what the data set has");
+    }
+    let pairs: Vec<PairId> = args.limit.spread(meant.len()).into_iter().map(|at| PairId(meant[at])).collect();
+    let output = Output::new(args.common, "proposing", pairs.len());
+    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let choice = args.mask.choice();
+    let generator = match args.imprint {
+        ImprintSource::Measured => None,
+        ImprintSource::Predicted => Some((predictor.bundle()?.clone(), predictor.config()?)),
+    };
+    let setup = BatchSetup {
+        propose: ProposeSetup {
+            source: args.source,
+            imprint: args.imprint,
+            mask: choice,
+            mask_model: predictor.mask_model(&choice)?,
+            engine: predictor.engine(),
+            registration: args.engine,
+            hand: !args.mask.no_hand,
+            pose: None,
+            carry_from: args.carry_from.as_ref().map(|name| find_pair(&dataset, name)).transpose()?,
+        },
+        pairs,
+        generator,
+        shift: predictor.shift(),
+        over_hand: args.over_hand,
+        person: args.person.clone(),
+    };
+    let found = propose_all(&dataset, &setup, predictor.models(), &output.job())?;
+    for remark in &found.left_out {
+        output.note(&format!("left out: {}: {}", remark.name, remark.why));
+    }
+    output.finish(&found, || found.text())?;
+    Ok(found.complete && found.left_out.is_empty())
+}
