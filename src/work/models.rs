@@ -190,11 +190,11 @@ impl Models {
         let what = || format!("Generate with {}", bundle.name);
         let run = |wanted: &[Wanted<'_>]| {
             let predict = || self.predict(bundle, engine, config, wanted, cx);
-            caught(predict).unwrap_or_else(|message| Err(TaskError::panicked(&what(), &message)))
+            caught(predict).unwrap_or_else(|message| Err(TaskError::panicked(what(), &message)))
         };
         let one = |wanted: &Wanted<'_>| {
             let made = run(std::slice::from_ref(wanted))?.pop();
-            made.ok_or_else(|| TaskError::new(&what(), "the generator gave no prediction"))
+            made.ok_or_else(|| TaskError::new(what(), "the generator gave no prediction"))
         };
         let made = match run(wanted) {
             Ok(made) => made.into_iter().map(Ok).collect(),

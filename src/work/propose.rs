@@ -25,7 +25,7 @@ use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::{DepthCamera, PadTouch, Sample};
 
 pub use batch::{Batch, BatchSetup, propose_all};
-pub use touch::{ProposeSetup, Touch, propose};
+pub use touch::{Proposals, ProposeSetup, Touch, propose};
 
 const WHAT: &str = "Propose a mask";
 

@@ -175,7 +175,7 @@ impl Job<'_> {
                 batch.same += 1;
                 continue;
             }
-            stored.draw(&place, Some(hand));
+            stored.put(&place, Some(hand));
             how.push(proposal.provenance);
             new += 1;
         }

@@ -65,6 +65,9 @@ pub struct Touch<'a> {
     pub labels: &'a PairLabels,
 }
 
+/// What is proposed for some pads, or why nothing is.
+pub type Proposals = Vec<(PadId, Result<Proposal, TaskError>)>;
+
 /// What is proposed for each of `pads`.
 ///
 /// # Errors
@@ -74,7 +77,7 @@ pub fn propose(
     pads: &[PadId],
     setup: &ProposeSetup,
     models: &Models,
-) -> Result<Vec<(PadId, Result<Proposal, TaskError>)>, TaskError> {
+) -> Result<Proposals, TaskError> {
     let lacks = |why: &str| TaskError::new(WHAT, why);
     let Touch { sample, imprints, labels, .. } = touch;
     let contact = |labels: Option<&PairLabels>| -> Result<Contact, TaskError> {
