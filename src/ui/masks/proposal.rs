@@ -68,8 +68,10 @@ fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         });
     } else {
-        let pairs = cx.state.library.order.len();
-        cx.action_button(ui, Action::ProposeAll, &format!("Propose for {pairs} listed"));
+        // Said here as well: the box that sets it is on screen only with a proposal.
+        let over = if cx.state.settings.mask.over_hand { ", over hand work" } else { "" };
+        let text = format!("Propose for {} listed{over}", cx.state.library.order.len());
+        cx.action_button(ui, Action::ProposeAll, &text);
     }
 }
 
