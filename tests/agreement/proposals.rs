@@ -3,7 +3,11 @@
 use touch2touch::app::command::ViewCommand;
 use touch2touch::app::labels::{HandMask, Review};
 use touch2touch::domain::label::{Paint, Provenance};
-use touch2touch::work::propose::ProposalSource;
+use touch2touch::domain::pose::RegistrationChoice;
+use touch2touch::infer::engine::EngineChoice;
+use touch2touch::work::job::{Cancel, JobCx};
+use touch2touch::work::models::Models;
+use touch2touch::work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
 
 use super::*;
 
@@ -270,4 +274,47 @@ fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_
     let again = json(&["masks", "propose", path, "--source", "cad_truth"], second.path());
     assert_eq!(again["masks"].as_u64(), Some(0));
     assert_eq!(again["same"], made["masks"]);
+}
+
+#[test]
+fn proposing_for_many_stops_between_pairs_and_keeps_what_was_done() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let dataset = Dataset::open(&folder).unwrap();
+    let setup = BatchSetup {
+        propose: ProposeSetup {
+            source: ProposalSource::Automatic,
+            imprint: MEASURED,
+            mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
+            mask_model: None,
+            engine: EngineChoice::default(),
+            registration: RegistrationChoice::default(),
+            hand: true,
+            pose: None,
+            carry_from: None,
+        },
+        pairs: (0..dataset.index.pairs.len() as u32).map(PairId).collect(),
+        generator: None,
+        shift: ShiftMode::ExactInverse,
+        over_hand: false,
+        person: None,
+    };
+    let labeled = || {
+        let labels = Labels::of(&dataset);
+        dataset.index.pairs.iter().filter(|pair| !labels.load(&pair.name).unwrap().masks.is_empty()).count()
+    };
+    let before = Cancel::default();
+    before.cancel();
+    let stopped = propose_all(&dataset, &setup, &Models::new(None), &JobCx::new(before, Arc::new(|_| {})));
+    assert!(stopped.unwrap_err().is_cancelled());
+    assert_eq!(labeled(), 0);
+    // The first pair is under way when it is told to stop: that one is finished.
+    let cancel = Cancel::default();
+    let at_once = cancel.clone();
+    let cx = JobCx::new(cancel, Arc::new(move |_| at_once.cancel()));
+    let found = propose_all(&dataset, &setup, &Models::new(None), &cx).unwrap();
+    assert!(!found.complete && found.text().ends_with("stopped early"), "{}", found.text());
+    assert_eq!((found.changed.len(), labeled()), (1, 1));
+    let none = BatchSetup { pairs: Vec::new(), ..setup };
+    assert!(propose_all(&dataset, &none, &Models::new(None), &JobCx::unwatched()).is_err());
 }
