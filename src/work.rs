@@ -35,6 +35,7 @@ pub mod models;
 pub mod new_bundle;
 pub mod pair_files;
 pub mod pose;
+pub mod predict;
 pub mod prediction;
 pub mod propose;
 pub mod queue;

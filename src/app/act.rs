@@ -148,9 +148,7 @@ impl Action {
                 does(SettingsCommand::SetPaint(if on { Paint::Contact } else { Paint::Ignore }))
             }
             Self::Propose => when(selected, ViewCommand::Propose(!state.selection.proposing)),
-            Self::ProposeAll => {
-                when(state.batching().is_none() && state.batch_setup().is_ok(), LabelsCommand::ProposeAll)
-            }
+            Self::ProposeAll => when(state.can_propose_all(), LabelsCommand::ProposeAll),
             Self::NextProposal => {
                 let next = next_of(&settings.mask.proposal).unwrap_or_default();
                 does(SettingsCommand::SetMask(MaskSettings { proposal: next, ..settings.mask.clone() }))

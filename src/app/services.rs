@@ -50,6 +50,14 @@ pub trait DataSource: Send + Sync {
     fn as_dataset(&self) -> Option<&Dataset> {
         None
     }
+    /// The same for the job `what`.
+    ///
+    /// # Errors
+    /// If there is no such thing.
+    fn on_disk(&self, what: &str) -> Result<&Dataset, TaskError> {
+        let why = "this kind of source cannot be read outside the studio";
+        self.as_dataset().ok_or_else(|| TaskError::new(what, why))
+    }
     /// The case that it is, with its pair, if it was opened from one.
     fn case(&self) -> Option<(PairId, &Case)> {
         None

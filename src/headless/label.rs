@@ -106,14 +106,14 @@ impl<'a> Touch<'a> {
 }
 
 impl Touch<'_> {
-    /// What `--propose` asks for, for a pad of the pair; `imprints` are those of `of`.
-    fn proposal(
+    /// What `--propose` asks for, for pads of the pair; `imprints` are those of `of`.
+    fn proposals(
         &mut self,
         (dataset, all, pair): (&Dataset, &Labels, PairId),
         (imprints, of): (&PerPad<DepthMap>, &ImprintOf),
-        pad: PadId,
+        pads: &[PadId],
         labels: &PairLabels,
-    ) -> anyhow::Result<Proposal> {
+    ) -> anyhow::Result<PerPad<Proposal>> {
         let (args, choice) = (self.args, self.args.mask.choice());
         let carry_from = args.carry_from.as_ref().map(|name| find_pair(dataset, name)).transpose()?;
         let setup = ProposeSetup {
@@ -129,8 +129,11 @@ impl Touch<'_> {
         };
         let (sample, tool) = (&self.sample, self.tool.as_ref());
         let touch = propose::Touch { dataset, all, pair, sample, tool, imprints, of, labels };
-        let made = propose::propose(touch, &[pad], &setup, self.predictor.models())?.pop();
-        Ok(made.ok_or_else(|| anyhow::anyhow!("there is no imprint"))?.1?)
+        let mut out = PerPad::default();
+        for (pad, made) in propose::propose(touch, pads, &setup, self.predictor.models())? {
+            out[pad] = Some(made?);
+        }
+        Ok(out)
     }
 }
 
@@ -154,7 +157,12 @@ fn change(
         if !args.remove_mask {
             let by = || Provenance::hand(args.person.clone().or_else(system_person).unwrap_or_default());
             let found = touch.contact(args.from.unwrap_or(args.imprint), (!args.adopt).then_some(&*labels))?;
-            for pad in pads {
+            let felt: Vec<PadId> = pads.into_iter().filter(|pad| found.masks[*pad].is_some()).collect();
+            let proposed = match args.propose {
+                Some(_) => touch.proposals((dataset, all, id), (&found.imprints, &of), &felt, labels)?,
+                None => PerPad::default(),
+            };
+            for pad in felt {
                 let Some(one) = &found.masks[pad] else { continue };
                 let drawn = match args.from {
                     Some(from) => labels.masks.get(&MaskPlace { pad, of: touch.predictor.of(from)? }),
@@ -166,11 +174,10 @@ fn change(
                     None => HandMask::new(one.mask.clone(), found.recipe.provenance(model, one.basis)),
                 };
                 let mut hand = args.from.map_or_else(|| start.clone(), |from| start.copied(from));
-                if args.propose.is_some() {
-                    let proposal = touch.proposal((dataset, all, id), (&found.imprints, &of), pad, labels)?;
+                if let Some(proposal) = &proposed[pad] {
                     let imprint = found.imprints[pad].as_ref();
                     let drawn = imprint.and_then(|imprint| labels.drawn(&place(pad), imprint));
-                    hand = accepted(drawn, &proposal, args.over_hand);
+                    hand = accepted(drawn, proposal, args.over_hand);
                 }
                 if let Some(imprint) = &found.imprints[pad] {
                     for drawing in &args.draw {

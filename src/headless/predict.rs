@@ -19,11 +19,12 @@ use crate::infer::engine::{EngineChoice, resolve};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
 use crate::work::error::TaskError;
-use crate::work::imprint::{self, chain_of, imprint_of};
+use crate::work::imprint::{self, chain_of, imprints_of};
 use crate::work::job::JobCx;
 use crate::work::labels::{ImprintOf, ImprintSource};
 use crate::work::mask::{Contact, MaskChoice, MaskInputs, MaskSource};
 use crate::work::models::{Masking, Models, Wanted};
+use crate::work::predict::Generating;
 use crate::work::prediction::Prediction;
 use crate::work::tuning::unfinished_folder;
 
@@ -219,15 +220,6 @@ impl Predictor {
         Ok(chain_of(&chains, &bundle.id, mode)?)
     }
 
-    /// The touches of a sample that the generator can start from, with the picture that it takes.
-    pub(super) fn conditions<'a>(&mut self, sample: &'a Sample) -> anyhow::Result<Vec<(PadId, Cow<'a, RgbGrid>)>> {
-        let mut found = Vec::new();
-        for (pad, touch) in sample.pads.entries() {
-            found.extend(self.condition(touch)?.map(|picture| (pad, picture)));
-        }
-        Ok(found)
-    }
-
     /// The imprints of a pair (meters, raw orientation): measured, or predicted from what the generator starts from.
     pub(super) fn imprints(
         &mut self,
@@ -253,23 +245,13 @@ impl Predictor {
 
     /// The predictions of a pair's touches, all in one batch.
     pub(super) fn predictions(&mut self, sample: &Sample, cx: &JobCx) -> anyhow::Result<PerPad<Prediction>> {
-        let conditions = self.conditions(sample)?;
-        let pictures: Vec<&RgbGrid> = conditions.iter().map(|(_, picture)| &**picture).collect();
-        let made = self.predict(&pictures, cx)?;
-        let mut out: PerPad<Prediction> = sample.rig.pads().map(|_| None).collect();
-        for ((finger, _), made) in conditions.iter().zip(made) {
-            out[*finger] = Some(made);
-        }
-        Ok(out)
+        let (config, engine, bundle) = (self.config()?, self.engine(), self.bundle()?.clone());
+        Ok(Generating { bundle: &bundle, engine, config: &config }.pair(&self.models, sample, cx)?)
     }
 
     /// Predictions of a pair's touches in meters, as large as its imprints.
     pub(super) fn in_meters(&self, sample: &Sample, made: &PerPad<Prediction>) -> anyhow::Result<PerPad<DepthMap>> {
-        let mut out: PerPad<DepthMap> = sample.rig.pads().map(|_| None).collect();
-        for (finger, made) in made.entries() {
-            out[finger] = Some(imprint_of(made, self.shift(), sample, finger)?);
-        }
-        Ok(out)
+        Ok(imprints_of(made, self.shift(), sample)?)
     }
 
     /// The mask model, looked for where the choice takes one; `None` where none is found and none was named.

@@ -10,7 +10,7 @@ use super::thumbnail;
 use super::widget::{curves, empty, progress};
 use crate::app::action::Action;
 use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
-use crate::app::command::{AdaptCommand, Pane, TasksCommand};
+use crate::app::command::{AdaptCommand, Pane};
 use crate::domain::units::{fixed, mm};
 use crate::work::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
 
@@ -142,13 +142,8 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         match cx.state.adapting() {
             Some((ticket, task)) => {
-                let (fraction, text, cancelling) =
-                    (task.progress.fraction(), task.progress.text.clone(), task.cancelling);
-                progress::bar(ui, (ui.available_width() - 70.0).clamp(80.0, 360.0), fraction, &text);
-                let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
-                if cancel.on_hover_text("Stop; the same fit goes on from here when it is asked for again").clicked() {
-                    cx.push(TasksCommand::Cancel(ticket));
-                }
+                let tip = "Stop; the same fit goes on from here when it is asked for again";
+                progress::stoppable(cx, ui, (ticket, task), 360.0, (&task.progress.text, tip));
             }
             None => {
                 cx.action_button(ui, Action::FitPairs, "Fit to my pairs");

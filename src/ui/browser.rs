@@ -14,7 +14,7 @@ use super::widget::cut::cut_in_the_middle;
 use super::widget::texture::depth_image;
 use super::widget::{empty, progress};
 use crate::app::action::Action;
-use crate::app::command::{Command, LibraryCommand, Pane, TasksCommand};
+use crate::app::command::{Command, LibraryCommand, Pane};
 use crate::app::evaluate::{ScoreChoice, SourceScores, Standing};
 use crate::app::labels::Review;
 use crate::app::library::{Place, Sort, short_name};
@@ -339,17 +339,9 @@ pub(super) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
     let total = cx.state.library.pairs().len();
     ui.horizontal_wrapped(|ui| match cx.state.evaluating() {
         Some((ticket, task)) => {
-            let (fraction, cancelling) = (task.progress.fraction(), task.cancelling);
-            let text = if cancelling {
-                "stopping".to_owned()
-            } else {
-                format!("{} of {}", task.progress.done, task.progress.total)
-            };
-            progress::bar(ui, (ui.available_width() - 64.0).clamp(60.0, 260.0), fraction, &text);
-            let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
-            if cancel.on_hover_text("Stop; what was scored until then is kept").clicked() {
-                cx.push(TasksCommand::Cancel(ticket));
-            }
+            let text = format!("{} of {}", task.progress.done, task.progress.total);
+            let what = (text.as_str(), "Stop; what was scored until then is kept");
+            progress::stoppable(cx, ui, (ticket, task), 260.0, what);
         }
         None => {
             cx.action_button(ui, Action::PredictAll, "Predict all");

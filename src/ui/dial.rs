@@ -9,7 +9,7 @@ use super::cx::{Cx, side_color};
 use super::theme::{SMALL, caption};
 use super::widget::{empty, progress};
 use crate::app::action::Action;
-use crate::app::command::{DialCommand, Pane, TasksCommand};
+use crate::app::command::{DialCommand, Pane};
 use crate::app::dial::DialPairs;
 use crate::app::keys::ImprintSource;
 use crate::work::sweep::{Dial, MOST_VALUES, Series, Sweep};
@@ -95,13 +95,8 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         match cx.state.turning() {
             Some((ticket, task)) => {
-                let (fraction, cancelling) = (task.progress.fraction(), task.cancelling);
-                let text = if cancelling { "stopping" } else { task.progress.text.as_str() };
-                progress::bar(ui, (ui.available_width() - 70.0).clamp(80.0, 300.0), fraction, text);
-                let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
-                if cancel.on_hover_text("Stop, and show the pairs that were done until then").clicked() {
-                    cx.push(TasksCommand::Cancel(ticket));
-                }
+                let tip = "Stop, and show the pairs that were done until then";
+                progress::stoppable(cx, ui, (ticket, task), 300.0, (&task.progress.text, tip));
             }
             None => {
                 cx.action_button(ui, Action::TurnDial, "Run");

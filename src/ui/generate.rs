@@ -7,7 +7,7 @@ use super::cx::Cx;
 use super::theme::{SMALL, caption, section, value};
 use super::widget::progress;
 use crate::app::action::Action;
-use crate::app::command::{Pane, PredictCommand, SettingsCommand, TasksCommand};
+use crate::app::command::{Pane, PredictCommand, SettingsCommand};
 use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode, VersusKey, shift_tooltip};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::domain::diffusion::GUIDANCE;
@@ -177,18 +177,9 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
     let width = ui.available_width();
     match running {
         Some((ticket, task)) => {
-            let (ticket, fraction, text) = (ticket, task.progress.fraction(), task.progress.text.clone());
-            let text = if text.is_empty() { "starting".to_owned() } else { text };
-            ui.horizontal(|ui| {
-                progress::bar(ui, width - 76.0, fraction, &text);
-                let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
-                if cancel
-                    .on_hover_text(cx.keys().behind("Stop generating; what is shown stays", Action::CancelJobs))
-                    .clicked()
-                {
-                    cx.push(TasksCommand::Cancel(ticket));
-                }
-            });
+            let text = if task.progress.text.is_empty() { "starting" } else { &task.progress.text };
+            let tip = cx.keys().behind("Stop generating; what is shown stays", Action::CancelJobs);
+            ui.horizontal(|ui| progress::stoppable(cx, ui, (ticket, task), f32::INFINITY, (text, &tip)));
         }
         None => {
             let can = cx.state.can_generate();

@@ -15,7 +15,7 @@ use super::theme::{SMALL, caption, medium, pane_frame, section};
 use super::widget::progress;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
-use crate::app::command::{Command, Pane, SettingsCommand, TasksCommand, ViewCommand};
+use crate::app::command::{Command, Pane, SettingsCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode, shift_tooltip};
 use crate::app::state::Lookup;
 use crate::domain::colormap::{ColorMap, Range};
@@ -115,14 +115,8 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
     let running = cx.state.tasks.running.iter().find(|(_, task)| task.title.starts_with("Shift statistics"));
     match running {
         Some((ticket, task)) => {
-            let (ticket, fraction, text) = (*ticket, task.progress.fraction(), task.progress.text.clone());
-            ui.horizontal(|ui| {
-                progress::bar(ui, ui.available_width() - 84.0, fraction, &text);
-                let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
-                if cancel.on_hover_text("Stop computing shift statistics").clicked() {
-                    cx.push(TasksCommand::Cancel(ticket));
-                }
-            });
+            let what = (task.progress.text.as_str(), "Stop computing shift statistics");
+            ui.horizontal(|ui| progress::stoppable(cx, ui, (*ticket, task), f32::INFINITY, what));
         }
         None => {
             cx.action_button(ui, Action::Refit, "Refit on this data set");

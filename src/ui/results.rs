@@ -8,7 +8,7 @@ use super::cx::Cx;
 use super::theme::{SMALL, caption, medium, section};
 use super::widget::{empty, progress};
 use crate::app::action::Action;
-use crate::app::command::{Command, Pane, TasksCommand};
+use crate::app::command::{Command, Pane};
 use crate::app::evaluate::{EvaluateCommand, GRASPS};
 use crate::domain::evaluation::{Column, Group, Row, TableMetrics, columns};
 
@@ -88,18 +88,13 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         match cx.state.evaluating() {
             Some((ticket, task)) => {
-                let (fraction, cancelling) = (task.progress.fraction(), task.cancelling);
-                let done = format!("{} of {}", task.progress.done, task.progress.total);
-                let text = match (cancelling, fraction) {
-                    (true, _) => "stopping".to_owned(),
-                    (false, Some(_)) => format!("{done} grasps   {}", task.progress.text),
-                    (false, None) => task.progress.text.clone(),
+                let now = &task.progress;
+                let text = match now.fraction() {
+                    Some(_) => format!("{} of {} grasps   {}", now.done, now.total, now.text),
+                    None => now.text.clone(),
                 };
-                progress::bar(ui, (ui.available_width() - 70.0).max(80.0), fraction, &text);
-                let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
-                if cancel.on_hover_text("Stop, and show what was scored until then").clicked() {
-                    cx.push(TasksCommand::Cancel(ticket));
-                }
+                let tip = "Stop, and show what was scored until then";
+                progress::stoppable(cx, ui, (ticket, task), f32::INFINITY, (&text, tip));
             }
             None => {
                 cx.action_button(ui, Action::EvaluateDataset, "Evaluate");

@@ -7,7 +7,7 @@ use super::cx::Cx;
 use super::theme::{SMALL, caption, section};
 use super::widget::{curves, progress};
 use crate::app::action::Action;
-use crate::app::command::{LibraryCommand, Pane, TasksCommand, TrainCommand};
+use crate::app::command::{LibraryCommand, Pane, TrainCommand};
 use crate::app::state::Lookup;
 use crate::app::train::{MINUTES, STEPS, TrainForm, state::MOST_HELD_OUT};
 use crate::work::bundles::BundleKind;
@@ -121,14 +121,8 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
         match cx.state.training() {
             Some((ticket, task)) => {
-                let (fraction, text) = (task.progress.fraction(), task.progress.text.clone());
-                let cancelling = task.cancelling;
-                progress::bar(ui, (ui.available_width() - 70.0).clamp(80.0, 360.0), fraction, &text);
-                let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
                 let tip = "Stop; the same training goes on from here when it is asked for again";
-                if cancel.on_hover_text(tip).clicked() {
-                    cx.push(TasksCommand::Cancel(ticket));
-                }
+                progress::stoppable(cx, ui, (ticket, task), 360.0, (&task.progress.text, tip));
             }
             None => {
                 cx.action_button(ui, Action::StartTraining, "Start training");

@@ -8,12 +8,13 @@ use serde::{Deserialize, Serialize};
 
 use super::bundles::{BundleInfo, BundleKind, FoundBundles};
 use super::error::TaskError;
-use super::imprint::{imprint_of, measured};
+use super::imprint::{imprints_of, measured};
 use super::job::JobCx;
 use super::labels::{Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, note};
 use super::mask::{MaskChoice, MaskInputs};
-use super::models::{Masking, Models, Wanted};
+use super::models::{Masking, Models};
 use super::pose::pose;
+use super::predict::Generating;
 use super::tool::load_tool;
 use crate::domain::align::Ask;
 use crate::domain::dataset::PairId;
@@ -24,7 +25,7 @@ use crate::domain::hand::AcceptedPose;
 use crate::domain::label::PackedMask;
 use crate::domain::pose::RegistrationChoice;
 use crate::domain::postprocess::ShiftMode;
-use crate::domain::rig::{PadId, PerPad};
+use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::domain::units::{angle_error, mm};
 use crate::infer::engine::EngineChoice;
@@ -216,16 +217,9 @@ fn results(
     let mut out = Vec::new();
     let mut sources = vec![(ImprintOf::Measured, measured(sample))];
     if let (Some(bundle), Some((_, config))) = (generator, &recipe.generator) {
-        let ends = bundle.ends(&sample.rig).transpose().map_err(|err| TaskError::from_error(WHAT, &err))?;
-        let input = ends.ok_or_else(|| TaskError::new(WHAT, format!("{} is no generator", bundle.name)))?.input;
-        let mut imprints = PerPad::default();
-        for (pad, touch) in sample.pads.entries() {
-            let Some(picture) = touch.picture(input) else { continue };
-            let wanted = [Wanted { difference: &picture, seed: config.seed, size: [0, 0] }];
-            let made = models.predict(bundle, recipe.runtime, config, &wanted, cx)?.pop();
-            let made = made.filter(|made| made.color.is_none());
-            imprints[pad] = made.map(|made| imprint_of(&made, recipe.shift, sample, pad)).transpose()?;
-        }
+        let made = Generating { bundle, engine: recipe.runtime, config }.pair(models, sample, cx)?;
+        let depths = made.map(|made| made.filter(|made| made.color.is_none()));
+        let imprints = imprints_of(&depths, recipe.shift, sample)?;
         sources.push((ImprintOf::predicted(&bundle.id, config, recipe.shift), imprints));
     }
     for (of, imprints) in sources.into_iter().filter(|(_, imprints)| !imprints.is_empty()) {

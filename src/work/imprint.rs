@@ -47,6 +47,22 @@ pub fn imprint_of(
     through(&chain, prediction, shift, bubble.map_or([0, 0], |b| b.imprint.size()))
 }
 
+/// The predictions of a pair's pads in meters, as [`imprint_of`].
+///
+/// # Errors
+/// As [`imprint`].
+pub fn imprints_of(
+    made: &PerPad<Prediction>,
+    shift: ShiftMode,
+    sample: &Sample,
+) -> Result<PerPad<DepthMap>, TaskError> {
+    let mut out = PerPad::default();
+    for (pad, made) in made.entries() {
+        out[pad] = Some(imprint_of(made, shift, sample, pad)?);
+    }
+    Ok(out)
+}
+
 /// The prediction of one finger as its sensor's picture shows it, meters: turned as that lies, and as large. It is
 /// resized once, where [`imprint_of`] and a resizing of that would do it twice.
 ///

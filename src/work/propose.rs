@@ -16,6 +16,7 @@ use super::error::TaskError;
 use super::labels::{HandMask, ImprintSource, MaskPlace, PairLabels, Review};
 use crate::domain::cloud::CloudError;
 use crate::domain::contact::{signed_distances, without_grain};
+use crate::domain::dataset::{Index, PairId};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::hand::HandPose;
@@ -273,16 +274,14 @@ pub fn carried_across(name: &str, from: (Side<'_>, &Mask), to: Side<'_>) -> Resu
     carried(from, to, across(), ACROSS_GATE_M, provenance)
 }
 
-/// Whether somebody worked on a pair, so that its masks can be carried to others.
-pub fn is_begun(review: Review) -> bool {
-    !matches!(review, Review::Todo | Review::Skip)
-}
-
-/// Of pairs that have a mask drawn by hand, the one to carry from to the pair at `here`: the nearest before it in the
-/// order, else the nearest behind it. All are places in one order.
-pub fn nearest_before<T: Copy>(here: usize, with_mask: impl Iterator<Item = (usize, T)>) -> Option<T> {
-    let distance = |at: usize| if at < here { (0, here - at) } else { (1, at - here) };
-    with_mask.filter(|(at, _)| *at != here).min_by_key(|(at, _)| distance(*at)).map(|(_, pair)| pair)
+/// The pair whose masks are carried to another: of the same tool and looked at by somebody, the nearest before it in the data
+/// set, else the nearest behind it. `None` if there is none.
+pub fn carries_from(index: &Index, to: PairId, review: impl Fn(&str) -> Review) -> Option<PairId> {
+    let tool = index.get(to)?.tool.as_ref()?;
+    let is_begun = |name: &str| !matches!(review(name), Review::Todo | Review::Skip);
+    let pairs = (0..).map(PairId).zip(&index.pairs);
+    let begun = pairs.filter(|(id, pair)| *id != to && pair.tool.as_ref() == Some(tool) && is_begun(&pair.name));
+    begun.map(|(id, _)| id).min_by_key(|id| if id.0 < to.0 { (0, to.0 - id.0) } else { (1, id.0 - to.0) })
 }
 
 /// The mask that accepting a proposal whole makes. Of the one that was drawn, what a person painted stays unless

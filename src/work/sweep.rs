@@ -7,7 +7,6 @@
 mod dial;
 mod outcome;
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -18,19 +17,20 @@ use serde::Serialize;
 use super::bundles::BundleInfo;
 use super::cloud::contact_points;
 use super::error::{Remark, TaskError};
-use super::imprint::{imprint_of, measured};
+use super::imprint::{imprints_of, measured};
 use super::job::JobCx;
 use super::labels::{ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels};
 use super::mask::{MaskInputs, MaskRecipe, contact_mask};
-use super::models::{Masking, Models, Wanted};
+use super::models::{Masking, Models};
 use super::pose::pose;
+use super::predict::Generating;
 use super::prediction::Prediction;
 use super::tool::load_tool;
 use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
-use crate::domain::grid::{DepthMap, Grid, Mask, RgbGrid};
+use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
@@ -306,11 +306,8 @@ impl<'a> Job<'a> {
                 let turns = if self.dial == Dial::Shift { &self.turns[..] } else { &self.turns[..1] };
                 let felt = |turn: &InForce| {
                     let made = made.as_ref().map_err(Clone::clone)?;
-                    let mut imprints = PerPad::default();
-                    for (pad, made) in made.entries() {
-                        let found = imprint_of(made, turn.shift, &pair.sample, pad);
-                        imprints[pad] = Some(found.map_err(|err| format!("{}: {}", err.what, err.why))?);
-                    }
+                    let imprints = imprints_of(made, turn.shift, &pair.sample);
+                    let imprints = imprints.map_err(|err| format!("{}: {}", err.what, err.why))?;
                     let of = self.setup.generator.as_ref();
                     let of = of.map(|(bundle, config)| ImprintOf::predicted(&bundle.id, config, turn.shift));
                     Ok(self.felt(pair, of.unwrap_or_default(), imprints))
@@ -325,31 +322,18 @@ impl<'a> Job<'a> {
     /// The predictions of each pair, or why there are none; `None` where there is nothing to start from.
     fn predictions(&self, pairs: &[Pair]) -> Result<Vec<Option<Made>>, TaskError> {
         let Some((bundle, config)) = &self.setup.generator else { return Ok(Vec::new()) };
-        let ends = bundle.ends(&self.dataset.rig).ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
-        let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
-        let touches: Vec<(usize, PadId, Cow<'_, RgbGrid>)> = pairs
-            .iter()
-            .enumerate()
-            .flat_map(|(at, pair)| {
-                pair.sample.pads.entries().filter_map(move |(pad, touch)| Some((at, pad, touch.picture(input)?)))
-            })
-            .collect();
-        let wanted: Vec<Wanted<'_>> = touches
-            .iter()
-            .map(|(.., picture)| Wanted { difference: picture, seed: config.seed, size: [0, 0] })
-            .collect();
-        let made = self.models.predict_each(bundle, self.setup.engine, config, &wanted, &self.cx.quiet());
-        let Some(made) = made else { return Ok(Vec::new()) };
-        let mut out: Vec<Option<Made>> = pairs.iter().map(|_| None).collect();
-        for ((at, pad, _), made) in touches.iter().zip(made) {
-            let slot = out[*at].get_or_insert_with(|| Ok(PerPad::default()));
-            match (made, slot) {
-                (Ok(made), Ok(pads)) => pads[*pad] = Some(made),
-                (Err(err), slot) => *slot = Err(err.why),
-                (Ok(_), Err(_)) => {}
+        let generating = Generating { bundle, engine: self.setup.engine, config };
+        let samples: Vec<&Sample> = pairs.iter().map(|pair| &pair.sample).collect();
+        let made = generating.pairs(self.models, &samples, &self.cx.quiet())?;
+        let one = |made: PerPad<Result<Prediction, TaskError>>| {
+            let mut pads = PerPad::default();
+            for (at, made) in made.into_iter().enumerate() {
+                pads[PadId::new(at)] = made.transpose().map_err(|err| err.why)?;
             }
-        }
-        Ok(out)
+            Ok(pads)
+        };
+        let made = made.unwrap_or_default().into_iter();
+        Ok(made.map(|made| (!made.is_empty()).then(|| one(made))).collect())
     }
 
     /// Imprints with the mask model's word on those whose mask nobody drew, if any value asks for it.

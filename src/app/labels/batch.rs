@@ -9,22 +9,19 @@ use crate::work::labels::ImprintSource;
 use crate::work::propose::{Batch, BatchSetup, ProposeSetup};
 
 impl State {
-    /// What proposing masks for the listed pairs would do.
-    ///
-    /// # Errors
-    /// Why it cannot be done, in words.
-    pub fn batch_setup(&self) -> Result<BatchSetup, String> {
-        if self.library.open.is_none() || self.library.order.is_empty() {
-            return Err("There are no pairs in the list".into());
-        }
+    /// Whether masks can be proposed for the listed pairs.
+    pub fn can_propose_all(&self) -> bool {
+        let predicts = self.worked_on(self.selection.finger) == ImprintSource::Predicted;
+        let has_model = !predicts || self.bundle(BundleKind::Generator).is_ok();
+        !self.library.order.is_empty() && has_model && self.batching().is_none()
+    }
+
+    /// What proposing masks for the listed pairs does.
+    fn batch_setup(&self) -> BatchSetup {
         let imprint = self.worked_on(self.selection.finger);
-        let generator = match (imprint, self.bundle(BundleKind::Generator)) {
-            (ImprintSource::Measured, _) => None,
-            (ImprintSource::Predicted, Ok(bundle)) => Some((bundle.clone(), self.settings.generate.config(bundle))),
-            (ImprintSource::Predicted, Err(_)) => return Err("There is no generator to predict with".into()),
-        };
+        let generator = self.bundle(BundleKind::Generator).ok().filter(|_| imprint == ImprintSource::Predicted);
         let mask = &self.settings.mask;
-        Ok(BatchSetup {
+        BatchSetup {
             propose: ProposeSetup {
                 source: mask.proposal,
                 imprint,
@@ -37,11 +34,11 @@ impl State {
                 carry_from: None,
             },
             pairs: self.library.order.clone(),
-            generator,
+            generator: generator.map(|bundle| (bundle.clone(), self.settings.generate.config(bundle))),
             shift: self.settings.shift,
             over_hand: mask.over_hand,
             person: Some(self.person()).filter(|name| !name.is_empty()),
-        })
+        }
     }
 
     /// The proposing for many pairs that is under way.
@@ -54,11 +51,8 @@ impl State {
 /// Starts it.
 pub(super) fn propose_all(state: &mut State, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
-    if state.batching().is_some() {
-        return;
-    }
-    let (Ok(setup), Some(open)) = (state.batch_setup(), &state.library.open) else { return };
-    let source = open.source.clone();
+    let Some(open) = state.library.open.as_ref().filter(|_| state.can_propose_all()) else { return };
+    let (source, setup) = (open.source.clone(), state.batch_setup());
     let ticket = state.tasks.start(format!("Propose masks for {} pairs", setup.pairs.len()), Vec::new());
     state.document.batch = Some(ticket);
     effects.push(Effect::ProposeAll { ticket, source, setup: Box::new(setup) });
@@ -77,9 +71,7 @@ pub(in crate::app) fn proposed(state: &mut State, ticket: Ticket, batch: &Batch)
         if drawn_on || doc.unsaved.contains(name) || doc.repeats.contains_key(name) {
             continue;
         }
-        doc.labels.remove(name);
-        doc.stored.remove(name);
-        doc.changed = None;
+        doc.reread(name);
         state.history.forget(name);
     }
     state.selection.proposing &= batch.masks == 0;

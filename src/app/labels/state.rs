@@ -141,13 +141,18 @@ impl Document {
         own.map(|(name, labels)| (name.clone(), labels.clone())).collect()
     }
 
-    /// Forgets what is known of a pair: it is read again when it is looked at.
-    pub(in crate::app) fn forget(&mut self, name: &str) {
+    /// Forgets the masks and poses of a pair: they are read again when it is looked at.
+    pub(in crate::app) fn reread(&mut self, name: &str) {
         self.labels.remove(name);
         self.stored.remove(name);
+        self.changed = None;
+    }
+
+    /// Forgets what is known of a pair, its review state and note too.
+    pub(in crate::app) fn forget(&mut self, name: &str) {
+        self.reread(name);
         self.reviews.remove(name);
         self.notes.remove(name);
-        self.changed = None;
     }
 
     /// What is known about a pair, if anything.

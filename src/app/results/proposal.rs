@@ -11,7 +11,6 @@ use super::pose::PoseKey;
 use super::tool::ToolKey;
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State, Wanted};
 use crate::domain::bits::Bits;
-use crate::domain::dataset::PairId;
 use crate::domain::grid::Grid;
 use crate::domain::hand::HandPose;
 use crate::domain::label::CadPose;
@@ -197,15 +196,11 @@ impl State {
             && self.worked_on(self.selection.finger) == source
     }
 
-    /// The pair whose mask would be carried to the selected one: the nearest of the same tool that somebody worked on.
+    /// The pair whose mask would be carried to the selected one.
     pub fn carries_from(&self) -> Option<PairKey> {
-        let (open, here) = (self.library.open.as_ref()?, self.entry()?);
-        let tool = here.tool.as_deref()?;
-        let at = self.selection.pair?.0 as usize;
-        let begun = |name: &str| propose::is_begun(self.document.review(name));
-        let pairs = open.source.index().pairs.iter().enumerate();
-        let with_mask = pairs.filter(|(_, other)| other.tool.as_deref() == Some(tool) && begun(&other.name));
-        propose::nearest_before(at, with_mask.map(|(at, _)| (at, PairId(at as u32)))).map(|id| open.key(id))
+        let (open, to) = (self.library.open.as_ref()?, self.selection.pair?);
+        let from = propose::carries_from(open.source.index(), to, |name| self.document.review(name))?;
+        Some(open.key(from))
     }
 
     /// The recipe of the proposal for one finger's imprint; `Ok(None)` while something that it takes is not there yet.

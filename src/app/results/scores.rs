@@ -4,7 +4,6 @@ use super::super::evaluate::state::ScoreTable;
 use super::super::pane::Need;
 use super::{Computes, DatasetSeq, Job, Lane, SharedServices, State, Wanted};
 use crate::infer::engine::EngineChoice;
-use crate::work::error::TaskError;
 use crate::work::evaluate::Setup;
 use std::sync::Arc;
 
@@ -28,7 +27,7 @@ impl Computes for ScoresKey {
         let (services, setup) = (services.clone(), state.setup_of_all()?);
         let source = state.library.open.as_ref()?.source.clone();
         Some(Job::new(Lane::Compute, "Look for scores", move |_| {
-            let dataset = source.as_dataset().ok_or_else(|| TaskError::new("Look for scores", "no such data set"))?;
+            let dataset = source.on_disk("Look for scores")?;
             Ok(ScoreTable::new(source.index(), services.known_scores(dataset, &setup)?))
         }))
     }

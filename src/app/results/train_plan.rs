@@ -26,9 +26,7 @@ impl Computes for TrainPlanKey {
         let source = state.library.open.as_ref()?.source.clone();
         let (changed, choice) = (state.document.labels.clone(), self.choice);
         Some(Job::new(Lane::Files, "Plan of a training", move |_| {
-            let dataset = source.as_dataset().ok_or_else(|| {
-                TaskError::new("Plan of a training", "this kind of source cannot be read outside the studio")
-            })?;
+            let dataset = source.on_disk("Plan of a training")?;
             plan(dataset, &HandMasks { labels: &Labels::of(dataset), changed: &changed }, choice)
         }))
     }

@@ -152,9 +152,7 @@ impl Runtime {
             Effect::Evaluate { ticket, source, setup } => {
                 let services = self.services.clone();
                 let body = Box::new(move |cx: &JobCx| {
-                    let dataset = source.as_dataset().ok_or_else(|| {
-                        TaskError::new("Evaluate", "this kind of source cannot be read outside the studio")
-                    })?;
+                    let dataset = source.on_disk("Evaluate")?;
                     let evaluation = Arc::new(services.evaluate(dataset, &setup, cx)?);
                     Ok(Answer::Evaluated(ticket, evaluation))
                 });
@@ -163,9 +161,7 @@ impl Runtime {
             Effect::Sweep { ticket, source, setup } => {
                 let services = self.services.clone();
                 let body = Box::new(move |cx: &JobCx| {
-                    let dataset = source.as_dataset().ok_or_else(|| {
-                        TaskError::new("Dial", "this kind of source cannot be read outside the studio")
-                    })?;
+                    let dataset = source.on_disk("Dial")?;
                     Ok(Answer::Swept(ticket, Arc::new(services.sweep(dataset, &setup, cx)?)))
                 });
                 self.task(Lane::Batch, ticket, "Dial".into(), body);
@@ -173,9 +169,7 @@ impl Runtime {
             Effect::ProposeAll { ticket, source, setup } => {
                 let services = self.services.clone();
                 let body = Box::new(move |cx: &JobCx| {
-                    let dataset = source.as_dataset().ok_or_else(|| {
-                        TaskError::new("Propose masks", "this kind of source cannot be read outside the studio")
-                    })?;
+                    let dataset = source.on_disk("Propose masks")?;
                     Ok(Answer::ProposedAll(ticket, Box::new(services.propose_all(dataset, &setup, cx)?)))
                 });
                 self.task(Lane::Batch, ticket, "Propose masks".into(), body);
@@ -183,9 +177,7 @@ impl Runtime {
             Effect::Adapt { ticket, source, setup } => {
                 let services = self.services.clone();
                 let body = Box::new(move |cx: &JobCx| {
-                    let dataset = source.as_dataset().ok_or_else(|| {
-                        TaskError::new("Fit the model", "this kind of source cannot be read outside the studio")
-                    })?;
+                    let dataset = source.on_disk("Fit the model")?;
                     let (adapted, bundle) = services.adapt(dataset, &setup, cx)?;
                     Ok(Answer::Adapted(ticket, Arc::new(adapted), bundle.map(Box::new)))
                 });
@@ -194,9 +186,7 @@ impl Runtime {
             Effect::Train { ticket, source, labels, setup } => {
                 let services = self.services.clone();
                 let body = Box::new(move |cx: &JobCx| {
-                    let dataset = source.as_dataset().ok_or_else(|| {
-                        TaskError::new("Train the mask model", "this kind of source cannot be read outside the studio")
-                    })?;
+                    let dataset = source.on_disk("Train the mask model")?;
                     let (trained, bundle) = services.train(dataset, &labels, &setup, cx)?;
                     Ok(Answer::Trained(ticket, Arc::new(trained), Box::new(bundle)))
                 });
@@ -213,9 +203,7 @@ impl Runtime {
             Effect::Figure { ticket, source, setup, recipes, file } => {
                 let (services, file) = (self.services.clone(), absolute(file));
                 let body = Box::new(move |cx: &JobCx| {
-                    let dataset = source.as_dataset().ok_or_else(|| {
-                        TaskError::new("Figure", "this kind of source cannot be read outside the studio")
-                    })?;
+                    let dataset = source.on_disk("Figure")?;
                     let predict = |pair: PairId, sample: &Arc<Sample>, cx: &JobCx| {
                         let mut made = PerPad::default();
                         for (key, bundle) in recipes.iter().filter(|(of, _)| *of == pair).flat_map(|(_, list)| list) {
@@ -251,9 +239,7 @@ impl Runtime {
             Effect::SaveCase { ticket, source, setup, file } => {
                 let (services, file) = (self.services.clone(), absolute(file));
                 let body = Box::new(move |cx: &JobCx| {
-                    let dataset = source.as_dataset().ok_or_else(|| {
-                        TaskError::new("Case", "this kind of source cannot be read outside the studio")
-                    })?;
+                    let dataset = source.on_disk("Case")?;
                     services.make_case(dataset, &setup, &file, cx)?;
                     Ok(Answer::Saved(ticket, format!("Saved {}", file.display()), file))
                 });

@@ -143,12 +143,10 @@ impl<'a> Worker<'a> {
 
     /// Predictions of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
     fn predictions(&mut self, sample: &Sample) -> anyhow::Result<Option<PerPad<Prediction>>> {
-        if self.predictor.conditions(sample)?.is_empty() {
-            return Err(self.predictor.no_condition());
-        }
         let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
         match self.predictor.predictions(sample, &cx) {
             Err(_) if self.stop.is_cancelled() => Ok(None),
+            Ok(made) if made.is_empty() => Err(self.predictor.no_condition()),
             made => made.map(Some),
         }
     }

@@ -5,7 +5,7 @@ use strum::IntoEnumIterator as _;
 
 use super::slider_mm;
 use crate::app::action::Action;
-use crate::app::command::{SettingsCommand, TasksCommand};
+use crate::app::command::SettingsCommand;
 use crate::app::settings::ProposalSource;
 use crate::app::state::Lookup;
 use crate::ui::cx::Cx;
@@ -58,15 +58,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// The same for every pair in the list, with how far it is.
 fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
     if let Some((ticket, task)) = cx.state.batching() {
-        let (fraction, cancelling) = (task.progress.fraction(), task.cancelling);
-        let text = if cancelling { "stopping" } else { task.progress.text.as_str() };
-        ui.horizontal(|ui| {
-            progress::bar(ui, (ui.available_width() - 70.0).clamp(60.0, 300.0), fraction, text);
-            let cancel = ui.add_enabled(!cancelling, egui::Button::new("Cancel"));
-            if cancel.on_hover_text("Stop; the pairs that were done until then keep their masks").clicked() {
-                cx.push(TasksCommand::Cancel(ticket));
-            }
-        });
+        let tip = "Stop; the pairs that were done until then keep their masks";
+        ui.horizontal(|ui| progress::stoppable(cx, ui, (ticket, task), 300.0, (&task.progress.text, tip)));
     } else {
         // Said here as well: the box that sets it is on screen only with a proposal.
         let over = if cx.state.settings.mask.over_hand { ", over hand work" } else { "" };

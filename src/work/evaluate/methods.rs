@@ -1,6 +1,5 @@
 //! The models of an evaluation, and what each method makes of a few touches.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use super::load::Case;
@@ -10,7 +9,8 @@ use crate::domain::diffusion::GenerateConfig;
 use crate::domain::evaluation::Scores;
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::postprocess::ShiftMode;
-use crate::domain::rig::{PadId, PerPad, SensorId, SensorKind};
+use crate::domain::rig::{PadId, PerPad, SensorKind};
+use crate::domain::sample::Sample;
 use crate::domain::sample::Scale;
 use crate::domain::turn::Turn;
 use crate::infer::bundle::{Bundle, Origin};
@@ -23,8 +23,8 @@ use crate::work::imprint;
 use crate::work::job::JobCx;
 use crate::work::labels::ImprintOf;
 use crate::work::mask::{MaskRecipe, MaskSource};
-use crate::work::models::{self, Wanted};
-use crate::work::prediction::Prediction;
+use crate::work::models;
+use crate::work::predict::Generating;
 
 /// Pictures that are looked at for stored predictions: a folder has them from the start, or not at all.
 const LOOKED_AT: u32 = 16;
@@ -46,8 +46,6 @@ pub(super) struct GeneratorMethod {
     models: models::Models,
     engine: EngineChoice,
     config: GenerateConfig,
-    /// The sensor that it starts from.
-    input: SensorId,
 }
 
 /// What a method makes of one touch.
@@ -103,7 +101,7 @@ impl Models {
             let bundle = found(origin, BundleKind::Generator)?;
             let info = bundle.generator.as_ref();
             let info = info.ok_or_else(|| TaskError::new(WHAT, format!("{origin} declares no generator")))?;
-            let input = info.sensors.ends(&bundle.name, &dataset.rig).map_err(|err| fail(&err))?.input;
+            info.sensors.ends(&bundle.name, &dataset.rig).map_err(|err| fail(&err))?;
             let (defaults, name) = (info.defaults, bundle.name.clone());
             let config = GenerateConfig {
                 steps: setup.steps.filter(|_| defaults.steps > 1).unwrap_or(defaults.steps),
@@ -115,7 +113,7 @@ impl Models {
             let name = if names.contains(&name) { format!("{name} ({})", origin.short_name()) } else { name };
             names.push(name.clone());
             let (models, engine) = (models.beside(), setup.runtime);
-            methods.push(Method::Generator(Box::new(GeneratorMethod { name, bundle, models, engine, config, input })));
+            methods.push(Method::Generator(Box::new(GeneratorMethod { name, bundle, models, engine, config })));
         }
         let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id), Turn::default()), Ok(Some(_)));
         if pictures && (0..LOOKED_AT).any(stored) {
@@ -300,16 +298,12 @@ fn stored(case: &Case) -> Result<Made, String> {
 
 impl GeneratorMethod {
     fn make(&mut self, cases: &[&Case], shift: ShiftMode, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
-        let input = self.input;
-        let touches: Vec<(usize, PadId, Cow<'_, RgbGrid>)> = cases
-            .iter()
-            .enumerate()
-            .flat_map(|(at, case)| {
-                case.sample.pads.entries().filter_map(move |(f, touch)| Some((at, f, touch.picture(input)?)))
-            })
-            .collect();
-        let images: Vec<&RgbGrid> = touches.iter().map(|t| &*t.2).collect();
-        let predictions = self.predict(&images, cx)?;
+        let generating = Generating { bundle: &self.bundle, engine: self.engine, config: &self.config };
+        let samples: Vec<&Sample> = cases.iter().map(|case| &case.sample).collect();
+        let predictions = match generating.pairs(&self.models, &samples, &cx.quiet()) {
+            Ok(predictions) => predictions?,
+            Err(err) => return Some(cases.iter().map(|_| Err(err.why.clone())).collect()),
+        };
         let mut made: Vec<Result<Made, String>> = cases
             .iter()
             .map(|_| {
@@ -322,7 +316,11 @@ impl GeneratorMethod {
                 })
             })
             .collect();
-        for ((at, finger, _), prediction) in touches.into_iter().zip(predictions) {
+        let each = predictions.into_iter().enumerate().flat_map(|(at, pads)| {
+            let pads = pads.into_iter().enumerate();
+            pads.filter_map(move |(pad, made)| Some((at, PadId::new(pad), made?)))
+        });
+        for (at, finger, prediction) in each {
             let sample = &cases[at].sample;
             let picture = prediction.and_then(|prediction| {
                 let seconds = prediction.seconds;
@@ -346,13 +344,5 @@ impl GeneratorMethod {
             }
         }
         Some(made)
-    }
-
-    /// Predictions. One that fails does not take the others of its batch with it. `None` once told to stop.
-    fn predict(&mut self, images: &[&RgbGrid], cx: &JobCx) -> Option<Vec<Result<Prediction, TaskError>>> {
-        let seed = self.config.seed;
-        let wanted: Vec<Wanted<'_>> =
-            images.iter().map(|difference| Wanted { difference, seed, size: [0, 0] }).collect();
-        self.models.predict_each(&self.bundle, self.engine, &self.config, &wanted, &cx.quiet())
     }
 }

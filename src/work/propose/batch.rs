@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::super::bundles::BundleInfo;
 use super::super::error::{Remark, TaskError};
-use super::super::imprint::{imprint_of, measured};
+use super::super::imprint::{imprints_of, measured};
 use super::super::job::JobCx;
 use super::super::labels::{Deed, ImprintOf, ImprintSource, Labels, MaskPlace, Review};
-use super::super::models::{Models, Wanted};
+use super::super::models::Models;
+use super::super::predict::Generating;
 use super::super::tool::load_tool;
 use super::{ProposeSetup, Touch, WHAT, accepted, propose};
 use crate::domain::dataset::PairId;
@@ -203,17 +204,10 @@ fn imprints(
     if setup.propose.imprint == ImprintSource::Measured {
         return Ok((measured(sample), ImprintOf::Measured));
     }
-    let lacks = |why: &str| TaskError::new(WHAT, why);
-    let (bundle, config) = setup.generator.as_ref().ok_or_else(|| lacks("there is no generator to predict with"))?;
-    let ends = bundle.ends(&sample.rig).ok_or_else(|| lacks("the bundle is no generator"))?;
-    let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
-    let pads: Vec<_> = sample.pads.entries().filter_map(|(pad, touch)| Some((pad, touch.picture(input)?))).collect();
-    let wanted: Vec<Wanted<'_>> =
-        pads.iter().map(|(_, picture)| Wanted { difference: picture, seed: config.seed, size: [0, 0] }).collect();
-    let made = models.predict(bundle, setup.propose.engine, config, &wanted, &cx.quiet())?;
-    let mut out: PerPad<DepthMap> = sample.rig.pads().map(|_| None).collect();
-    for ((pad, _), made) in pads.iter().zip(made) {
-        out[*pad] = Some(imprint_of(&made, setup.shift, sample, *pad)?);
-    }
-    Ok((out, ImprintOf::predicted(&bundle.id, config, setup.shift)))
+    let generator = setup.generator.as_ref();
+    let (bundle, config) = generator.ok_or_else(|| TaskError::new(WHAT, "there is no generator to predict with"))?;
+    let generating = Generating { bundle, engine: setup.propose.engine, config };
+    let made = generating.pair(models, sample, &cx.quiet())?;
+    let imprints = imprints_of(&made, setup.shift, sample)?;
+    Ok((imprints, ImprintOf::predicted(&bundle.id, config, setup.shift)))
 }

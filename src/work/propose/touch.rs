@@ -7,8 +7,8 @@ use super::super::mask::{Contact, MaskChoice, MaskInputs};
 use super::super::models::{Masking, Models};
 use super::super::pose::pose;
 use super::{
-    Proposal, ProposalSource, Side, WHAT, cad_distances, carried_across, carried_from_pair, grown, is_begun, near_cad,
-    nearest_before,
+    Proposal, ProposalSource, Side, WHAT, cad_distances, carried_across, carried_from_pair, carries_from, grown,
+    near_cad,
 };
 use crate::domain::align::Ask;
 use crate::domain::dataset::PairId;
@@ -133,7 +133,9 @@ pub fn propose(
             grown(imprint, labels.drawn(&place, imprint))
         }),
         ProposalSource::Carry => {
-            let from = setup.carry_from.or_else(|| carried_from(touch));
+            let reviews = touch.all.reviews().states;
+            let review = |name: &str| reviews.get(name).copied().unwrap_or_default();
+            let from = setup.carry_from.or_else(|| carries_from(&touch.dataset.index, touch.pair, review));
             let from = from.ok_or_else(|| {
                 lacks("nobody worked on another pair of this tool yet").with_hint("Correct the mask of one first.")
             })?;
@@ -154,15 +156,4 @@ pub fn propose(
             })
         }
     }
-}
-
-/// The pair whose mask is carried to this one: the nearest of the same tool that somebody worked on.
-fn carried_from(touch: Touch<'_>) -> Option<PairId> {
-    let reviews = touch.all.reviews().states;
-    let begun = |name: &str| reviews.get(name).is_some_and(|review| is_begun(*review));
-    let index = &touch.dataset.index;
-    let tool = index.get(touch.pair)?.tool.as_ref()?;
-    let pairs = index.pairs.iter().enumerate();
-    let pairs = pairs.filter(|(_, other)| other.tool.as_ref() == Some(tool) && begun(&other.name));
-    nearest_before(touch.pair.0 as usize, pairs.map(|(at, _)| (at, PairId(at as u32))))
 }
