@@ -3,7 +3,9 @@
 mod circles;
 mod skips;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use super::support::rust_files;
 
 /// What must not be named in the code of a layer, each with the reason.
 const FORBIDDEN: &[(&str, &[&str], &str)] = &[
@@ -93,17 +95,6 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
 
 /// Longest file, in lines, tests included.
 const MAX_LINES: usize = 700;
-
-fn rust_files(dir: &Path, out: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(dir).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            rust_files(&path, out);
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            out.push(path);
-        }
-    }
-}
 
 /// The code of a file: no comment lines, and nothing that is only compiled for tests, wherever it stands.
 fn code(text: &str) -> String {

@@ -19,6 +19,7 @@ mod kill;
 mod layers;
 mod models;
 mod pose;
+mod rules;
 mod sim;
 mod stability;
 

@@ -59,3 +59,15 @@ pub(crate) fn run(args: &[&str], data: &Path) -> Output {
         .output()
         .unwrap()
 }
+
+/// All Rust files below a folder.
+pub(crate) fn rust_files(dir: &Path, out: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            rust_files(&path, out);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            out.push(path);
+        }
+    }
+}

@@ -18,7 +18,7 @@ use touch2touch::gpu::wgpu;
 use touch2touch::ui::{Options, StudioApp};
 
 /// A full-HD screen.
-const SIZE: [f32; 2] = [1920.0, 1080.0];
+pub(super) const SIZE: [f32; 2] = [1920.0, 1080.0];
 /// Frames per figure.
 const FRAMES: usize = 30;
 /// Pairs of the demo that are paged through for the figure of memory, unless `--pairs` says otherwise.
@@ -103,20 +103,29 @@ impl TestRenderer for Painter {
     }
 }
 
-/// A studio on the demo, and where it is painted.
-struct Studio {
-    harness: Harness<'static, StudioApp>,
+/// A studio, and where it is painted.
+pub(super) struct Studio {
+    pub(super) harness: Harness<'static, StudioApp>,
     state: RenderState,
     screen: Arc<Mutex<Option<wgpu::Texture>>>,
     _folder: tempfile::TempDir,
 }
 
 impl Studio {
+    /// On the demo.
     fn new(whole_frames: bool) -> std::io::Result<Self> {
+        let mut studio = Self::on(None, whole_frames, true)?;
+        studio.settle();
+        studio.send(SettingsCommand::DismissHint);
+        Ok(studio)
+    }
+
+    /// On a folder; `inline` does what is to be computed between frames, else threads do it meanwhile.
+    pub(super) fn on(open: Option<PathBuf>, whole_frames: bool, inline: bool) -> std::io::Result<Self> {
         let folder = tempfile::tempdir()?;
         let services = LiveServices::with_config_folder(Some(PathBuf::from(folder.path())));
-        let mut options = Options::new(Arc::new(services), None);
-        options.inline = true;
+        let mut options = Options::new(Arc::new(services), open);
+        options.inline = inline;
         options.native_dialogs = false;
         options.whole_frames = whole_frames;
         // As the window was opened before: with the toolkit's dithering.
@@ -126,13 +135,10 @@ impl Studio {
             .with_max_steps(400)
             .renderer(painter)
             .build_eframe(move |cc| StudioApp::new(cc, options));
-        let mut studio = Self { harness, state, screen, _folder: folder };
-        studio.settle();
-        studio.send(SettingsCommand::DismissHint);
-        Ok(studio)
+        Ok(Self { harness, state, screen, _folder: folder })
     }
 
-    fn settle(&mut self) {
+    pub(super) fn settle(&mut self) {
         for _ in 0..2000 {
             self.harness.step();
             if self.harness.state().is_idle() && self.harness.state().state().library.open.is_some() {
@@ -145,14 +151,14 @@ impl Studio {
         }
     }
 
-    fn send(&mut self, command: impl Into<Command>) {
+    pub(super) fn send(&mut self, command: impl Into<Command>) {
         self.harness.state_mut().push(command);
         self.harness.step();
         self.settle();
     }
 
     /// One frame after `input`; its processor time, milliseconds: all, and that of putting it on the window.
-    fn frame(&mut self, input: &[Event]) -> [f64; 2] {
+    pub(super) fn frame(&mut self, input: &[Event]) -> [f64; 2] {
         self.harness.input_mut().events.extend_from_slice(input);
         let start = processor_ms();
         self.harness.step();
@@ -169,7 +175,7 @@ impl Studio {
     }
 
     /// The bytes that are on the screen.
-    fn picture(&self) -> Vec<u8> {
+    pub(super) fn picture(&self) -> Vec<u8> {
         let (device, queue) = (&self.state.device, &self.state.queue);
         let Ok(kept) = self.screen.lock() else { return Vec::new() };
         let Some(texture) = kept.as_ref() else { return Vec::new() };
@@ -209,7 +215,7 @@ fn processor_ms() -> f64 {
 }
 
 /// Resident memory now and at its highest, MiB; zero where the system does not say.
-fn resident_mib() -> [f64; 2] {
+pub(super) fn resident_mib() -> [f64; 2] {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let of = |key: &str| {
         let line = text.lines().find(|line| line.starts_with(key));
@@ -224,7 +230,7 @@ fn rms(a: &[u8], b: &[u8]) -> f64 {
     (sum / a.len().max(1) as f64).sqrt()
 }
 
-fn median(values: &mut [f64]) -> f64 {
+pub(super) fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }

@@ -7,7 +7,7 @@ use super::cx::Cx;
 use super::images::{map_of, range_of};
 use super::theme::{SMALL, caption, section};
 use super::thumbnail;
-use super::widget::{curves, empty, progress};
+use super::widget::{curves, empty};
 use crate::app::action::Action;
 use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
 use crate::app::command::{AdaptCommand, Pane};
@@ -143,7 +143,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         match cx.state.adapting() {
             Some((ticket, task)) => {
                 let tip = "Stop; the same fit goes on from here when it is asked for again";
-                progress::stoppable(cx, ui, (ticket, task), 360.0, (&task.progress.text, tip));
+                cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
             }
             None => {
                 cx.action_button(ui, Action::FitPairs, "Fit to my pairs");

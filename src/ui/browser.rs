@@ -11,8 +11,8 @@ use super::dialogs::Purpose;
 use super::scene::error_color;
 use super::theme::{Palette, SMALL, caption};
 use super::widget::cut::cut_in_the_middle;
+use super::widget::empty;
 use super::widget::texture::depth_image;
-use super::widget::{empty, progress};
 use crate::app::action::Action;
 use crate::app::command::{Command, LibraryCommand, Pane};
 use crate::app::evaluate::{ScoreChoice, SourceScores, Standing};
@@ -341,7 +341,7 @@ pub(super) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
         Some((ticket, task)) => {
             let text = format!("{} of {}", task.progress.done, task.progress.total);
             let what = (text.as_str(), "Stop; what was scored until then is kept");
-            progress::stoppable(cx, ui, (ticket, task), 260.0, what);
+            cx.stoppable(ui, (ticket, task), 260.0, what);
         }
         None => {
             cx.action_button(ui, Action::PredictAll, "Predict all");

@@ -9,11 +9,13 @@ use super::saved::Saved;
 use super::scene_view::Device;
 use super::theme::Palette;
 use super::widget::image_canvas::ViewTransform;
+use super::widget::progress;
 use super::widget::texture::Textures;
 use crate::app::action::{Action, Bindings};
-use crate::app::command::Command;
+use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
+use crate::app::tasks::state::{Task, Ticket};
 use crate::domain::dataset::PairId;
 use crate::domain::rig::SensorKind;
 
@@ -62,7 +64,27 @@ impl Cx<'_> {
         }
         response
     }
+
+    /// How far a task is, at most `widest` wide, in the words of `text`, with a button that stops it; `tip` says what
+    /// stopping keeps.
+    pub(super) fn stoppable(
+        &mut self,
+        ui: &mut Ui,
+        (ticket, task): (Ticket, &Task),
+        widest: f32,
+        (text, tip): (&str, &str),
+    ) {
+        let width = (ui.available_width() - CANCEL).clamp(60.0, widest);
+        progress::bar(ui, width, task.progress.fraction(), if task.cancelling { "stopping" } else { text });
+        let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
+        if cancel.on_hover_text(tip).clicked() {
+            self.push(TasksCommand::Cancel(ticket));
+        }
+    }
 }
+
+/// Room for the button beside a bar, points.
+const CANCEL: f32 = 70.0;
 
 /// What part of pictures is seen, and the colors of errors: one for all panes.
 pub(super) struct Views {

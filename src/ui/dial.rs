@@ -7,7 +7,7 @@ use strum::IntoEnumIterator as _;
 
 use super::cx::{Cx, side_color};
 use super::theme::{SMALL, caption};
-use super::widget::{empty, progress};
+use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{DialCommand, Pane};
 use crate::app::dial::DialPairs;
@@ -96,7 +96,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         match cx.state.turning() {
             Some((ticket, task)) => {
                 let tip = "Stop, and show the pairs that were done until then";
-                progress::stoppable(cx, ui, (ticket, task), 300.0, (&task.progress.text, tip));
+                cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip));
             }
             None => {
                 cx.action_button(ui, Action::TurnDial, "Run");

@@ -5,7 +5,6 @@ use strum::IntoEnumIterator as _;
 
 use super::cx::Cx;
 use super::theme::{SMALL, caption, section, value};
-use super::widget::progress;
 use crate::app::action::Action;
 use crate::app::command::{Pane, PredictCommand, SettingsCommand};
 use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode, VersusKey, shift_tooltip};
@@ -179,7 +178,7 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
         Some((ticket, task)) => {
             let text = if task.progress.text.is_empty() { "starting" } else { &task.progress.text };
             let tip = cx.keys().behind("Stop generating; what is shown stays", Action::CancelJobs);
-            ui.horizontal(|ui| progress::stoppable(cx, ui, (ticket, task), f32::INFINITY, (text, &tip)));
+            ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), f32::INFINITY, (text, &tip)));
         }
         None => {
             let can = cx.state.can_generate();

@@ -12,7 +12,6 @@ use strum::IntoEnumIterator as _;
 use super::cx::{Cx, side_color};
 use super::images;
 use super::theme::{SMALL, caption, medium, pane_frame, section};
-use super::widget::progress;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane, SettingsCommand, ViewCommand};
@@ -116,7 +115,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
     match running {
         Some((ticket, task)) => {
             let what = (task.progress.text.as_str(), "Stop computing shift statistics");
-            ui.horizontal(|ui| progress::stoppable(cx, ui, (*ticket, task), f32::INFINITY, what));
+            ui.horizontal(|ui| cx.stoppable(ui, (*ticket, task), f32::INFINITY, what));
         }
         None => {
             cx.action_button(ui, Action::Refit, "Refit on this data set");

@@ -6,7 +6,7 @@ use eframe::egui::{
 
 use super::cx::Cx;
 use super::theme::{SMALL, caption, medium, section};
-use super::widget::{empty, progress};
+use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
 use crate::app::evaluate::{EvaluateCommand, GRASPS};
@@ -94,7 +94,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                     None => now.text.clone(),
                 };
                 let tip = "Stop, and show what was scored until then";
-                progress::stoppable(cx, ui, (ticket, task), f32::INFINITY, (&text, tip));
+                cx.stoppable(ui, (ticket, task), f32::INFINITY, (&text, tip));
             }
             None => {
                 cx.action_button(ui, Action::EvaluateDataset, "Evaluate");

@@ -5,7 +5,7 @@ use eframe::egui::{self, DragValue, Label, RichText, ScrollArea, Ui, vec2};
 
 use super::cx::Cx;
 use super::theme::{SMALL, caption, section};
-use super::widget::{curves, progress};
+use super::widget::curves;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, TrainCommand};
 use crate::app::state::Lookup;
@@ -122,7 +122,7 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui) {
         match cx.state.training() {
             Some((ticket, task)) => {
                 let tip = "Stop; the same training goes on from here when it is asked for again";
-                progress::stoppable(cx, ui, (ticket, task), 360.0, (&task.progress.text, tip));
+                cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
             }
             None => {
                 cx.action_button(ui, Action::StartTraining, "Start training");

@@ -8,7 +8,7 @@ use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, Pr
 use touch2touch::app::keys::{ImprintSource, Registration};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
-use touch2touch::app::settings::{MaskSource, MaskTool};
+use touch2touch::app::settings::{ColorRange, MaskSource, MaskTool};
 use touch2touch::app::state::{Absent, Lookup, State};
 use touch2touch::app::tasks::Entry;
 use touch2touch::domain::dataset::{PairId, Problem};
@@ -162,4 +162,29 @@ fn threads_give_the_same_and_wake_the_window() {
     }
     assert_eq!(services.source.loads_of(0), 1);
     assert_eq!(state.chosen(lab::RIGHT).unwrap().seed, 42);
+}
+
+#[test]
+fn colors_stay_from_pair_to_pair() {
+    let mut bench = Bench::open();
+    bench.send(panes(&[Pane::Measured]));
+    bench.settle();
+    let ranges = |bench: &mut Bench| {
+        let mut seen = Vec::new();
+        for pair in [0, 1, 0] {
+            bench.send(LibraryCommand::Select(PairId(pair)));
+            bench.settle();
+            seen.push(bench.state.settings.range);
+        }
+        seen
+    };
+    let kept = bench.state.settings.range;
+    assert_eq!(ranges(&mut bench), [kept; 3], "nobody asked for other colors");
+    // A person gives each pair its own, and takes that back.
+    bench.send(SettingsCommand::SetRange(ColorRange { locked: false, ..kept }));
+    let own = ranges(&mut bench);
+    assert!(own[0] != own[1] && own[0] == own[2], "{own:?}");
+    bench.send(SettingsCommand::SetRange(ColorRange { locked: true, ..own[0] }));
+    let kept = bench.state.settings.range;
+    assert_eq!(ranges(&mut bench), [kept; 3]);
 }

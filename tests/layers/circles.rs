@@ -12,7 +12,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::{code, rust_files};
+use super::code;
+use crate::support::rust_files;
 
 /// The layers without a circle. A layer that has become free of them is added here and stays so.
 const LAYERS: &[&str] = &["domain", "io", "infer", "gpu", "work", "headless", "ui"];

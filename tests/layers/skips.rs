@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use super::rust_files;
+use crate::support::rust_files;
 
 /// What may stand to the right of `let Some(..) =` in a test that returns without it.
 const ASKS: &[&str] = &["shared(", "support::shared(", "support::gpu(", "support::torch(", "View::new(", "Rig::"];

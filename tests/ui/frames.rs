@@ -1,10 +1,12 @@
 //! Frames of which only what changed is painted: the same pictures, and little to paint.
 
-use eframe::egui::{Key, Modifiers, PointerButton, Pos2, vec2};
+use eframe::egui::{Key, Modifiers, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{LibraryCommand, SettingsCommand};
+use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::results::Results;
 use touch2touch::app::settings::{Theme, Workspace};
+use touch2touch::app::state::State;
 
 use super::rig::Rig;
 
@@ -144,4 +146,41 @@ fn what_is_computed_stays_within_its_budget() {
     }
     let bytes = rig.harness.state().state().results.bytes();
     assert!(bytes > first && bytes <= Results::BUDGET, "{first} {bytes}");
+}
+
+/// The smallest and the largest byte of green in the upper left of `rect`, beside what may be written in its middle.
+fn spread(rig: &mut Rig, rect: Rect) -> [u8; 2] {
+    let picture = rig.harness.render().unwrap();
+    let [min, max] = [0.15, 0.42].map(|share| rect.min + share * rect.size());
+    let (xs, ys) = (min.x as u32..max.x as u32, min.y as u32..max.y as u32);
+    let green = ys.flat_map(|y| xs.clone().map(move |x| (x, y))).map(|(x, y)| picture.get_pixel(x, y)[1]);
+    green.fold([255, 0], |[low, high], value| [low.min(value), high.max(value)])
+}
+
+#[test]
+fn paging_shows_no_blank_frame_and_keeps_its_budget() {
+    let Some(mut rig) = Rig::paging(SIZE, 200) else { return };
+    rig.harness.state_mut().push(SettingsCommand::DismissHint);
+    rig.harness.state_mut().push(SettingsCommand::SetWorkspace(Workspace::Label));
+    let felt = |state: &State| state.imprint(ImprintSource::Measured, state.selection.finger).ready().is_some();
+    rig.until("the imprint", felt);
+    rig.harness.run_steps(5);
+    let state = rig.harness.state().state();
+    let name = format!("Measured {}", state.finger_name(state.selection.finger));
+    let place = rig.harness.get_by_label(&name).rect();
+    let [low, high] = spread(&mut rig, place);
+    assert!(high - low > 20, "an imprint has colors: {low} to {high}");
+    let mut waited = 0;
+    // As a held key does, before the last pair was read; and further than is read ahead.
+    for by in (0..60).map(|frame| if frame % 4 == 0 { 8 } else { 1 }) {
+        rig.harness.state_mut().push(LibraryCommand::Step(by));
+        rig.harness.step();
+        let state = rig.harness.state().state();
+        waited += usize::from(!felt(state));
+        assert!(state.results.bytes() <= Results::BUDGET);
+        let row = state.selection.pair;
+        let [low, high] = spread(&mut rig, place);
+        assert!(high - low > 10, "the frame of {row:?} is blank: {low} to {high}");
+    }
+    assert!(waited > 0, "every pair was there before its frame");
 }

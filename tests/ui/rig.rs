@@ -224,6 +224,29 @@ impl Rig {
         Some(rig)
     }
 
+    /// As [`Rig::new`] on `pairs` pairs of one tool that are the same files, read on lanes of their own while frames go on.
+    pub(super) fn paging(size: [f32; 2], pairs: u64) -> Option<Self> {
+        crate::support::gpu()?;
+        let folder = tempfile::tempdir().unwrap();
+        let (data, config) = (folder.path().join("data"), folder.path().join("config"));
+        let tool = &catalog::tools()[0];
+        let sample = sim::simulate(tool, sim::random_grasp(3), 3, &sim::SimConfig::default());
+        write_pair(&data, Layout::Train, &tool.name, 0, &sample).unwrap();
+        write_tools(&data, &[(tool.name.as_str(), tool.seen, tool.mesh())]).unwrap();
+        for sensor in ["bubbles", "gelslims"] {
+            let folder = data.join("train").join(sensor).join(&tool.name);
+            for index in 1..pairs {
+                std::fs::hard_link(folder.join("data_0.pt"), folder.join(format!("data_{index}.pt"))).unwrap();
+            }
+        }
+        let live = LiveServices::with_config_folder(Some(config.clone()));
+        let services = Arc::new(QuickGenerator { live, gate: None });
+        let mut rig =
+            Self { harness: Self::build(size, services, Some(data.clone()), false), data, config, _folder: folder };
+        rig.until("the first pair", |state| state.library.open.is_some() && state.sample().ready().is_some());
+        Some(rig)
+    }
+
     /// As [`Rig::new`] with lanes of its own, and a generator that stops after its preview until the gate is opened.
     pub(super) fn gated(size: [f32; 2]) -> Option<(Self, Arc<Gate>)> {
         let mut rig = Self::new(size, 1)?;

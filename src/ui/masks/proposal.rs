@@ -11,7 +11,6 @@ use crate::app::state::Lookup;
 use crate::ui::cx::Cx;
 use crate::ui::images::PROPOSED;
 use crate::ui::theme::{SMALL, section};
-use crate::ui::widget::progress;
 use crate::work::propose::FARTHEST_M;
 
 /// Source, number, and the way to accept or reject.
@@ -59,7 +58,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
     if let Some((ticket, task)) = cx.state.batching() {
         let tip = "Stop; the pairs that were done until then keep their masks";
-        ui.horizontal(|ui| progress::stoppable(cx, ui, (ticket, task), 300.0, (&task.progress.text, tip)));
+        ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip)));
     } else {
         // Said here as well: the box that sets it is on screen only with a proposal.
         let over = if cx.state.settings.mask.over_hand { ", over hand work" } else { "" };

@@ -2,30 +2,7 @@
 
 use eframe::egui::{self, Color32, FontId, Rect, Response, Role, Sense, Ui, WidgetInfo, vec2};
 
-use crate::app::command::TasksCommand;
-use crate::app::tasks::state::{Task, Ticket};
-use crate::ui::cx::Cx;
 use crate::ui::theme::{Palette, SMALL};
-
-/// Room for the button beside a bar, points.
-const CANCEL: f32 = 70.0;
-
-/// How far a task is, at most `widest` wide, in the words of `text`, with a button that stops it; `tip` says what stopping
-/// keeps.
-pub(in crate::ui) fn stoppable(
-    cx: &mut Cx<'_>,
-    ui: &mut Ui,
-    (ticket, task): (Ticket, &Task),
-    widest: f32,
-    (text, tip): (&str, &str),
-) {
-    let width = (ui.available_width() - CANCEL).clamp(60.0, widest);
-    bar(ui, width, task.progress.fraction(), if task.cancelling { "stopping" } else { text });
-    let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
-    if cancel.on_hover_text(tip).clicked() {
-        cx.push(TasksCommand::Cancel(ticket));
-    }
-}
 
 /// A bar `width` wide with a text over it. `fraction` is 0..1; `None` shows that something runs without saying how
 /// far it is (without animation: an unknown duration is no reason to draw frames).

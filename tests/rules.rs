@@ -1,0 +1,146 @@
+//! The rules that people's complaints about other tools taught: where each is tried, and the trials that fit nowhere else.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use touch2touch::domain::catalog;
+use touch2touch::domain::grid::Mask;
+use touch2touch::domain::label::Provenance;
+use touch2touch::domain::rig::lab;
+use touch2touch::domain::sim;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch::work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Review};
+
+use super::support::rust_files;
+
+/// Each rule with the tests that try it.
+const RULES: [(u32, &str, &[&str]); 7] = [
+    (
+        1,
+        "A process killed at any moment of a stroke loses at most that stroke, and every file parses",
+        &["a_kill_in_mid_stroke_loses_at_most_that_stroke", "no_confirmed_stroke_is_lost_to_a_kill"],
+    ),
+    (
+        2,
+        "A label file that cannot be read blocks its pair and is never replaced",
+        &["a_damaged_file_blocks_its_pair_and_is_kept", "labels_that_cannot_be_read_are_never_written"],
+    ),
+    (
+        3,
+        "Undo changes the file too, and touches nothing that is not on screen",
+        &["what_is_saved_is_loaded_and_undo_changes_the_file", "undo_and_redo_follow_what_is_on_screen"],
+    ),
+    (
+        4,
+        "Opening in any order, twice, from another folder drops and doubles no label",
+        &["labels_are_the_same_by_whatever_way_the_data_set_is_opened"],
+    ),
+    (
+        5,
+        "Paging shows no blank frame and keeps its budget; what a stroke costs is in the benchmarks",
+        &["paging_shows_no_blank_frame_and_keeps_its_budget"],
+    ),
+    (6, "Colors do not change from pair to pair unless a person changes the range", &["colors_stay_from_pair_to_pair"]),
+    (
+        12,
+        "An exported folder is what the loader takes, without a change by hand",
+        &["the_folder_is_what_the_loader_accepts", "the_check_finds_what_the_loader_would_trip_over"],
+    ),
+];
+
+#[test]
+fn each_rule_has_its_tests() {
+    let mut files = Vec::new();
+    for folder in ["src", "tests"] {
+        rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
+    }
+    let sources: Vec<String> = files.iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();
+    for (number, rule, tests) in RULES {
+        assert!(!tests.is_empty());
+        for test in tests {
+            let found = sources.iter().any(|text| text.contains(&format!("#[test]\nfn {test}()")));
+            assert!(found, "rule {number} ({rule}) names the test {test}, which is not there");
+        }
+    }
+}
+
+fn mask(at: usize) -> Mask {
+    Mask::from_fn(175, 140, |u, v| (u + 3 * at) % 11 < 4 && v > 20 + at)
+}
+
+/// All labels of a data set as they are read in this order of its pairs.
+fn read(folder: &Path, backwards: bool) -> BTreeMap<String, PairLabels> {
+    let dataset = Dataset::open(folder).unwrap();
+    let labels = Labels::of(&dataset);
+    let mut names: Vec<String> = dataset.index.pairs.iter().map(|pair| pair.name.clone()).collect();
+    assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
+    if backwards {
+        names.reverse();
+    }
+    names.into_iter().map(|name| (name.clone(), labels.load(&name).unwrap())).collect()
+}
+
+fn files(folder: &Path) -> BTreeSet<PathBuf> {
+    let inside = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    inside.map(|entry| entry.path()).filter(|path| path.is_file()).collect()
+}
+
+#[test]
+fn labels_are_the_same_by_whatever_way_the_data_set_is_opened() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path().join("set");
+    let tool = catalog::tools().first().unwrap();
+    let sample = sim::simulate(tool, sim::random_grasp(3), 3, &sim::SimConfig::default());
+    for index in 1..4 {
+        write_pair(&root, Layout::Train, &tool.name, index, &sample).unwrap();
+    }
+    write_tools(&root, &[(tool.name.as_str(), tool.seen, tool.mesh())]).unwrap();
+    let dataset = Dataset::open(&root).unwrap();
+    let labels = Labels::of(&dataset);
+    for (at, pair) in dataset.index.pairs.iter().enumerate() {
+        let mut one = labels.load(&pair.name).unwrap();
+        for pad in lab::PADS {
+            let hand = HandMask::new(mask(at + pad.index()), Provenance::hand("a person"));
+            one.put(&MaskPlace::measured(pad), Some(hand));
+        }
+        one.review = Review::Flagged;
+        labels.save(&pair.name, &one, &Deed::named("test")).unwrap();
+    }
+    let (first, written) = (read(&root, false), files(&labels.folder().unwrap()));
+    assert!(first.len() == 3 && first.values().all(|one| one.masks.len() == 2 && one.review == Review::Flagged));
+    let same = |now: &BTreeMap<String, PairLabels>, way: &str| {
+        for (name, one) in &first {
+            let now = now.get(name).unwrap_or_else(|| panic!("{way}: {name} is gone"));
+            assert_eq!(now.review, one.review, "{way}: {name}");
+            assert_eq!(now.masks.len(), one.masks.len(), "{way}: {name}");
+            assert!(one.masks.iter().all(|(place, hand)| now.masks[place].is_same(hand)), "{way}: {name}");
+        }
+    };
+    same(&read(&root, true), "backwards, a second time");
+    let mut ways = vec![
+        root.join("train"),
+        root.join("train/bubbles"),
+        root.join("train/gelslims"),
+        root.join("train/bubbles/../../../set"),
+    ];
+    #[cfg(unix)]
+    {
+        let link = dir.path().join("link");
+        std::os::unix::fs::symlink(&root, &link).unwrap();
+        ways.push(link);
+    }
+    for way in ways {
+        same(&read(&way, false), &way.display().to_string());
+    }
+    // A pair that sorts before the others moves all of them by one place.
+    write_pair(&root, Layout::Train, &tool.name, 0, &sample).unwrap();
+    let grown = read(&root, false);
+    assert_eq!(grown.len(), 4);
+    same(&grown, "a pair more");
+    assert_eq!(files(&labels.folder().unwrap()), written, "reading writes nothing");
+    // The folder goes elsewhere, with what lies in it.
+    let moved = dir.path().join("moved");
+    std::fs::rename(&root, &moved).unwrap();
+    same(&read(&moved, false), "moved");
+}
