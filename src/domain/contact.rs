@@ -163,6 +163,8 @@ pub struct ContactMask {
     pub mask: Mask,
     /// What it is made of.
     pub basis: MaskBasis,
+    /// Share of the picture's pixels that the mask model says neither yes nor no of, 0..1; `None` for any other source.
+    pub unsure: Option<f64>,
 }
 
 impl MaskBasis {
@@ -202,9 +204,9 @@ impl MaskBasis {
 /// A mask with the last word on it: a flat imprint has no contact, whatever the mask's source.
 pub fn settled(imprint: &DepthMap, mask: Mask) -> ContactMask {
     if rise(imprint) >= FLAT_M {
-        return ContactMask { mask, basis: MaskBasis::Source };
+        return ContactMask { mask, basis: MaskBasis::Source, unsure: None };
     }
-    ContactMask { mask: Mask::filled(imprint.width(), imprint.height(), false), basis: MaskBasis::Flat }
+    ContactMask { mask: Mask::filled(imprint.width(), imprint.height(), false), basis: MaskBasis::Flat, unsure: None }
 }
 
 /// The mask of a model with the last word on it: as [`settled`], and where the model found nothing in an imprint that
@@ -213,7 +215,7 @@ pub fn settled_model(imprint: &DepthMap, mask: Mask) -> ContactMask {
     match rest_and_top(imprint) {
         Some([rest, top]) if top - rest >= CLEAR_M && !mask.as_slice().contains(&true) => {
             let min_m = rest + CONTACT_SHARE * (top - rest);
-            ContactMask { mask: threshold(imprint, min_m), basis: MaskBasis::Depth(min_m) }
+            ContactMask { mask: threshold(imprint, min_m), basis: MaskBasis::Depth(min_m), unsure: None }
         }
         _ => settled(imprint, mask),
     }

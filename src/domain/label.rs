@@ -25,7 +25,7 @@ use super::grid::Mask;
 pub use agreement::{Agreement, agreement};
 pub use carry::{Carried, Surface, across, carry};
 pub use clean_up::{CleanKind, CleanUp};
-pub use doubt::{Doubt, UNSURE};
+pub use doubt::{Doubt, UNSURE, unsure_share};
 pub use drawing::{DrawTool, Drawing, Ground};
 pub use gate::Gate;
 pub use grow::grow_from;

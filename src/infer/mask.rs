@@ -6,6 +6,7 @@ use super::trial::admit;
 use crate::domain::contact::{ContactMask, settled_model};
 use crate::domain::diffusion::{ModelError, Tensor};
 use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::label::unsure_share;
 use crate::domain::resample::{bilinear, nearest_mask};
 
 /// Why there is no mask.
@@ -124,7 +125,8 @@ fn at_least(probability: &Grid<f32>, imprint: &DepthMap, least: f32) -> Mask {
 
 /// The contact mask of an imprint from its map of [`MaskModel::probability`].
 pub fn contact_of(probability: &Grid<f32>, imprint: &DepthMap, least: f32) -> ContactMask {
-    settled_model(imprint, at_least(probability, imprint, least))
+    let found = settled_model(imprint, at_least(probability, imprint, least));
+    ContactMask { unsure: unsure_share(probability), ..found }
 }
 
 /// The imprint as the graph wants it, `[1, 1, height, width]`.

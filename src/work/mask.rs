@@ -219,7 +219,7 @@ pub fn contact_mask(
     unet: impl FnOnce(&DepthMap) -> Result<ContactMask, TaskError>,
 ) -> Result<ContactMask, TaskError> {
     if let Some(hand) = inputs.drawn(pad, imprint) {
-        return Ok(ContactMask { mask: (*hand.mask).clone(), basis: MaskBasis::Hand });
+        return Ok(ContactMask { mask: (*hand.mask).clone(), basis: MaskBasis::Hand, unsure: None });
     }
     match recipe {
         MaskRecipe::Unet(..) => unet(imprint),

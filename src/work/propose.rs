@@ -14,8 +14,9 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::error::TaskError;
 use super::labels::{HandMask, ImprintSource, MaskPlace, PairLabels, Review};
+use super::mask::MaskRecipe;
 use crate::domain::cloud::CloudError;
-use crate::domain::contact::{signed_distances, without_grain};
+use crate::domain::contact::{ContactMask, signed_distances, without_grain};
 use crate::domain::dataset::{Index, PairId};
 use crate::domain::frames::PlanarPose;
 use crate::domain::grid::{DepthMap, Grid, Mask};
@@ -156,6 +157,14 @@ pub fn smooth_imprint<'a>(imprint: &'a DepthMap, of: ImprintSource, rig: &Rig) -
     }
 }
 
+/// The mask of an automatic source; of the mask model's it says how sure that is. `model` is its name.
+pub fn automatic(found: ContactMask, recipe: &MaskRecipe, model: &str) -> Proposal {
+    let provenance = recipe.provenance(model, found.basis);
+    let unsure = found.unsure.map(|share| format!("the model is unsure of {:.1} % of the picture", share * 100.0));
+    let note = found.basis.note().into_iter().chain(unsure).collect::<Vec<_>>().join("; ");
+    Proposal { mask: found.mask, provenance, note }
+}
+
 /// The signed distance of each membrane point to the CAD model, meters, negative inside; NaN without depth. From it
 /// [`near_cad`] makes a mask of any distance at once.
 ///
@@ -292,4 +301,24 @@ pub fn accepted(drawn: Option<&HandMask>, proposal: &Proposal, over_hand: bool) 
     let mut hand = drawn.clone();
     hand.replace(&proposal.mask, proposal.provenance.clone(), !over_hand);
     hand
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::domain::bits::Bits;
+    use crate::domain::contact::MaskBasis;
+
+    #[test]
+    fn a_model_says_how_sure_it_is() {
+        let recipe = MaskRecipe::Unet("id".into(), Some(Bits::from(0.5_f32)));
+        let found = |basis, unsure| ContactMask { mask: Mask::filled(2, 2, true), basis, unsure };
+        let sure = automatic(found(MaskBasis::Source, Some(0.0125)), &recipe, "model");
+        assert_eq!(sure.note, "the model is unsure of 1.3 % of the picture");
+        assert!(matches!(sure.provenance, Provenance::Model { .. }), "{:?}", sure.provenance);
+        let instead = automatic(found(MaskBasis::Depth(0.004), Some(0.2)), &recipe, "model");
+        assert!(instead.note.contains("found no contact") && instead.note.ends_with("20.0 % of the picture"));
+        let silent = automatic(found(MaskBasis::Source, None), &MaskRecipe::Truth, "");
+        assert_eq!(silent.note, "");
+    }
 }

@@ -61,11 +61,13 @@ pub struct AutomaticMask {
     pub mask: Arc<Mask>,
     /// What it is made of in the end.
     pub basis: MaskBasis,
+    /// As [`ContactMask::unsure`].
+    pub unsure: Option<f64>,
 }
 
 impl From<ContactMask> for AutomaticMask {
     fn from(found: ContactMask) -> Self {
-        Self { mask: Arc::new(found.mask), basis: found.basis }
+        Self { mask: Arc::new(found.mask), basis: found.basis, unsure: found.unsure }
     }
 }
 

@@ -11,6 +11,7 @@ use super::pose::PoseKey;
 use super::tool::ToolKey;
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State, Wanted};
 use crate::domain::bits::Bits;
+use crate::domain::contact::ContactMask;
 use crate::domain::grid::Grid;
 use crate::domain::hand::HandPose;
 use crate::domain::label::CadPose;
@@ -132,9 +133,11 @@ impl Computes for ProposalKey {
             Ingredients::Automatic(recipe) => {
                 let found = state.results.masks.get(&self.automatic(recipe))?.clone();
                 let model = state.model_of(recipe).to_owned();
-                let provenance = recipe.provenance(&model, found.basis);
-                let note = found.basis.note().unwrap_or_default();
-                job(Box::new(move || Ok(Proposal { mask: (*found.mask).clone(), provenance, note })))
+                let recipe = recipe.clone();
+                job(Box::new(move || {
+                    let (mask, basis, unsure) = ((*found.mask).clone(), found.basis, found.unsure);
+                    Ok(propose::automatic(ContactMask { mask, basis, unsure }, &recipe, &model))
+                }))
             }
             Ingredients::Cad(at, within) => {
                 let key = DistancesKey { imprint: self.imprint.clone(), at: at.clone() };

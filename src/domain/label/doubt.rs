@@ -17,14 +17,19 @@ pub struct Doubt {
     pub disagreement: Option<f64>,
 }
 
+/// Share of the pixels of a map of contact's probability that are in [`UNSURE`], 0..1; `None` for an empty map.
+pub fn unsure_share(probability: &Grid<f32>) -> Option<f64> {
+    let unsure = probability.as_slice().iter().filter(|p| UNSURE.contains(*p)).count();
+    let share = unsure as f64 / probability.len() as f64;
+    share.is_finite().then_some(share)
+}
+
 impl Doubt {
     /// Of one finger: the model's probability of contact at any size, its mask of the imprint, and the one drawn by hand
     /// where there is one (of another size there is none).
     pub fn of(probability: &Grid<f32>, model: &Mask, hand: Option<&Mask>) -> Self {
-        let unsure = probability.as_slice().iter().filter(|p| UNSURE.contains(*p)).count();
-        let share = unsure as f64 / probability.len() as f64;
         let disagreement = hand.and_then(|hand| agreement(hand, model, 1.0)).map(|found| 1.0 - found.dice);
-        Self { unsure: Some(share).filter(|share| share.is_finite()), disagreement }
+        Self { unsure: unsure_share(probability), disagreement }
     }
 
     /// The more of each.

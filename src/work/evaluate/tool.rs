@@ -133,7 +133,7 @@ impl<'a> Tool<'a> {
                     let found = guarded(|| seen.contact_mask(imprint, f, inputs).map_err(|err| err.why));
                     let finger = || case.sample.rig.pad_key(f);
                     let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
-                    let ContactMask { mask, basis } = found.ok()?;
+                    let ContactMask { mask, basis, .. } = found.ok()?;
                     let why = match basis {
                         MaskBasis::Source => return Some(mask),
                         MaskBasis::Hand => "were drawn by hand",

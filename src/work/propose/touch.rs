@@ -7,8 +7,8 @@ use super::super::mask::{Contact, MaskChoice, MaskInputs};
 use super::super::models::{Masking, Models};
 use super::super::pose::pose;
 use super::{
-    Proposal, ProposalSource, Side, WHAT, cad_distances, carried_across, carried_from_pair, carries_from, grown,
-    near_cad,
+    Proposal, ProposalSource, Side, WHAT, automatic, cad_distances, carried_across, carried_from_pair, carries_from,
+    grown, near_cad,
 };
 use crate::domain::align::Ask;
 use crate::domain::dataset::PairId;
@@ -105,9 +105,7 @@ pub fn propose(
             let made = contact(None)?;
             each(&|pad, _| {
                 let one = made.masks[pad].as_ref().ok_or_else(|| lacks("there is no mask"))?;
-                let provenance = made.recipe.provenance(made.model.as_deref().unwrap_or_default(), one.basis);
-                let note = one.basis.note().unwrap_or_default();
-                Ok(Proposal { mask: one.mask.clone(), provenance, note })
+                Ok(automatic(one.clone(), &made.recipe, made.model.as_deref().unwrap_or_default()))
             })
         }
         ProposalSource::CadTruth => {
