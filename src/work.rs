@@ -24,6 +24,7 @@ pub mod error;
 pub mod evaluate;
 pub mod export;
 pub mod figure;
+pub mod filter;
 pub mod imprint;
 pub mod job;
 pub mod label_stats;

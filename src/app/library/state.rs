@@ -14,10 +14,10 @@ use super::super::labels::state::Document;
 use super::super::services::DataSource;
 use super::super::state::State;
 use crate::domain::dataset::{Index, PairEntry, PairId};
-use crate::domain::evaluation::Condition;
 use crate::domain::rig::Rig;
 use crate::work::bundles::{BundleInfo, BundleKind};
 use crate::work::error::TaskError;
+use crate::work::filter::Filter;
 
 /// What can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -127,7 +127,7 @@ pub struct Library {
     /// What was seen of the folder while it is followed; `None` while it is not.
     pub follow: Option<Follow>,
     /// Shows only pairs whose name, tool or note contains every word (any case). `tool:`, `is:` and `note:` narrow a word;
-    /// `has:note` are pairs with one; `angle>5` is a [`Condition`] on a score.
+    /// `has:note` are pairs with one; `angle>5` is a condition on a score.
     pub filter: String,
     /// Shows only these pairs: those brushed in a picture of the scores.
     pub brush: Option<Arc<BTreeSet<PairId>>>,
@@ -179,32 +179,15 @@ impl Library {
 
     /// Recomputes `order` from filter, tool and sort.
     pub(in crate::app) fn reorder(&mut self, document: &Document, table: &TableState) {
-        let mut words: Vec<String> = self.filter.split_whitespace().map(str::to_lowercase).collect();
-        let conditions: Vec<Condition> = words.iter().filter_map(|word| Condition::parse(word)).collect();
-        words.retain(|word| Condition::parse(word).is_none());
+        let filter = Filter::parse(&self.filter);
         let scored = |id: PairId| {
             self.brush.as_ref().is_none_or(|brush| brush.contains(&id))
-                && conditions.iter().all(|condition| table.meets(id, condition))
+                && filter.conditions.iter().all(|condition| table.meets(id, condition))
         };
         let review = |entry: &PairEntry| document.review(&entry.name);
         let passes = |entry: &PairEntry| {
-            let name = entry.name.to_lowercase();
-            let tool = entry.tool.as_deref().unwrap_or("").to_lowercase();
-            let note = document.note(&entry.name).to_lowercase();
-            self.tool.as_ref().is_none_or(|t| entry.tool.as_ref() == Some(t))
-                && words.iter().all(|word| {
-                    if let Some(t) = word.strip_prefix("tool:") {
-                        tool.contains(t)
-                    } else if let Some(state) = word.strip_prefix("is:") {
-                        review(entry).name().replace(' ', "-").starts_with(state)
-                    } else if let Some(part) = word.strip_prefix("note:") {
-                        note.contains(part)
-                    } else if word == "has:note" {
-                        !note.is_empty()
-                    } else {
-                        [&name, &tool, &note].into_iter().any(|text| text.contains(word.as_str()))
-                    }
-                })
+            self.tool.as_ref().is_none_or(|tool| entry.tool.as_ref() == Some(tool))
+                && filter.passes(entry, review(entry), document.note(&entry.name))
         };
         let pairs = self.pairs();
         let mut order: Vec<PairId> =

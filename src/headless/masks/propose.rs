@@ -6,9 +6,10 @@ use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::predict::{ModelArgs, Predictor};
 use super::super::{Common, Output, ToolArgs, VerbResult, find_pair};
-use crate::domain::dataset::PairId;
+use crate::domain::dataset::{PairEntry, PairId};
 use crate::domain::pose::RegistrationChoice;
-use crate::work::labels::ImprintSource;
+use crate::work::filter::Filter;
+use crate::work::labels::{ImprintSource, Labels};
 use crate::work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
 
 /// Arguments of `masks propose`.
@@ -25,9 +26,10 @@ pub(in super::super) struct ProposeArgs {
     /// Replace what was painted by hand as well. Pairs marked "done", "flagged" or "skip" stay as they are all the same.
     #[arg(long)]
     over_hand: bool,
-    /// Only pairs of this tool.
-    #[arg(long, value_name = "TOOL")]
-    of_tool: Option<String>,
+    /// Only pairs that answer to all these words, as in the studio's filter box: parts of name, tool or note, `tool:rod`,
+    /// `is:todo`, `note:edge`, `has:note`.
+    #[arg(long, value_name = "WORDS", default_value = "", hide_default_value = true)]
+    filter: String,
     /// The pair whose masks are carried; else for each pair the nearest one before of the same tool that somebody worked on.
     #[arg(long, value_name = "PAIR")]
     carry_from: Option<String>,
@@ -51,13 +53,17 @@ pub(in super::super) struct ProposeArgs {
 
 pub(super) fn run(args: &ProposeArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
-    let is_meant = |entry: &crate::domain::dataset::PairEntry| {
-        args.of_tool.as_ref().is_none_or(|tool| entry.tool.as_ref() == Some(tool))
+    let (filter, reviews) = (Filter::parse(&args.filter), Labels::of(&dataset).reviews());
+    if !filter.conditions.is_empty() {
+        anyhow::bail!("conditions on scores, such as angle>5, are for the studio; here are no scores to look at");
+    }
+    let is_meant = |entry: &PairEntry| {
+        let note = reviews.notes.get(&entry.name).map_or("", String::as_str);
+        filter.passes(entry, reviews.states.get(&entry.name).copied().unwrap_or_default(), note)
     };
     let meant: Vec<u32> = (0u32..).zip(&dataset.index.pairs).filter(|(_, e)| is_meant(e)).map(|(at, _)| at).collect();
     if meant.is_empty() {
-        let tool = args.of_tool.as_deref().unwrap_or_default();
-        anyhow::bail!("there are no pairs of the tool \"{tool}\"; `touch2touch doctor` lists what the data set has");
+        anyhow::bail!("no pair answers to \"{}\"; `touch2touch doctor` lists what the data set has", args.filter);
     }
     let pairs: Vec<PairId> = args.limit.spread(meant.len()).into_iter().map(|at| PairId(meant[at])).collect();
     let output = Output::new(args.common, "proposing", pairs.len());
