@@ -14,7 +14,7 @@ use touch2touch::domain::grid::Grid;
 use touch2touch::domain::sim;
 use touch2touch::io::dataset::RIG_JSON;
 use touch2touch::io::images;
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch::io::simulated::{Layout, pair_paths, write_pair, write_tools};
 
 use super::window::{SIZE, Studio, median, resident_mib};
 
@@ -111,12 +111,12 @@ pub(super) fn paging() -> std::io::Result<serde_json::Value> {
     let folder = tempfile::tempdir()?;
     let Some(tool) = catalog::tools().first() else { return Ok(json!(null)) };
     let sample = sim::simulate(tool, sim::random_grasp(3), 3, &sim::SimConfig::default());
-    write_pair(folder.path(), Layout::Train, &tool.name, 0, &sample).map_err(std::io::Error::other)?;
-    write_tools(folder.path(), &[(tool.name.as_str(), tool.seen, tool.mesh())]).map_err(std::io::Error::other)?;
-    for sensor in ["bubbles", "gelslims"] {
-        let files = folder.path().join("train").join(sensor).join(&tool.name);
-        for index in 1..PAIRS {
-            std::fs::hard_link(files.join("data_0.pt"), files.join(format!("data_{index}.pt")))?;
+    let root = folder.path();
+    let written = write_pair(root, Layout::Train, &tool.name, 0, &sample).map_err(std::io::Error::other)?;
+    write_tools(root, &[(tool.name.as_str(), tool.seen, tool.mesh())]).map_err(std::io::Error::other)?;
+    for index in 1..PAIRS {
+        for (file, again) in written.iter().zip(pair_paths(root, Layout::Train, &tool.name, index)) {
+            std::fs::hard_link(file, again)?;
         }
     }
     let mut studio = Studio::on(Some(folder.path().to_owned()), false, false)?;

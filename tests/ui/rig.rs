@@ -24,7 +24,7 @@ use touch2touch::domain::sim;
 use touch2touch::infer::bundle::Origin;
 use touch2touch::infer::bundle::SensorPair;
 use touch2touch::infer::engine::EngineChoice;
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch::io::simulated::{Layout, pair_paths, write_pair, write_tools};
 use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::ui::{Options, StudioApp};
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
@@ -231,12 +231,11 @@ impl Rig {
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
         let tool = &catalog::tools()[0];
         let sample = sim::simulate(tool, sim::random_grasp(3), 3, &sim::SimConfig::default());
-        write_pair(&data, Layout::Train, &tool.name, 0, &sample).unwrap();
+        let written = write_pair(&data, Layout::Train, &tool.name, 0, &sample).unwrap();
         write_tools(&data, &[(tool.name.as_str(), tool.seen, tool.mesh())]).unwrap();
-        for sensor in ["bubbles", "gelslims"] {
-            let folder = data.join("train").join(sensor).join(&tool.name);
-            for index in 1..pairs {
-                std::fs::hard_link(folder.join("data_0.pt"), folder.join(format!("data_{index}.pt"))).unwrap();
+        for index in 1..pairs {
+            for (file, again) in written.iter().zip(pair_paths(&data, Layout::Train, &tool.name, index)) {
+                std::fs::hard_link(file, again).unwrap();
             }
         }
         let live = LiveServices::with_config_folder(Some(config.clone()));
