@@ -5,7 +5,7 @@
 //! line parses, loops and prints. Neither computes anything itself, so that both always give the same figure.
 //!
 //! * [`models`]: bundles found and loaded once; predictions, from the disk where they were made before.
-//! * [`imprint`], [`mask`], [`cloud`], [`pose`]: one step each. [`compare`], [`ledger`], [`layers`], [`ensemble`]: what
+//! * [`imprint`], [`mask`], [`cloud`], [`pose`]: one step each. [`compare`], [`ledger`], [`layers`], [`influence`], [`ensemble`]: what
 //!   there is to know about their results.
 //! * [`figure`], [`pair_files`]: results as pictures for papers and as files for other programs.
 //! * [`evaluate`], [`sweep`], [`statistics`], [`adapt`], [`train`], [`export`], [`training_data`]: passes over a whole data set.
@@ -26,6 +26,7 @@ pub mod export;
 pub mod figure;
 pub mod filter;
 pub mod imprint;
+pub mod influence;
 pub mod job;
 pub mod label_stats;
 pub mod labels;

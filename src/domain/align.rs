@@ -19,6 +19,7 @@ pub mod closed_form;
 pub mod correspond;
 mod directions;
 pub mod icp;
+mod influence;
 pub mod lab_icp;
 mod observability;
 mod planar;
@@ -38,6 +39,7 @@ use super::frames::PlanarPose;
 
 pub use directions::{Directions, Distances};
 pub use icp::IcpConfig;
+pub use influence::{InfluenceError, influence};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub use observability::{DEGENERATE_BELOW, MotionEllipse, Observability, observability};
 pub use planar::align;

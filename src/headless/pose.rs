@@ -1,10 +1,11 @@
 //! `touch2touch pose`: in-hand poses of a whole data set, with the error against the truth where it is known.
 
 mod args;
+mod influence;
 mod report;
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::contact_mask::labels_of;
 use super::guard::{Bug, guarded};
@@ -36,10 +37,13 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         Imprints::Predicted => &[ImprintSource::Predicted],
         Imprints::Both => &[ImprintSource::Measured, ImprintSource::Predicted],
     };
-    let stems = match &args.fans.fan_out {
-        Some(folder) => output_stems(folder, &dataset, &ids)?.into_iter().map(Some).collect(),
-        None => vec![None; ids.len()],
+    let stems = |folder: &Option<PathBuf>| -> anyhow::Result<Vec<Option<PathBuf>>> {
+        match folder {
+            Some(folder) => Ok(output_stems(folder, &dataset, &ids)?.into_iter().map(Some).collect()),
+            None => Ok(vec![None; ids.len()]),
+        }
     };
+    let stems = stems(&args.fans.fan_out)?.into_iter().zip(stems(&args.influence)?).collect::<Vec<_>>();
     let output = Output::new(args.common, "aligning", ids.len());
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
@@ -47,7 +51,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let mut cases = Vec::new();
     let all_labels = Labels::of(&dataset);
     let mut complete = true;
-    for (id, stem) in ids.into_iter().zip(stems) {
+    for (id, (stem, influence)) in ids.into_iter().zip(stems) {
         let entry = &dataset.index.pairs[id];
         output.step(&entry.name);
         let sample = match dataset.load(PairId(id as u32)) {
@@ -86,6 +90,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             let asked = Asked {
                 name: &entry.name,
                 stem: stem.as_deref(),
+                influence: influence.as_deref(),
                 inputs: MaskInputs { sample: &sample, tool: Some(tool), labels: args.mask.drawn(&labels), of: None },
                 tool,
                 accepted: labels.accepted(imprint),
@@ -121,6 +126,8 @@ struct Asked<'a> {
     name: &'a str,
     /// Where pictures of it go.
     stem: Option<&'a Path>,
+    /// Where the influence of its pixels goes.
+    influence: Option<&'a Path>,
     inputs: MaskInputs<'a>,
     tool: &'a ToolModel,
     accepted: Option<AcceptedPose>,
@@ -133,7 +140,7 @@ fn pose_cases(
     imprint: ImprintSource,
     predictor: &mut Predictor,
 ) -> anyhow::Result<Vec<Case>> {
-    let Asked { name, stem, inputs, tool, accepted } = *asked;
+    let Asked { name, stem, influence, inputs, tool, accepted } = *asked;
     let sample = inputs.sample;
     let imprints = predictor.imprints(sample, imprint, &JobCx::unwatched())?;
     let of = predictor.of(imprint)?;
@@ -159,6 +166,9 @@ fn pose_cases(
         let found = points.clone().and_then(|points| pose(&points, tool, &*registration(args, engine), ask, truth));
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
+        let influence = influence.zip(answer).map(|(stem, found)| {
+            influence::write(stem, (&contact.clouds(sample)?, sample, tool), (imprint, engine), found)
+        });
         Ok(Case {
             name: name.to_owned(),
             engine: engine.to_string(),
@@ -175,6 +185,8 @@ fn pose_cases(
             accepted: accepted.map(|a| Accepted::new(a, truth.map(|truth| truth.inverse().theta_rad))),
             report: found.ok().map(|found| found.report).filter(|_| args.trace),
             ambiguity: left_open.clone(),
+            no_influence: influence.as_ref().and_then(|found| found.as_ref().err().map(says)),
+            influence: influence.and_then(Result::ok),
             fan,
         })
     };

@@ -9,7 +9,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
-use super::cloud::contact_points;
+use super::cloud::{Clouds, clouds, contact_points};
 use super::error::TaskError;
 use super::labels::{HandMask, ImprintOf, MaskPlace, PairLabels};
 use crate::domain::bits::Bits;
@@ -307,6 +307,15 @@ impl Contact {
     /// As [`contact_points`].
     pub fn points(&self, sample: &Sample) -> Result<Vec<DVec3>, TaskError> {
         contact_points(sample, &self.imprints.as_ref(), &self.masks.as_ref().map(|found| Some(&found?.mask)))
+    }
+
+    /// All surface points of the pair, with the contact points marked.
+    ///
+    /// # Errors
+    /// As [`clouds`].
+    pub fn clouds(&self, sample: &Sample) -> Result<Clouds, TaskError> {
+        let part = |pad| Some((self.imprints[pad].as_ref()?, self.masks[pad].as_ref().map(|found| &found.mask)));
+        clouds(sample, &sample.rig.pads().map(part).collect())
     }
 }
 

@@ -161,7 +161,7 @@ impl Stage {
                 ("NAME", _) => self.name.clone(),
                 ("OTHER", _) => at("other"),
                 ("TOOL.stl", _) => at("set/tools_stls/pattern_36.stl"),
-                ("DIR", "--out") => at(&format!("out {number}")),
+                ("DIR", "--out" | "--influence") => at(&format!("out {number}")),
                 ("DIR", "--cases") => at("known"),
                 ("DIR", "watch") => at("robot"),
                 ("DIR", "check") => repository().join("assets/models/generator_ldm").to_str().unwrap().to_owned(),

@@ -17,7 +17,8 @@ use crate::domain::rig::{PadId, PerPad, Rig, lab};
 use crate::headless::args::JsonArgs;
 use crate::headless::predict::{ModelArgs, Predictor};
 use crate::headless::{Output, VerbResult};
-use crate::work::cloud::contact_points;
+use crate::work::cloud::{clouds, contact_points};
+use crate::work::influence::influence;
 use crate::work::job::JobCx;
 use crate::work::labels::{HandMask, ImprintSource};
 use crate::work::mask::{MaskChoice, MaskInputs, MaskSource};
@@ -77,6 +78,37 @@ struct Stroke {
     largest_upload: f64,
 }
 
+/// What follows the end of a stroke on the imprints of both fingers until its pose is there, besides the screen.
+#[derive(Serialize)]
+struct Follow {
+    /// What the strokes change: masks of the true contact, or all that is deeper than the threshold.
+    masks: &'static str,
+    size: [usize; 2],
+    strokes: usize,
+    /// Mask to surface points of both fingers; milliseconds.
+    cloud: Spent,
+    /// Contact points to pose.
+    registration: Spent,
+    /// Both: the pose and its angle error are there.
+    whole: Spent,
+    /// Pose to the influence of every pixel, where that is shown.
+    influence: Spent,
+}
+
+/// Milliseconds of something that was done several times.
+#[derive(Serialize)]
+struct Spent {
+    median_ms: f64,
+    worst_ms: f64,
+}
+
+impl Spent {
+    fn of(ms: &[f64]) -> Self {
+        let median_ms = quantile(ms.iter().copied(), 0.5).unwrap_or(f64::NAN);
+        Self { median_ms, worst_ms: ms.iter().copied().fold(f64::NAN, f64::max) }
+    }
+}
+
 #[derive(Serialize)]
 struct Report {
     machine: Machine,
@@ -84,6 +116,7 @@ struct Report {
     simulation_seed: u64,
     rows: Vec<Row>,
     strokes: Vec<Stroke>,
+    follows: Vec<Follow>,
 }
 
 /// Proposals of one source, by grasp.
@@ -131,7 +164,15 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
     }
     let strokes = [([175, 140], 4.0), ([1024, 1024], 4.0), ([1024, 1024], 40.0)];
     let strokes = strokes.into_iter().map(|(size, radius_px)| stroke(size, radius_px)).collect();
-    let report = Report { machine, grasps: cases.len(), simulation_seed: args.simulation_seed, rows, strokes };
+    let (grasps, simulation_seed) = (cases.len(), args.simulation_seed);
+    let threshold_m = MaskChoice::default().threshold_m;
+    let by_threshold = |case: &Case| {
+        let mask = |pad| Some(case.sample.pad(pad)?.depth()?.imprint.map(|&depth| depth >= threshold_m));
+        Ok(case.sample.rig.pads().map(mask).collect())
+    };
+    let follows = [follow("true masks", &cases, &true_masks)?, follow("threshold", &cases, &by_threshold)?];
+    let follows = follows.into_iter().flatten().collect();
+    let report = Report { machine, grasps, simulation_seed, rows, strokes, follows };
     args.json.write(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(true)
@@ -282,6 +323,67 @@ fn stroke(size: [usize; 2], radius_px: f32) -> Stroke {
     }
 }
 
+/// Strokes at the edge of masks, each followed by what the studio computes of it.
+fn follow(
+    name: &'static str,
+    cases: &[Case],
+    masks_of: &dyn Fn(&Case) -> anyhow::Result<PerPad<Mask>>,
+) -> anyhow::Result<Option<Follow>> {
+    const STROKES_EACH: usize = 4;
+    const RADIUS_PX: f32 = 4.0;
+    let method = RegistrationChoice::default().method();
+    let (mut lifting, mut registering, mut whole, mut hanging) = (vec![], vec![], vec![], vec![]);
+    let mut size = None;
+    for case in cases {
+        let mut masks = masks_of(case)?;
+        let imprint = |pad| Some(&case.sample.pad(pad)?.depth()?.imprint);
+        for stroke in 0..STROKES_EACH {
+            let pad = lab::PADS[stroke % lab::PADS.len()];
+            let (Some(mask), Some(imprint_of_it)) = (masks.get_mut(pad), imprint(pad)) else { continue };
+            size = Some(imprint_of_it.size());
+            let mut hand = HandMask::new(mask.clone(), Provenance::Nothing);
+            let mut touched = mask.map(|_| false);
+            let Some(at) = edge(mask, stroke) else { continue };
+            let paint = if stroke < STROKES_EACH / 2 { Paint::Contact } else { Paint::Free };
+            let drawing = Drawing::begin(DrawTool::Brush { radius_px: RADIUS_PX }, at, paint);
+            hand.draw_on(&drawing, &mut touched, Ground::new(imprint_of_it), 0, Provenance::hand("bench"));
+            *mask = (*hand.mask).clone();
+            let parts = lab::PADS.into_iter().map(|pad| Some((imprint(pad)?, masks[pad].as_ref()))).collect();
+            let begin = Instant::now();
+            let lifted = clouds(&case.sample, &parts)?;
+            let since = |begin: Instant| begin.elapsed().as_secs_f64() * 1e3;
+            let cloud_ms = since(begin);
+            let found = pose(&lifted.contact_points(), &case.tool, &*method, Ask::default(), Some(case.truth));
+            let all_ms = since(begin);
+            let Ok(found) = found else { continue };
+            lifting.push(cloud_ms);
+            registering.push(all_ms - cloud_ms);
+            whole.push(all_ms);
+            let begin = Instant::now();
+            let at = found.grasp_from_object;
+            if influence(&lifted, &case.sample, &case.tool, RegistrationChoice::default(), at).is_ok() {
+                hanging.push(since(begin));
+            }
+        }
+    }
+    Ok(size.filter(|_| !whole.is_empty()).map(|size| Follow {
+        masks: name,
+        size,
+        strokes: whole.len(),
+        cloud: Spent::of(&lifting),
+        registration: Spent::of(&registering),
+        whole: Spent::of(&whole),
+        influence: Spent::of(&hanging),
+    }))
+}
+
+/// A pixel at the edge of a mask, another one for each stroke.
+fn edge(mask: &Mask, stroke: usize) -> Option<[f32; 2]> {
+    let row = mask.height() * (stroke + 3) / (STROKES + 6) + mask.height() / 3;
+    let x = mask.row(row.min(mask.height() - 1)).iter().position(|contact| *contact)?;
+    Some([x as f32, row as f32])
+}
+
 fn text(report: &Report) -> String {
     let number = |value: Option<f64>, digits: usize| value.map_or("-".into(), |v| format!("{v:.digits$}"));
     let mut lines = vec![format!(
@@ -316,6 +418,19 @@ fn text(report: &Report) -> String {
             stroke.move_worst_ms,
             stroke.end_median_ms,
             stroke.largest_upload * 100.0
+        ));
+    }
+    for Follow { masks, size, strokes, cloud, registration, whole, influence } in &report.follows {
+        let ms = |spent: &Spent| format!("{:.2} ms (worst {:.2})", spent.median_ms, spent.worst_ms);
+        lines.push(format!(
+            "after a stroke ({masks}, {strokes} strokes), {} x {}, both fingers: cloud {}, registration {}, the new pose \
+             after {}; influence of all pixels {}",
+            size[0],
+            size[1],
+            ms(cloud),
+            ms(registration),
+            ms(whole),
+            ms(influence)
         ));
     }
     lines.join("\n")

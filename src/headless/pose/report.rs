@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::super::seeds::PoseFan;
+use super::influence::Influences;
 use crate::domain::align::AlignReport;
 use crate::domain::ambiguity::Ambiguity;
 use crate::domain::findings::Finding;
@@ -40,6 +41,12 @@ pub(super) struct Case {
     /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) ambiguity: Option<PerPad<Ambiguity>>,
+    /// With `--influence`, where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) influence: Option<Influences>,
+    /// Why there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) no_influence: Option<String>,
     /// With `--seeds`, for predicted imprints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) fan: Option<PoseFan>,
@@ -138,6 +145,16 @@ pub(super) fn text(report: &Report) -> String {
             c.mask,
             c.stop
         );
+    }
+    for case in &report.cases {
+        let (name, imprint) = (&case.name, case.imprint);
+        if let Some(found) = &case.influence {
+            text += &format!("\n{name} ({imprint} imprint): where the angle changes most, by the upper left corner\n");
+            text += &found.places.iter().map(|place| format!("  {}\n", place.text())).collect::<String>();
+        }
+        if let Some(why) = &case.no_influence {
+            text += &format!("\n{name} ({imprint} imprint): {why}\n");
+        }
     }
     text += &format!(
         "\n{:<28} {:>5} {:>9} {:>9} {:>7} {:>7} {:>10}\n",

@@ -1,0 +1,65 @@
+//! `pose --influence`: which pixels an angle hangs on, as a file and as a list of places.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use crate::domain::pose::{RegistrationChoice, ToolModel};
+use crate::domain::sample::Sample;
+use crate::io::names;
+use crate::io::npz;
+use crate::io::pt::Tensor;
+use crate::work::cloud::Clouds;
+use crate::work::influence::{Place, influence};
+use crate::work::labels::ImprintSource;
+use crate::work::pose::PoseResult;
+
+/// What a case says of the influence of its pixels.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Influences {
+    /// Holds, by finger, degrees to the square millimeter for every pixel; NaN where none was asked.
+    pub(super) file: PathBuf,
+    /// Where the angle hangs on most, the first the most.
+    pub(super) places: Vec<NamedPlace>,
+}
+
+/// A place with the name of its finger.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct NamedPlace {
+    finger: String,
+    #[serde(flatten)]
+    place: Place,
+}
+
+impl NamedPlace {
+    /// The place in a line.
+    pub(super) fn text(&self) -> String {
+        let Place { at_mm: [x, y], in_mask, pixels, angle_deg, .. } = &self.place;
+        let way = if *in_mask { "without" } else { "with" };
+        format!("{:<5} at {x:6.2}, {y:6.2} mm: {angle_deg:+.3}° {way} its {pixels} pixels", self.finger)
+    }
+}
+
+/// Finds and writes the influence as `STEM_IMPRINT_ENGINE_influence.npz`, one array a finger.
+pub(super) fn write(
+    stem: &Path,
+    (clouds, sample, tool): (&Clouds, &Sample, &ToolModel),
+    (imprint, engine): (ImprintSource, RegistrationChoice),
+    found: &PoseResult,
+) -> anyhow::Result<Influences> {
+    let found = influence(clouds, sample, tool, engine, found.grasp_from_object)?;
+    let engine = engine.to_string().replace([':', '='], "_");
+    let file = names::with_ending(stem, &format!("_{}_{engine}_influence.npz", imprint.key()));
+    let name = |pad| sample.rig.pad_key(pad).to_string();
+    let arrays: Vec<(String, Tensor)> = found
+        .pixels
+        .entries()
+        .map(|(pad, values)| {
+            let shown = values.as_slice().iter().map(|value| found.deg_per_mm2(*value) as f32).collect();
+            (name(pad), Tensor::f32(&[values.height(), values.width()], shown))
+        })
+        .collect();
+    npz::write(&file, &arrays.iter().map(|(name, values)| (name.as_str(), values.clone())).collect::<Vec<_>>())?;
+    let places = found.places.into_iter().map(|place| NamedPlace { finger: name(place.finger), place }).collect();
+    Ok(Influences { file, places })
+}
