@@ -1,5 +1,6 @@
 //! The studio and the command line are one program: what a button does, a verb does, and with the same numbers.
 
+mod influence;
 mod proposals;
 
 use std::collections::BTreeMap;
@@ -121,7 +122,8 @@ fn how(action: Action) -> How {
             r#"{"tool": "lasso", "paint": "contact", "points": [[9, 9], [30, 9], [9, 30]]}"#,
         ]),
         A::PanTool | A::LastTool | A::PaintIgnore | A::LetThrough | A::BrushSmaller | A::BrushLarger => Window,
-        A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger => Window,
+        A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger | A::Ghosts | A::Lens => Window,
+        A::Influence => Verb(&["pose", "demo", "--pair", "a", "--influence", "folder"]),
         A::PoseTool | A::SixDof | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
         A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
         A::LockRange | A::RangeOnce | A::ResetRange | A::Fit | A::BothClouds | A::LinkCameras | A::Footprint => Window,

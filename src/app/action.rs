@@ -161,6 +161,9 @@ actions! {
     MaskOutline, Mask, "Mask as outline", "Draws only the outline of the mask", [shift(K::S)];
     MaskFainter, Mask, "Mask fainter", "Makes the mask more transparent", [plain(K::Minus)];
     MaskStronger, Mask, "Mask stronger", "Makes the mask less transparent", [plain(K::Equals)];
+    Influence, Mask, "What the angle hangs on", "Colors the pixels by how much the registered angle would change without them, or with those beside the mask", [shift(K::I)];
+    Ghosts, Mask, "As it was before", "Keeps mask, points and pose as they were before the last change visible until the next one, or not", [shift(K::H)];
+    Lens, Mask, "Lens", "Magnifies the imprint under the pointer eight times, or not", [shift(K::M)];
     DoneAndNext, Mask, "Done and next", "Marks the pair as done and shows the next unfinished one", [ctrl(K::Enter)];
     Flag, Mask, "Flag", "Marks the pair as questionable", [plain(K::Exclamationmark)];
     Skip, Mask, "Skip", "Leaves the pair out", [ctrl(K::Backspace)];
@@ -272,6 +275,9 @@ impl Action {
             Self::TakeOver => "copy mask across measured predicted",
             Self::ResetMask => "clear delete mask",
             Self::Undo => "revert back",
+            Self::Influence => "leverage sensitivity heat map pose pixels important",
+            Self::Ghosts => "ghost previous before undo compare",
+            Self::Lens => "magnify magnifier zoom loupe",
             Self::BrushSmaller | Self::BrushLarger => "pen size radius width",
             Self::RunPose => "retry recompute register registration icp failed",
             Self::NextPoseEngine => "icp gicp register method algorithm",

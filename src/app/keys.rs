@@ -12,6 +12,7 @@ pub use super::results::basin::BasinKey;
 pub use super::results::cloud::CloudKey;
 pub use super::results::ensemble::EnsembleKey;
 pub use super::results::imprint::{ImprintKey, MetersKey};
+pub use super::results::influence::InfluenceKey;
 pub use super::results::mask::{MaskKey, MaskVersion};
 pub use super::results::pose::PoseKey;
 pub use super::results::prediction::PredictionKey;

@@ -1,6 +1,7 @@
 //! The room of the document: strokes, clean-ups, review states, accepted poses, undo, saving.
 
 mod batch;
+pub mod ghost;
 mod repeat;
 pub mod state;
 
@@ -183,15 +184,15 @@ fn begin_stroke(
         return state.log.error(&err.with_hint("Propose a mask first, or paint contact."));
     }
     state.selection.imprint = source;
-    let pair = state.pair_name().to_owned();
+    let (pair, pose) = (state.pair_name().to_owned(), state.shown_pose_key(source));
     start.revision = state.document.next_revision();
     let labels = state.document.labels.entry(pair.clone()).or_default();
     let before = labels.put(&place, Some(start.clone()));
     let drawing = Drawing::begin(tool, at_px, if erase { paint.reversed() } else { paint });
     let [width, height] = start.mask.size();
     let touched = Mask::filled(width, height, false);
-    let (angle, by) = (angle(state, source), Provenance::hand(state.person()));
-    let stroke = Stroke { pair, place, source, drawing, allowed, proposed, angle, before, start, touched, by };
+    let by = Provenance::hand(state.person());
+    let stroke = Stroke { pair, place, source, drawing, allowed, proposed, pose, before, start, touched, by };
     state.document.stroke = Some(stroke);
     redraw(state, 0);
 }
@@ -234,7 +235,7 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
         labels.put(&stroke.place, stroke.before);
         return;
     }
-    let (pair, place) = (stroke.pair, stroke.place);
+    let (pair, finger, place) = (stroke.pair, stroke.place.pad, stroke.place);
     let edit = Edit::Mask { pair: pair.clone(), place, mask: stroke.before.as_ref().map(KeptMask::of) };
     let name = match (stroke.drawing.tool, stroke.drawing.paint) {
         (DrawTool::Brush { .. }, Paint::Free) => "eraser stroke",
@@ -246,13 +247,9 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     };
     let how = serde_json::to_value(&stroke.drawing).ok();
     record(state, &pair, Deed { how, ..Deed::named(name) }, edit, effects);
-    let (source, before) = (stroke.source, stroke.angle);
-    state.document.changed = Some(Changed { pair, source, name: name.into(), before });
-}
-
-/// The angle that is registered now, and its error.
-fn angle(state: &State, source: ImprintSource) -> Option<(f64, Option<f64>)> {
-    state.pose(source).shown().map(|pose| (pose.angle_rad, pose.error_rad))
+    let (source, mask, before) = (stroke.source, Some(stroke.start.mask), stroke.pose);
+    let revision = state.document.next_revision();
+    state.document.changed = Some(Changed { pair, source, name: name.into(), finger, revision, mask, before });
 }
 
 /// Takes in what somebody else made of a pair's masks meanwhile. What was done here before cannot be taken back any more: it
@@ -321,11 +318,12 @@ fn set_hand_mask(state: &mut State, deed: Deed, place: MaskPlace, mask: Option<H
     let pair = state.pair_name().to_owned();
     let revision = state.document.next_revision();
     let mask = mask.map(|mask| KeptMask::of(&HandMask { revision, ..mask }));
-    let (source, name) = (place.of.source(), deed.name.clone());
-    let before = angle(state, source);
+    let (source, finger, name) = (place.of.source(), place.pad, deed.name.clone());
+    let before = state.shown_pose_key(source);
+    let shown = state.mask_in_force(source, finger).ok().map(|mask| mask.mask.clone());
     let mut edit = Edit::Mask { pair: pair.clone(), place, mask };
     edit.swap(&mut state.document);
-    state.document.changed = Some(Changed { pair: pair.clone(), source, name, before });
+    state.document.changed = Some(Changed { pair: pair.clone(), source, name, finger, revision, mask: shown, before });
     record(state, &pair, deed, edit, effects);
 }
 
@@ -490,6 +488,8 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
     let how = if act == Act::Undo { "Undone" } else { "Done again" };
     match name {
         Some(name) => {
+            // What the last change did is said, and shown, no more: it may be what was taken back.
+            state.document.changed = None;
             state.log.info(format!("{how}: {name}"));
             save_pair(state, pair, Deed { act, ..Deed::named(name) }, effects);
             state.reorder();

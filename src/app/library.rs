@@ -268,6 +268,7 @@ pub(super) fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>)
     state.selection.hover_point = None;
     state.workbench.leave_pair();
     inspect::rewind(state);
+    state.document.changed = None;
     // What failed while it was only loaded ahead was not reported then.
     if let Some(key) = state.pair_key()
         && let Some(err) = state.tasks.failed.get(&Request::Sample(key))

@@ -23,6 +23,7 @@ pub mod comparison;
 pub mod deviation;
 pub mod ensemble;
 pub mod imprint;
+pub mod influence;
 pub mod inspection;
 pub mod label_stats;
 pub mod labels;
@@ -117,6 +118,8 @@ pub struct Latest {
     pub inspection: Option<inspection::InspectionKey>,
     /// The basin map.
     pub basin: Option<basin::BasinKey>,
+    /// What its angle hangs on.
+    pub influence: Option<influence::InfluenceKey>,
 }
 
 const MIB: usize = 1 << 20;
@@ -274,6 +277,8 @@ results! {
     Layers(layers::LayersKey) in layers, 16 * MIB;
     /// Signed distances between contact points and the registered model.
     Deviation(deviation::DeviationKey) in deviations, 64 * MIB;
+    /// Which pixels a registered angle hangs on.
+    Influence(influence::InfluenceKey) in influences, 16 * MIB;
     /// The steps of a recorded registration, made ready to be looked through.
     Inspection(inspection::InspectionKey) in inspections, 64 * MIB;
     /// Where starts lead.

@@ -53,6 +53,8 @@ pub enum SettingsCommand {
     SetMaskOpacity(f32),
     /// Whether the GelSlim's window is drawn.
     SetFootprintVisible(bool),
+    /// Whether what the last change of a mask started from is drawn.
+    SetGhosts(bool),
     /// The registration.
     SetPoseEngine(RegistrationChoice),
     /// The model runtime.
@@ -125,6 +127,7 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
         SettingsCommand::SetMaskOutline(outline) => settings.mask_outline = outline,
         SettingsCommand::SetMaskOpacity(opacity) => settings.mask_opacity = opacity,
         SettingsCommand::SetFootprintVisible(visible) => settings.footprint_visible = visible,
+        SettingsCommand::SetGhosts(shown) => settings.ghosts = shown,
         SettingsCommand::SetPoseEngine(engine) => settings.pose_engine = engine,
         SettingsCommand::SetRuntime(runtime) => settings.runtime = runtime,
         SettingsCommand::SetPerson(person) => settings.person = person,

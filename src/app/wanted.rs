@@ -37,7 +37,7 @@ impl State {
         let both = self.workbench.both_clouds && self.needs(Need::Scene(other));
         let scene = layers || both || self.needs(Need::Scene(source)) || self.needs(Need::Poses);
         let inspected = self.inspect.source == source && (self.needs(Need::Steps) || self.needs(Need::Basin));
-        let scene = scene || self.proposes_at_pose(source);
+        let scene = scene || self.proposes_at_pose(source) || self.shows_influence(source);
         (scene, scene || inspected)
     }
 }
@@ -142,6 +142,7 @@ impl Wanted<'_> {
         }
         self.layers(source);
         self.deviation(source);
+        self.influence(source);
     }
 
     fn neighbors(&mut self) {

@@ -1,6 +1,8 @@
 //! The image panes: GelSlim, measured and predicted imprint, error. Linked pan, zoom and cross-hair.
 
 pub(super) mod bar;
+mod influence;
+mod lens;
 pub(super) mod link;
 mod paint;
 
@@ -37,6 +39,9 @@ pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
 pub(super) const PROPOSED: Color32 = Color32::from_rgb(0x4a, 0xd9, 0xff);
 /// The color of ignored pixels.
 pub(super) const IGNORED: Color32 = Color32::from_rgb(0xff, 0xc8, 0x3d);
+
+/// The color of what was before the last change of a mask.
+pub(super) const GHOST: Color32 = Color32::from_rgb(0xc9, 0xb0, 0xff);
 
 /// What is being painted on the images.
 #[derive(Default)]
@@ -408,6 +413,7 @@ fn depth_pane(
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
     output.paint(texture, if stale { Color32::from_gray(130) } else { Color32::WHITE });
     if pane != Pane::Error {
+        influence::overlay(cx, ui, &output, source, finger);
         paint::mask(cx, ui, memory, &output, source, finger);
     }
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
@@ -434,6 +440,9 @@ fn depth_pane(
         paint::stroke(cx, ui, memory, &output, (pane, source, finger));
     }
     captions(cx, &output, pane, finger);
+    if pane != Pane::Error && cx.state.selection.lens {
+        lens::show(cx, memory, &output, texture, (source, finger, paintable));
+    }
     histogram
 }
 
@@ -511,9 +520,14 @@ fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, de
     let name = pane.title();
     let note = scale_note(cx.state);
     let note = if note.is_empty() { String::new() } else { format!(" ({note})") };
+    let influence = match pane {
+        Pane::Measured => influence::readout(cx.state, ImprintSource::Measured, finger, [x, y]),
+        Pane::Predicted => influence::readout(cx.state, ImprintSource::Predicted, finger, [x, y]),
+        _ => String::new(),
+    };
     cx.shared.readout = Some(if v.is_finite() {
         format!(
-            "{name} {} ({x}, {y})   {}{note}   {v:.6} m",
+            "{name} {} ({x}, {y})   {}{note}   {v:.6} m{influence}",
             cx.state.finger_name(finger),
             units::text_mm(f64::from(v))
         )

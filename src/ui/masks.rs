@@ -328,12 +328,14 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn effect(cx: &Cx<'_>, ui: &mut Ui) {
     let Some(changed) = cx.state.document.changed.as_ref().filter(|c| c.pair == cx.state.pair_name()) else { return };
     let deg = |rad: f64| units::text_deg(rad);
-    let (text, color) = match (cx.state.pose(changed.source), changed.before) {
-        (Lookup::Ready(pose), Some((before, error_before))) => {
-            let by = (pose.angle_rad - before).to_degrees();
-            let mut text = format!("{}: angle {by:+.2}°, {} to {}", changed.name, deg(before), deg(pose.angle_rad));
+    let before = changed.before.as_ref().and_then(|key| cx.state.results.poses.get(key));
+    let (text, color) = match (cx.state.pose(changed.source), before) {
+        (Lookup::Ready(pose), Some(before)) => {
+            let (from, to) = (before.angle_rad, pose.angle_rad);
+            let mut text =
+                format!("{}: angle {:+.2}°, {} to {}", changed.name, (to - from).to_degrees(), deg(from), deg(to));
             let mut color = cx.p.text;
-            if let (Some(from), Some(to)) = (error_before, pose.error_rad) {
+            if let (Some(from), Some(to)) = (before.error_rad, pose.error_rad) {
                 text += &format!("; error {} to {}", deg(from), deg(to));
                 color = if to < from { cx.p.good } else { cx.p.caution };
             }
@@ -457,6 +459,18 @@ fn look(cx: &mut Cx<'_>, ui: &mut Ui) {
         let mut outline = settings.mask_outline;
         if ui.checkbox(&mut outline, "outline").on_hover_text(cx.keys().help(Action::MaskOutline)).changed() {
             cx.push(SettingsCommand::SetMaskOutline(outline));
+        }
+        let mut ghosts = settings.ghosts;
+        if ui.checkbox(&mut ghosts, "before").on_hover_text(cx.keys().help(Action::Ghosts)).changed() {
+            cx.push(SettingsCommand::SetGhosts(ghosts));
+        }
+        let mut influence = cx.state.selection.influence;
+        if ui.checkbox(&mut influence, "influence").on_hover_text(cx.keys().help(Action::Influence)).changed() {
+            cx.push(ViewCommand::ShowInfluence(influence));
+        }
+        let mut lens = cx.state.selection.lens;
+        if ui.checkbox(&mut lens, "lens").on_hover_text(cx.keys().help(Action::Lens)).changed() {
+            cx.push(ViewCommand::ShowLens(lens));
         }
         let mut footprint = settings.footprint_visible;
         if ui.checkbox(&mut footprint, "GelSlim window").on_hover_text(cx.keys().help(Action::Footprint)).changed() {

@@ -1,6 +1,7 @@
 //! The 3D panes: cloud, contact points and CAD model, measured and predicted, with linked cameras.
 
 mod build;
+mod ghost;
 mod gizmo;
 mod hands;
 mod layers;
@@ -16,6 +17,7 @@ use glam::{DAffine3, DVec3};
 use strum::IntoEnumIterator as _;
 
 use build::{SceneCloud, SceneSurface};
+use ghost::SceneGhost;
 use gizmo::Gizmo;
 use layers::LayerColors;
 use steps::StepLines;
@@ -55,6 +57,8 @@ pub(super) struct Memory {
     clouds: [Option<SceneCloud>; 2],
     /// Membranes as surfaces, while they are shown.
     surfaces: [Option<SceneSurface>; 2],
+    /// Contact points that the last change of a mask dropped and added, while they are shown.
+    ghosts: [Option<SceneGhost>; 2],
     /// The data set that the views were fitted to.
     fitted: Option<DatasetSeq>,
     /// Colors of the contact points.
@@ -164,6 +168,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
     }
     build::update_mesh(cx, &mut memory.mesh, &mut memory.revision);
     layers::update(cx, memory, source);
+    ghost::update(cx, memory, source);
     steps::update(cx, memory, source);
     let label = match source {
         ImprintSource::Measured => "3D view, measured",

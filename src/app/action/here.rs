@@ -40,7 +40,10 @@ impl Action {
             },
             Kind::Color => picture,
             Kind::Imprint(_) | Kind::Error => {
-                picture || range || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
+                picture
+                    || range
+                    || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
+                    || matches!(self, A::Influence | A::Ghosts | A::Lens)
             }
             Kind::Versus => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
             Kind::Scene(_) => picture || self.is_of_scene(),

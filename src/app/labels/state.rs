@@ -4,10 +4,11 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::super::keys::{ImprintSource, Revision};
+use super::super::keys::{ImprintSource, PoseKey, Revision};
 use super::super::tasks::state::Ticket;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::label::{DrawTool, Drawing, Ground, Provenance};
+use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
 use crate::work::label_stats::LabelStats;
 pub use crate::work::labels::{HandMask, MaskPlace, PairLabels, Review};
@@ -68,8 +69,14 @@ pub struct Changed {
     pub source: ImprintSource,
     /// What was done.
     pub name: Cow<'static, str>,
-    /// The angle before, and its error where the truth is known; radians.
-    pub before: Option<(f64, Option<f64>)>,
+    /// The finger.
+    pub finger: PadId,
+    /// Which change of the document it is.
+    pub revision: Revision,
+    /// The mask before, where there was one.
+    pub mask: Option<Arc<Mask>>,
+    /// The pose before, by its recipe.
+    pub before: Option<PoseKey>,
 }
 
 /// Labels that somebody else changed while they were being changed here.
@@ -96,8 +103,8 @@ pub struct Stroke {
     pub(in crate::app) allowed: Option<Mask>,
     /// What is let through of a proposal.
     pub(in crate::app) proposed: Option<Arc<Proposal>>,
-    /// The angle before the stroke, as [`Changed::before`].
-    pub(in crate::app) angle: Option<(f64, Option<f64>)>,
+    /// The pose before the stroke, as [`Changed::before`].
+    pub(in crate::app) pose: Option<PoseKey>,
     /// The hand mask before the stroke; `None` if there was none.
     pub(in crate::app) before: Option<HandMask>,
     /// What is drawn on: the mask in force before the stroke.

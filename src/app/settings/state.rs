@@ -84,6 +84,8 @@ pub struct Settings {
     pub mask_opacity: f32,
     /// Whether the GelSlim's window is drawn on bubble images.
     pub footprint_visible: bool,
+    /// Whether mask, points and pose before the last change of a mask stay visible until the next.
+    pub ghosts: bool,
     /// Whether the hint of the first start was dismissed.
     pub hint_dismissed: bool,
     /// What was opened before, newest first.
@@ -142,6 +144,7 @@ impl Default for Settings {
             mask_outline: false,
             mask_opacity: 0.35,
             footprint_visible: true,
+            ghosts: true,
             hint_dismissed: false,
             recent: Vec::new(),
             layouts: std::collections::BTreeMap::new(),

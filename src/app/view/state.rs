@@ -21,6 +21,10 @@ pub struct Selection {
     pub imprint: ImprintSource,
     /// Whether a proposal is shown over the mask.
     pub proposing: bool,
+    /// Whether imprints show which pixels the registered angle hangs on.
+    pub influence: bool,
+    /// Whether imprints are magnified around the pointer.
+    pub lens: bool,
     /// Whether both fingers are shown, or only the active one.
     pub both_fingers: bool,
     /// The pixel under the pointer: the cross-hair of all images.

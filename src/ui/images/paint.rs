@@ -2,7 +2,7 @@
 
 use eframe::egui::{Align2, Color32, CursorIcon, Event, FontId, Key, PointerButton, Pos2, Stroke, Ui, Vec2, vec2};
 
-use super::{CONTACT, IGNORED, Memory, PROPOSED};
+use super::{CONTACT, GHOST, IGNORED, Memory, PROPOSED};
 use crate::app::command::{LabelsCommand, SettingsCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, MaskVersion};
 use crate::app::pane::Pane;
@@ -12,7 +12,7 @@ use crate::domain::rig::PadId;
 use crate::ui::cx::Cx;
 use crate::ui::widget::brush_cursor;
 use crate::ui::widget::image_canvas::CanvasOutput;
-use crate::ui::widget::texture::{mask_image, outline};
+use crate::ui::widget::texture::{dashes, mask_image, outline};
 
 /// The mask in force as a veil with an outline, or the outline alone.
 pub(super) fn mask(
@@ -30,7 +30,8 @@ pub(super) fn mask(
     let Ok(in_force) = cx.state.mask_in_force(source, finger) else { return };
     let key: (&MaskVersion, _) = (&in_force.version, cx.state.imprint_key(source, finger).ok());
     // Where nobody paints the data itself is what counts: the outline says enough.
-    if !settings.mask_outline && cx.state.selection.panes.contains(&Pane::Masks) {
+    let veiled = !settings.mask_outline && !cx.state.shows_influence(source);
+    if veiled && cx.state.selection.panes.contains(&Pane::Masks) {
         let mask = in_force.mask;
         let slot = ("mask", source, finger);
         let texture = cx.shared.textures.mask(ui.ctx(), slot, &key, mask);
@@ -62,6 +63,11 @@ pub(super) fn mask(
         let segments = memory.outlines.get(&slot, &key, || outline(&proposal.mask));
         output.segments(segments, Color32::from_black_alpha(110), 2.5);
         output.segments(segments, PROPOSED, 1.25);
+    }
+    if let Some(ghost) = cx.state.ghost(source).filter(|ghost| ghost.finger == finger) {
+        let dashes = memory.outlines.get(&("ghost", source, finger), ghost.revision, || dashes(&outline(ghost.mask)));
+        output.segments(dashes, Color32::from_black_alpha(140), 2.5);
+        output.segments(dashes, GHOST, 1.5);
     }
     let mask = in_force.mask;
     let segments = memory.outlines.get(&("mask", source, finger), &key, || outline(mask));

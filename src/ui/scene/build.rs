@@ -20,7 +20,7 @@ use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
 use crate::gpu::view::Plane;
 use crate::ui::cx::{Cx, side_color};
-use crate::ui::images::CONTACT;
+use crate::ui::images::{CONTACT, GHOST};
 use crate::ui::theme::{self, Palette};
 use crate::work::cloud::{Clouds, FingerCloud};
 
@@ -130,6 +130,9 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
         SceneLayer::Cad | SceneLayer::Registered => p.cad,
         SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, other_side(source)), 0.7),
         SceneLayer::TrueCad => p.strong,
+        SceneLayer::Before => theme::mix(p.strong, GHOST, 0.8),
+        SceneLayer::Dropped => theme::mix(p.strong, GHOST, 0.5),
+        SceneLayer::Added => theme::mix(p.strong, p.good, 0.6),
         SceneLayer::Pins => p.pins[0],
         SceneLayer::Guides => p.weak,
     }
@@ -141,6 +144,7 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seco
     let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: look.eye_dome, ..SceneData::default() };
     scene.cut = cut(cx, memory, source);
     clouds(cx, memory, source, &mut scene);
+    changed(cx, memory, source, &mut scene);
     surfaces(cx, memory, source, &mut scene);
     pointed(cx, source, &mut scene);
     picked(cx, source, &mut scene);
@@ -208,6 +212,23 @@ fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
     }
     if cx.state.workbench.both_clouds {
         other_cloud(cx, memory, source, scene);
+    }
+}
+
+/// The contact points that the last change dropped and added.
+fn changed(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
+    let Some(ghost) = &memory.ghosts[source as usize] else { return };
+    for (layer, points) in &ghost.points {
+        let look = cx.state.settings.scene.layer(*layer);
+        if look.shown && !points.is_empty() {
+            scene.clouds.push(CloudItem {
+                name: format!("{layer:?}").to_lowercase(),
+                revision: ghost.revision,
+                points: points.clone(),
+                colors: PointColors::One,
+                style: cloud_style(look, color(cx, source, *layer)),
+            });
+        }
     }
 }
 
@@ -306,6 +327,9 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(S
     found.extend(other.map(|pose| (SceneLayer::OtherCad, pose.grasp_from_object.to_affine())));
     let truth = state.sample().ready().and_then(|sample| sample.grasp_from_object);
     found.extend(truth.map(|pose| (SceneLayer::TrueCad, pose.to_affine())));
+    let before = state.ghost(source).and_then(|ghost| ghost.pose).map(|pose| pose.grasp_from_object);
+    let before = before.filter(|before| registered != Some(*before));
+    found.extend(before.map(|pose| (SceneLayer::Before, pose.to_affine())));
     found
 }
 

@@ -7,7 +7,7 @@ use eframe::egui::{
 };
 use strum::IntoEnumIterator as _;
 
-use super::{Memory, build, layers, other_side, steps};
+use super::{Memory, build, ghost, layers, other_side, steps};
 use crate::app::command::SettingsCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer, SceneLook};
@@ -78,6 +78,9 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
             if other_side(source) == ImprintSource::Measured { "measured contact" } else { "predicted contact" };
         add(SceneLayer::OtherContact, other);
     }
+    for (layer, text) in ghost::legend_entries(memory, source) {
+        add(layer, &text);
+    }
     if memory.mesh.is_some() {
         for (layer, _) in build::models(cx, source, 0.0) {
             add(layer, model_name(cx, source, layer));
@@ -111,6 +114,7 @@ fn model_name(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> &'static
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => "CAD, in hand",
         SceneLayer::Cad if cx.state.by_hand(source).is_some() => "CAD, accepted by hand",
         SceneLayer::TrueCad => "CAD, true pose",
+        SceneLayer::Before => "CAD, before",
         SceneLayer::OtherCad if source == ImprintSource::Measured => "CAD, predicted side",
         SceneLayer::OtherCad => "CAD, measured side",
         _ => "CAD, aligned",

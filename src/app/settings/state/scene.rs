@@ -27,6 +27,12 @@ pub enum SceneLayer {
     OtherCad,
     /// The model at the true pose.
     TrueCad,
+    /// The model where it was registered before the last change of a mask.
+    Before,
+    /// The contact points that the last change dropped.
+    Dropped,
+    /// The contact points that it added.
+    Added,
     /// The model at the pinned steps.
     Pins,
     /// Floor grid, axes, scale bar.
@@ -92,6 +98,7 @@ impl SceneLayer {
             Self::Membrane => LayerLook { size: LayerSize::Px(1.5), ..look },
             Self::Surface => LayerLook { shown: false, opacity: 0.5, ..look },
             Self::Contact | Self::OtherContact => LayerLook { size: LayerSize::Mm(0.4), ..look },
+            Self::Dropped | Self::Added => LayerLook { size: LayerSize::Mm(0.6), ..look },
             _ => look,
         }
     }
@@ -103,7 +110,7 @@ impl SceneLayer {
 
     /// Whether its size can be in millimeters.
     pub fn has_points(self) -> bool {
-        matches!(self, Self::Membrane | Self::Contact | Self::OtherContact)
+        matches!(self, Self::Membrane | Self::Contact | Self::OtherContact | Self::Dropped | Self::Added)
     }
 }
 

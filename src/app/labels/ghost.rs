@@ -1,0 +1,47 @@
+//! [`Ghost`]: what the last change of a mask started from, shown beside what it led to.
+
+use std::sync::Arc;
+
+use super::super::keys::{CloudKey, ImprintSource, PoseKey, Revision};
+use super::super::state::State;
+use crate::domain::grid::Mask;
+use crate::domain::rig::PadId;
+use crate::work::cloud::Clouds;
+use crate::work::pose::PoseResult;
+
+/// Mask, pose and cloud before the last change of a mask. Nothing of it is computed: pose and cloud are those that were
+/// there, and are missing where none was.
+#[derive(Clone, Copy, Debug)]
+pub struct Ghost<'a> {
+    /// The finger whose mask was changed.
+    pub finger: PadId,
+    /// Which change of the document it is of.
+    pub revision: Revision,
+    /// The mask before.
+    pub mask: &'a Arc<Mask>,
+    /// The pose before.
+    pub pose: Option<&'a Arc<PoseResult>>,
+    /// The cloud before, with its recipe.
+    pub clouds: Option<(&'a CloudKey, &'a Arc<Clouds>)>,
+}
+
+impl State {
+    /// What the last change of a mask of an imprint of the selected pair started from, until the next stroke; `None` where
+    /// there was none, or ghosts are switched off.
+    pub fn ghost(&self, source: ImprintSource) -> Option<Ghost<'_>> {
+        let changed = self.document.changed.as_ref()?;
+        let here = changed.pair == self.pair_name() && changed.source == source && self.document.stroke.is_none();
+        let mask = changed.mask.as_ref().filter(|_| here && self.settings.ghosts)?;
+        let key = changed.before.as_ref();
+        let clouds = key.and_then(|key| Some((&key.cloud, self.results.clouds.get(&key.cloud)?)));
+        let (finger, revision) = (changed.finger, changed.revision);
+        Some(Ghost { finger, revision, mask, pose: key.and_then(|key| self.results.poses.get(key)), clouds })
+    }
+
+    /// The recipe of the pose that is shown of an imprint.
+    pub(super) fn shown_pose_key(&self, source: ImprintSource) -> Option<PoseKey> {
+        self.pose(source).shown()?;
+        let now = self.pose_key(source).ok().flatten().filter(|key| self.results.poses.contains(key));
+        now.or_else(|| self.latest(source)?.pose.clone())
+    }
+}

@@ -1,0 +1,56 @@
+//! What an angle hangs on is the same on the screen and by verb.
+
+use touch2touch::app::command::ViewCommand;
+use touch2touch::io::npz;
+use touch2touch::io::pt::Values;
+
+use super::*;
+
+const MEASURED: ImprintSource = ImprintSource::Measured;
+
+#[test]
+fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let path = folder.to_str().unwrap();
+    let out = home.path().join("influence");
+    let verb = ["pose", path, "--influence", out.to_str().unwrap(), "--mask", "threshold"];
+    let report = json(&verb, home.path());
+    let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
+    let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
+    studio.send(SettingsCommand::SetMask(MaskSettings { choice, ..MaskSettings::default() }).into());
+    assert!(studio.state.influence(MEASURED).ready().is_none(), "nobody looks at it");
+    studio.send(ViewCommand::ShowInfluence(true).into());
+    let pairs = studio.state.library.open.as_ref().unwrap().source.index().pairs.len();
+    for pair in 0..pairs {
+        studio.send(LibraryCommand::Select(PairId(pair as u32)).into());
+        let state = &studio.state;
+        let name = state.pair_name();
+        let case = report["cases"].as_array().unwrap().iter().find(|case| case["name"] == name).unwrap();
+        let Lookup::Ready(found) = state.influence(MEASURED) else { panic!("{name}: {:?}", state.tasks.failed) };
+        let arrays = npz::read(Path::new(case["influence"]["file"].as_str().unwrap())).unwrap();
+        for (finger, values) in found.pixels.entries() {
+            let written = &arrays[&state.finger_name(finger).to_lowercase()];
+            assert_eq!(written.shape, [values.height(), values.width()]);
+            let Values::F32(written) = &written.values else { panic!("{name}: not f32") };
+            let shown = values.as_slice().iter().map(|v| (found.deg_per_mm2(*v) as f32).to_bits());
+            assert!(shown.eq(written.iter().map(|v| v.to_bits())), "{name} {finger:?}");
+            let finite = values.as_slice().iter().filter(|v| v.is_finite()).count();
+            assert!(finite > 1000 && finite < values.len(), "{name} {finger:?}: {finite}");
+        }
+        let places = case["influence"]["places"].as_array().unwrap();
+        assert_eq!(places.len(), 10, "{name}");
+        for (said, place) in places.iter().zip(&found.places) {
+            assert_eq!(said["angle_deg"], number(place.angle_deg), "{name}");
+            assert_eq!(said["in_mask"], place.in_mask, "{name}");
+        }
+    }
+    // A registration that has none says so, in both.
+    let verb = ["pose", path, "--influence", out.to_str().unwrap(), "--mask", "threshold", "--engine", "gicp"];
+    let why = json(&verb, home.path())["cases"][0]["no_influence"].as_str().unwrap().to_owned();
+    let engine = touch2touch::domain::pose::Registration::Gicp.into();
+    studio.send(SettingsCommand::SetPoseEngine(engine).into());
+    let Lookup::Failed(said) = studio.state.influence(MEASURED) else { panic!("{:?}", studio.state.tasks.failed) };
+    assert!(why.contains(&said.why), "{why}: {}", said.why);
+    studio.send(ViewCommand::ShowInfluence(false).into());
+}

@@ -1,0 +1,157 @@
+//! After a stroke: what the pose hangs on, what was before, and the lens.
+
+use eframe::egui::{Event, Key, Modifiers, PointerButton, pos2};
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::command::{LabelsCommand, LibraryCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::library::Place;
+use touch2touch::app::settings::{SceneLayer, Workspace};
+use touch2touch::app::state::State;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::rig::lab;
+
+use super::rig::Rig;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+const MEASURED: ImprintSource = ImprintSource::Measured;
+
+impl Rig {
+    /// A brush stroke by command, raw bubble pixels.
+    fn dab(&mut self, from: [f32; 2], to: [f32; 2]) {
+        let begin = LabelsCommand::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px: from, erase: false };
+        self.send(begin);
+        self.send(LabelsCommand::StrokeTo(to));
+        self.send(LabelsCommand::EndStroke);
+    }
+}
+
+fn state(rig: &Rig) -> &State {
+    rig.harness.state().state()
+}
+
+#[test]
+fn what_the_angle_hangs_on_is_computed_while_it_is_shown_and_follows_the_mask() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    let there = |rig: &Rig| state(rig).results.influences.bytes();
+    assert_eq!(there(&rig), 0, "nobody looks at it");
+    rig.harness.key_press_modifiers(Modifiers::SHIFT, Key::I);
+    rig.harness.step();
+    rig.settle();
+    assert!(there(&rig) > 0);
+    let key = |rig: &Rig| {
+        let now = state(rig);
+        assert!(now.influence(MEASURED).ready().is_some(), "{:?}", now.tasks.failed);
+        now.shown_influence(MEASURED).unwrap().0
+    };
+    let before = key(&rig);
+    // The status bar says what hangs on the pixel under the pointer.
+    let picture = rig.harness.get_by_label("Measured imprint right").rect();
+    rig.harness.hover_at(picture.center());
+    rig.settle();
+    rig.shoot("label-influence");
+    assert!(rig.harness.query_all_by_label_contains("°/mm²").next().is_some());
+    rig.dab([60.0, 60.0], [110.0, 60.0]);
+    assert_ne!(key(&rig), before, "another mask, another pose");
+    rig.harness.key_press_modifiers(Modifiers::SHIFT, Key::I);
+    rig.harness.step();
+    rig.settle();
+    let bytes = there(&rig);
+    rig.dab([60.0, 80.0], [110.0, 80.0]);
+    assert_eq!(there(&rig), bytes, "not shown, not computed");
+}
+
+#[test]
+fn what_was_before_a_stroke_stays_visible_until_the_next_or_elsewhere() {
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    let mask = |rig: &Rig| state(rig).mask_in_force(MEASURED, lab::RIGHT).unwrap().mask.clone();
+    let angle = |rig: &Rig| state(rig).pose(MEASURED).ready().unwrap().angle_rad;
+    assert!(state(&rig).ghost(MEASURED).is_none());
+    let (first, first_angle) = (mask(&rig), angle(&rig));
+    rig.dab([60.0, 40.0], [110.0, 60.0]);
+    let (second, second_angle) = (mask(&rig), angle(&rig));
+    assert!(first != second && first_angle != second_angle);
+    let ghost = state(&rig).ghost(MEASURED).unwrap();
+    assert_eq!((ghost.finger, ghost.mask), (lab::RIGHT, &first));
+    assert_eq!(ghost.pose.unwrap().angle_rad, first_angle);
+    assert!(ghost.clouds.is_some());
+    // The list of the 3D view says what was dropped and added, and where the model was.
+    rig.shoot("label-ghost");
+    assert!(rig.harness.query_all_by_label_contains("added: ").next().is_some());
+    assert!(rig.harness.query_all_by_label_contains("CAD, before").next().is_some());
+    // The next stroke has its own.
+    rig.dab([60.0, 80.0], [110.0, 90.0]);
+    assert_eq!(state(&rig).ghost(MEASURED).unwrap().mask, &second);
+    // A key switches them off and on; undo and going elsewhere end them.
+    for shown in [false, true] {
+        rig.harness.key_press_modifiers(Modifiers::SHIFT, Key::H);
+        rig.harness.step();
+        rig.settle();
+        assert_eq!(state(&rig).ghost(MEASURED).is_some(), shown);
+    }
+    rig.send(LabelsCommand::Undo);
+    assert!(state(&rig).ghost(MEASURED).is_none(), "it may be what was taken back");
+    rig.dab([60.0, 80.0], [110.0, 90.0]);
+    assert!(state(&rig).ghost(MEASURED).is_some());
+    rig.send(LibraryCommand::Step(1));
+    rig.send(LibraryCommand::Step(-1));
+    assert!(state(&rig).ghost(MEASURED).is_none());
+}
+
+#[test]
+fn the_lens_uploads_nothing_and_leaves_an_idle_window_idle() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    let picture = rig.harness.get_by_label("Measured imprint right").rect();
+    rig.harness.hover_at(picture.center());
+    rig.settle();
+    let uploads = rig.harness.state().uploads();
+    let without = rig.harness.render().unwrap();
+    rig.harness.key_press_modifiers(Modifiers::SHIFT, Key::M);
+    rig.harness.step();
+    rig.settle();
+    assert!(state(&rig).selection.lens);
+    let with = rig.harness.render().unwrap();
+    assert_ne!(without, with);
+    for at in [0.3, 0.5, 0.7] {
+        rig.harness.hover_at(pos2(picture.left() + at * picture.width(), picture.center().y));
+        rig.settle();
+    }
+    rig.shoot("label-lens");
+    assert_eq!(rig.harness.state().uploads(), uploads);
+    // It is painting's companion: a stroke beneath it is drawn as without.
+    let at = picture.center();
+    rig.harness.hover_at(at);
+    for pressed in [true, false] {
+        let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+        rig.harness.event(Event::PointerButton { pos: at, button, pressed, modifiers });
+        rig.harness.step();
+    }
+    rig.settle();
+    assert!(state(&rig).hand_mask(MEASURED, lab::RIGHT).is_some());
+}
+
+#[test]
+#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
+fn pictures_of_the_live_loop() {
+    let Some(mut rig) = Rig::live(SIZE, Place::Demo) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(LibraryCommand::Select(PairId(30)));
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.dab([40.0, 50.0], [70.0, 60.0]);
+    rig.shoot("live-ghost");
+    let picture = rig.harness.get_by_label("Measured imprint right").rect();
+    rig.harness.hover_at(picture.center());
+    rig.send(ViewCommand::ShowInfluence(true));
+    rig.shoot("live-influence");
+    let scene = state(&rig).settings.scene.clone();
+    assert!(scene.layer(SceneLayer::Before).shown);
+    rig.send(ViewCommand::ShowInfluence(false));
+    rig.send(ViewCommand::ShowLens(true));
+    rig.shoot("live-lens");
+    rig.send(LabelsCommand::ResetMask);
+}
