@@ -107,7 +107,7 @@ fn labels_are_the_same_by_whatever_way_the_data_set_is_opened() {
         one.review = Review::Flagged;
         labels.save(&pair.name, &one, &Deed::named("test")).unwrap();
     }
-    let (first, written) = (read(&root, false), files(&labels.folder().unwrap()));
+    let (first, written) = (read(&root, false), files(labels.folder().unwrap()));
     assert!(first.len() == 3 && first.values().all(|one| one.masks.len() == 2 && one.review == Review::Flagged));
     let same = |now: &BTreeMap<String, PairLabels>, way: &str| {
         for (name, one) in &first {
@@ -138,7 +138,7 @@ fn labels_are_the_same_by_whatever_way_the_data_set_is_opened() {
     let grown = read(&root, false);
     assert_eq!(grown.len(), 4);
     same(&grown, "a pair more");
-    assert_eq!(files(&labels.folder().unwrap()), written, "reading writes nothing");
+    assert_eq!(files(labels.folder().unwrap()), written, "reading writes nothing");
     // The folder goes elsewhere, with what lies in it.
     let moved = dir.path().join("moved");
     std::fs::rename(&root, &moved).unwrap();

@@ -27,6 +27,9 @@ pub struct Generating<'a> {
 /// A pad's picture that the generator starts from, with the place of its pair.
 type Picture<'a> = (usize, PadId, Cow<'a, RgbGrid>);
 
+/// The predictions of a pair's pads, or why a pad has none.
+pub type Predicted = PerPad<Result<Prediction, TaskError>>;
+
 impl Generating<'_> {
     /// The sensor that it starts from.
     ///
@@ -35,7 +38,7 @@ impl Generating<'_> {
     pub fn input(self, rig: &Rig) -> Result<SensorId, TaskError> {
         let what = || format!("Generate with {}", self.bundle.name);
         let ends = self.bundle.ends(rig).ok_or_else(|| TaskError::new(what(), "the bundle is no generator"))?;
-        Ok(ends.map_err(|err| TaskError::from_error(&what(), &err))?.input)
+        Ok(ends.map_err(|err| TaskError::from_error(what(), &err))?.input)
     }
 
     fn pictures<'s>(self, samples: &[&'s Sample]) -> Result<Vec<Picture<'s>>, TaskError> {
@@ -71,12 +74,7 @@ impl Generating<'_> {
     ///
     /// # Errors
     /// As [`Self::input`].
-    pub fn pairs(
-        self,
-        models: &Models,
-        samples: &[&Sample],
-        cx: &JobCx,
-    ) -> Result<Option<Vec<PerPad<Result<Prediction, TaskError>>>>, TaskError> {
+    pub fn pairs(self, models: &Models, samples: &[&Sample], cx: &JobCx) -> Result<Option<Vec<Predicted>>, TaskError> {
         let pictures = self.pictures(samples)?;
         let wanted = self.wanted(&pictures);
         let Some(made) = models.predict_each(self.bundle, self.engine, self.config, &wanted, cx) else {

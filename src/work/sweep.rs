@@ -23,7 +23,7 @@ use super::labels::{ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels};
 use super::mask::{MaskInputs, MaskRecipe, contact_mask};
 use super::models::{Masking, Models};
 use super::pose::pose;
-use super::predict::Generating;
+use super::predict::{Generating, Predicted};
 use super::prediction::Prediction;
 use super::tool::load_tool;
 use crate::domain::align::Ask;
@@ -325,7 +325,7 @@ impl<'a> Job<'a> {
         let generating = Generating { bundle, engine: self.setup.engine, config };
         let samples: Vec<&Sample> = pairs.iter().map(|pair| &pair.sample).collect();
         let made = generating.pairs(self.models, &samples, &self.cx.quiet())?;
-        let one = |made: PerPad<Result<Prediction, TaskError>>| {
+        let one = |made: Predicted| {
             let mut pads = PerPad::default();
             for (at, made) in made.into_iter().enumerate() {
                 pads[PadId::new(at)] = made.transpose().map_err(|err| err.why)?;
