@@ -9,7 +9,7 @@ pub mod caught;
 pub mod dataset;
 pub(crate) mod digest;
 pub mod doctor;
-pub mod export_unet;
+pub mod exchange;
 pub mod files;
 pub mod folders;
 pub mod follow;

@@ -8,7 +8,8 @@
 //! * [`imprint`], [`mask`], [`cloud`], [`pose`]: one step each. [`compare`], [`ledger`], [`layers`], [`influence`], [`ensemble`]: what
 //!   there is to know about their results.
 //! * [`figure`], [`pair_files`]: results as pictures for papers and as files for other programs.
-//! * [`evaluate`], [`sweep`], [`statistics`], [`adapt`], [`train`], [`export`], [`training_data`]: passes over a whole data set.
+//! * [`evaluate`], [`sweep`], [`statistics`], [`adapt`], [`train`], [`export`], [`import`],
+//!   [`training_data`]: passes over a whole data set.
 //! * [`job`], [`error`]: how work is watched, stopped, and how it fails.
 
 pub mod adapt;
@@ -25,6 +26,7 @@ pub mod evaluate;
 pub mod export;
 pub mod figure;
 pub mod filter;
+pub mod import;
 pub mod imprint;
 pub mod influence;
 pub mod job;

@@ -131,7 +131,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let counts = json(&exported);
     let total: i64 = ["train", "val", "test"].iter().map(|k| counts[k].as_i64().unwrap()).sum();
     assert_eq!(total, 8, "two fingers of four pairs");
-    assert!(touch2touch::io::export_unet::check_folder(&masks).problems.is_empty());
+    assert!(touch2touch::io::exchange::check_folder(&masks).problems.is_empty());
 }
 
 #[test]

@@ -57,6 +57,7 @@ impl Action {
             Self::ExportMeasured => export(state, ImprintSource::Measured),
             Self::ExportPredicted => export(state, ImprintSource::Predicted),
             Self::ExportMasks => when(open, ExportCommand::AskMasks(true)),
+            Self::ImportMasks => when(open, ViewCommand::Ui(UiRequest::PickMasks)),
 
             Self::PreviousPair => when(listed, LibraryCommand::Step(-1)),
             Self::NextPair => when(listed, LibraryCommand::Step(1)),

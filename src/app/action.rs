@@ -95,7 +95,8 @@ actions! {
     OwnPreferences, File, "Back to my preferences", "Gives your own preferences back, while the case stays open", [];
     ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [];
     ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [];
-    ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads", [ctrl(K::E)];
+    ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads, as NPY, COCO or PNG", [ctrl(K::E)];
+    ImportMasks, File, "Import masks…", "Takes masks over from a folder of PNG, NPY or COCO files, named as an export names them; hand work stays", [];
 
     PreviousPair, Navigate, "Previous pair", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)];
     NextPair, Navigate, "Next pair", "Shows the next pair of the list", [plain(K::D), plain(K::PageDown)];
@@ -251,7 +252,8 @@ impl Action {
             Self::OpenDemo => "example sample simulated simulator",
             Self::Follow => "live watch camera stream",
             Self::Reload => "refresh again",
-            Self::ExportMasks => "unet training labels npy save",
+            Self::ExportMasks => "unet training labels npy coco png save",
+            Self::ImportMasks => "unet labels npy coco png load read",
             Self::NextWorst => "bad largest error outlier failure hardest",
             Self::NextUncertain | Self::RankMasks => {
                 "queue active learning doubt disagreement unsure probability hardest"

@@ -19,6 +19,7 @@ use crate::work::adapt::Adapted;
 use crate::work::bundles::BundleInfo;
 use crate::work::error::{TaskError, TaskErrorKind};
 use crate::work::evaluate::Evaluation;
+use crate::work::import::Import;
 use crate::work::job::Progress;
 use crate::work::propose::Batch;
 use crate::work::sweep::Sweep;
@@ -72,6 +73,8 @@ pub enum Answer {
     Swept(Ticket, Arc<Sweep>),
     /// Masks were proposed for many pairs.
     ProposedAll(Ticket, Box<Batch>),
+    /// Masks were taken over.
+    Imported(Ticket, Box<Import>),
     /// A generator was fitted, and is this bundle where one was written.
     Adapted(Ticket, Arc<Adapted>, Option<Box<BundleInfo>>),
     /// A mask model was trained, and is this bundle.
@@ -170,6 +173,10 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::ProposedAll(ticket, batch) => {
             state.tasks.running.remove(&ticket);
             labels::proposed(state, ticket, &batch);
+        }
+        Answer::Imported(ticket, import) => {
+            state.tasks.running.remove(&ticket);
+            labels::imported(state, &import);
         }
         Answer::Adapted(ticket, adapted, bundle) => {
             state.tasks.running.remove(&ticket);

@@ -20,6 +20,7 @@ use crate::work::case::CaseSetup;
 use crate::work::evaluate::{Evaluation, Setup};
 use crate::work::export::ExportChoice;
 use crate::work::figure::FigureSetup;
+use crate::work::import::ImportSetup;
 use crate::work::labels::Deed;
 use crate::work::propose::BatchSetup;
 use crate::work::sweep::SweepSetup;
@@ -100,6 +101,15 @@ pub enum Effect {
         choice: ExportChoice,
         /// Where to.
         folder: PathBuf,
+    },
+    /// Take masks over that lie in a form of other programs.
+    ImportMasks {
+        /// The job.
+        ticket: Ticket,
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// Which, and how.
+        setup: ImportSetup,
     },
     /// Have a tool's CAD file read in a unit.
     SetUnit {
@@ -225,6 +235,7 @@ impl std::fmt::Debug for Effect {
             Self::SaveLabels(_, save) => write!(f, "SaveLabels({})", save.name),
             Self::SaveSettings(_) => write!(f, "SaveSettings"),
             Self::ExportMasks { folder, .. } => write!(f, "ExportMasks({})", folder.display()),
+            Self::ImportMasks { setup, .. } => write!(f, "ImportMasks({})", setup.from.display()),
             Self::SetUnit { tool, unit, .. } => write!(f, "SetUnit({tool}, {unit:?})"),
             Self::Evaluate { ticket, .. } => write!(f, "Evaluate({ticket:?})"),
             Self::Sweep { ticket, .. } => write!(f, "Sweep({ticket:?})"),

@@ -3,7 +3,7 @@
 mod command;
 pub mod state;
 
-pub use state::{CaseView, ExportState, FigureForm, MOST_PAIRS, Output, PairExport, SCALES};
+pub use state::{CaseView, ExportState, FigureForm, ImportForm, MOST_PAIRS, Output, PairExport, SCALES};
 
 use std::path::PathBuf;
 
@@ -28,6 +28,12 @@ pub enum ExportCommand {
     AskMasks(bool),
     /// Changes what it says.
     SetMasks(ExportChoice),
+    /// Says what an import of masks from a folder or file would change; `None` asks no more.
+    AskImport(Option<PathBuf>),
+    /// Whether it replaces what was painted by hand as well.
+    ImportOverHand(bool),
+    /// Does it.
+    Import,
     /// Asks where something is to be written.
     Place(Output),
     /// Writes it.
@@ -44,6 +50,17 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
         ExportCommand::SetForm(form) => state.export.form = form.validated(),
         ExportCommand::AskMasks(asking) => state.export.asking_masks = asking,
         ExportCommand::SetMasks(choice) => state.export.masks = choice,
+        ExportCommand::AskImport(from) => {
+            state.export.imports += 1;
+            let asked = state.export.imports;
+            state.export.importing = from.map(|from| ImportForm { from, over_hand: false, asked });
+        }
+        ExportCommand::ImportOverHand(over_hand) => {
+            if let Some(form) = &mut state.export.importing {
+                form.over_hand = over_hand;
+            }
+        }
+        ExportCommand::Import => import(state, effects),
         ExportCommand::Place(output) => effects.push(Effect::Ui(UiRequest::PickOutput(output))),
         ExportCommand::WriteCase(file, camera) => {
             let (Some(setup), Some(open)) = (state.case_setup(&camera), &state.library.open) else { return };
@@ -118,6 +135,14 @@ pub(super) fn predict_case(state: &mut State, effects: &mut Vec<Effect>) {
         state.export.predict = false;
         predict::same_seed(state, effects);
     }
+}
+
+fn import(state: &mut State, effects: &mut Vec<Effect>) {
+    let (Some(setup), Some(open)) = (state.import_setup(), &state.library.open) else { return };
+    let source = open.source.clone();
+    state.export.importing = None;
+    let ticket = state.tasks.start("Import masks".into(), Vec::new());
+    effects.push(Effect::ImportMasks { ticket, source, setup });
 }
 
 fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Effect>) {

@@ -5,7 +5,7 @@ pub mod ghost;
 mod repeat;
 pub mod state;
 
-pub(super) use batch::proposed;
+pub(super) use batch::{imported, proposed};
 pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
 pub use state::{Changed, Document, HandMask, MaskPlace, Merged, PairLabels, Repeating, Review, Stored, Stroke};
 

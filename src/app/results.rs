@@ -22,6 +22,7 @@ pub mod cloud;
 pub mod comparison;
 pub mod deviation;
 pub mod ensemble;
+pub mod import_plan;
 pub mod imprint;
 pub mod influence;
 pub mod inspection;
@@ -261,6 +262,8 @@ results! {
     Mask(mask::MaskKey) in masks, 32 * MIB;
     /// What an export of masks would write where.
     MaskPlan(mask_plan::MaskPlanKey) in mask_plans, MIB;
+    /// What an import of masks would change.
+    ImportPlan(import_plan::ImportPlanKey) in import_plans, MIB;
     /// The distances of an imprint's points from the CAD model.
     Distances(proposal::DistancesKey) in distances, 32 * MIB;
     /// A mask that is proposed.

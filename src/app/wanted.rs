@@ -25,6 +25,7 @@ impl State {
         list.label_stats();
         list.neighbors();
         list.mask_plan();
+        list.import_plan();
         list.train_plan();
         list.list
     }

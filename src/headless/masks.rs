@@ -1,6 +1,7 @@
 //! `touch2touch masks`: contact masks as training folders, how far those of two people agree, which to look at first, and a
 //! mask model trained on them.
 
+mod import;
 mod propose;
 mod queue;
 mod stats;
@@ -9,7 +10,7 @@ mod train;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::args::{DatasetArgs, LimitArgs, keyed};
@@ -20,7 +21,7 @@ use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::dataset::PairId;
 use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
-use crate::io::export_unet::ExportReport;
+use crate::io::exchange::{ExportReport, Format};
 use crate::work::agreement::{Agreements, compare_labels};
 use crate::work::error::TaskError;
 use crate::work::export::{Automatic, ExportChoice, ExportSetup, HandMasks, LeftOut, Which, export_masks, plan};
@@ -31,8 +32,10 @@ use crate::work::tool::Tools;
 /// What can be done with masks.
 #[derive(Debug, Subcommand)]
 pub(super) enum MasksVerb {
-    /// Write images and masks for training a mask UNet, and check what was written by the loader's rules.
+    /// Write masks for training, and check what was written by the rules of its form.
     Export(ExportArgs),
+    /// Take masks over that lie in one of these forms. What was painted by hand stays, and no pair is marked.
+    Import(import::ImportArgs),
     /// Compare the masks of two people, the worst first.
     Compare(CompareMasksArgs),
     /// Propose masks for many pairs at once. What was painted by hand stays, and every pair is still to be looked at.
@@ -118,8 +121,9 @@ pub(super) struct ExportArgs {
     /// The folder to write; empty, missing, or a previous export.
     #[arg(long)]
     out: PathBuf,
-    /// The form.
-    #[arg(long, value_enum, default_value_t = Format::Unet)]
+    /// The form: a folder as the lab's UNet loader reads it, numpy arrays, COCO annotations with run lengths, or masks alone as
+    /// pictures.
+    #[arg(long, default_value = Format::default().key(), value_parser = keyed::<Format>())]
     format: Format,
     /// Which pairs: those marked "done" with a mask drawn by hand, those begun too, or all (`--mask` makes the missing
     /// masks). Pairs marked "skip" or "flagged" never go along.
@@ -152,15 +156,10 @@ pub(super) struct ExportArgs {
     common: Common,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Format {
-    /// `{train,val,test}/{imgs,masks}/<stem>.png`, as the lab's UNet loader reads it.
-    Unet,
-}
-
 #[derive(Serialize)]
 struct Exported {
     out: PathBuf,
+    format: &'static str,
     train: usize,
     val: usize,
     test: usize,
@@ -183,13 +182,13 @@ struct Written {
 pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let args = match verb {
         MasksVerb::Export(args) => args,
+        MasksVerb::Import(args) => return import::run(args),
         MasksVerb::Compare(args) => return compare(args),
         MasksVerb::Propose(args) => return propose::run(args),
         MasksVerb::Stats(args) => return stats::run(args),
         MasksVerb::Queue(args) => return queue::run(args),
         MasksVerb::Train(args) => return train::run(args),
     };
-    let Format::Unet = args.format;
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let ids = args.limit.spread(dataset.index.pairs.len());
     let output = Output::new(args.common, "exporting", ids.len());
@@ -201,6 +200,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
             hand_checked: args.hand_checked,
             by_tool: args.by_tool,
             seed: args.split_seed,
+            format: args.format,
         },
     };
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
@@ -231,6 +231,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let [train, val, test] = plan.counts;
     let exported = Exported {
         out: args.out.clone(),
+        format: args.format.key(),
         train,
         val,
         test,
@@ -241,7 +242,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     };
     output.finish(&exported, || {
         let end = match exported.written {
-            Some(_) => format!("written to {}, read back and accepted by the loader's rules", args.out.display()),
+            Some(_) => format!("written to {}, read back and found the same by its loader's rules", args.out.display()),
             None => "nothing was written (--dry-run)".to_owned(),
         };
         [plan.lines(), vec![end]].concat().join("\n")

@@ -46,7 +46,30 @@ pub enum NpzError {
 /// # Errors
 /// [`NpzError::Io`] if the file cannot be written.
 pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
-    write_values(file, &[image.height(), image.width()], image.as_slice().to_vec())
+    write_values(file, &[image.height(), image.width()], Values::F32(image.as_slice().to_vec()))
+}
+
+/// Writes a gray picture as `.npy`: u8, shape `(height, width)`, row-major.
+///
+/// # Errors
+/// [`NpzError::Io`] if the file cannot be written.
+pub fn write_npy_gray(file: &Path, picture: &Grid<u8>) -> Result<(), NpzError> {
+    write_values(file, &[picture.height(), picture.width()], Values::U8(picture.as_slice().to_vec()))
+}
+
+/// Reads a `.npy` file of numbers, row-major. Integers other than `u8` become `i64`.
+///
+/// # Errors
+/// [`NpzError`].
+pub fn read_npy(file: &Path) -> Result<Tensor, NpzError> {
+    let io = |source| NpzError::Io { file: file.to_owned(), source };
+    let name = file.file_stem().map(|name| files::clip(&name.to_string_lossy())).unwrap_or_default();
+    let failed = |reason| NpzError::Array { file: file.to_owned(), name: name.clone(), reason };
+    let opened = files::open(file).map_err(io)?;
+    let size = opened.metadata().map_err(io)?.len();
+    let mut from = std::io::BufReader::new(opened);
+    let header = npy::header(&mut from, MAX_VALUES).map_err(failed)?;
+    header.values(&mut from, size).map_err(failed)
 }
 
 /// Writes the planes of a color picture as `.npy`: f32, 3 x height x width.
@@ -55,11 +78,11 @@ pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
 /// [`NpzError::Io`] if the file cannot be written.
 pub fn write_npy_planes(file: &Path, picture: &RgbGrid) -> Result<(), NpzError> {
     let values = (0..3).flat_map(|c| picture.as_slice().iter().map(move |pixel| pixel[c])).collect();
-    write_values(file, &[3, picture.height(), picture.width()], values)
+    write_values(file, &[3, picture.height(), picture.width()], Values::F32(values))
 }
 
-fn write_values(file: &Path, shape: &[usize], values: Vec<f32>) -> Result<(), NpzError> {
-    let bytes = npy::bytes(shape, &Values::F32(values));
+fn write_values(file: &Path, shape: &[usize], values: Values) -> Result<(), NpzError> {
+    let bytes = npy::bytes(shape, &values);
     atomic::write_bytes(file, &bytes).map_err(|source| NpzError::Io { file: file.to_owned(), source })
 }
 

@@ -302,6 +302,7 @@ impl StudioApp {
             UiRequest::PickFile => self.shared.dialogs.open(Purpose::File, ctx),
             UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
             UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
+            UiRequest::PickMasks => self.shared.dialogs.open(Purpose::Masks, ctx),
             UiRequest::Camera(preset) => {
                 // The view under the pointer turns; linked cameras turn together.
                 let over = self.panes.hovered.filter(|pane| matches!(pane.kind(), Kind::Scene(_)));
@@ -492,6 +493,7 @@ impl eframe::App for StudioApp {
             bars::hint(&mut cx, &ctx);
             export::form(&mut cx, &ctx);
             export::masks::form(&mut cx, &ctx);
+            export::import::form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::sheet(&mut cx, &ctx, &mut self.shortcuts);
             bars::drop_overlay(&cx, &ctx);
@@ -503,6 +505,7 @@ impl eframe::App for StudioApp {
                         Command::Export(ExportCommand::WriteCase(path, camera))
                     }
                     Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
+                    Purpose::Masks => Command::Export(ExportCommand::AskImport(Some(path))),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });
             }

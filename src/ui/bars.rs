@@ -71,6 +71,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             Action::ExportMeasured,
             Action::ExportPredicted,
             Action::ExportMasks,
+            Action::ImportMasks,
             Action::TrainMasks,
             Action::Save,
             Action::Reload,
@@ -85,7 +86,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
     });
-    response.on_hover_text("Open a data set, export masks, train on them");
+    response.on_hover_text("Open a data set, export and import masks, train on them");
 }
 
 /// Shows and hides panes of the workspace; whether it did.

@@ -21,6 +21,8 @@ pub(super) enum Purpose {
     File,
     /// The folder that the results table is written to.
     Table,
+    /// The folder of masks that are imported.
+    Masks,
     /// Where something is written.
     Output(Output),
 }
@@ -31,6 +33,7 @@ impl Purpose {
             Self::Folder => "Open a folder of pairs",
             Self::File => "Open a file of a data set",
             Self::Output(output) => output.title(),
+            Self::Masks => "Import masks from a folder",
             Self::Table => "Write the results table to a folder",
         }
     }
@@ -75,7 +78,7 @@ impl Dialogs {
         let work = move || {
             let dialog = rfd::FileDialog::new().set_title(purpose.title());
             let path = match purpose {
-                Purpose::Folder | Purpose::Table => dialog.pick_folder(),
+                Purpose::Folder | Purpose::Table | Purpose::Masks => dialog.pick_folder(),
                 Purpose::File => dialog.pick_file(),
                 Purpose::Output(output) => match output.file_name() {
                     Some(name) => dialog.set_file_name(name).save_file(),
@@ -135,6 +138,9 @@ impl Dialogs {
                     Some(name) => format!("A file such as {name}"),
                     None => "A folder; it is made if it is not there.".to_owned(),
                 },
+                Purpose::Masks => {
+                    "The folder of an export, one of its parts, or one .png, .npy or .json of masks.".to_owned()
+                }
                 _ => "A folder in the lab's layout, a folder of image pairs, or any file in one.".to_owned(),
             };
             ui.label(caption(what, p));

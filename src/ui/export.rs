@@ -1,5 +1,6 @@
 //! Taking things away: the form of a figure, and the menu in each pane's title.
 
+pub(super) mod import;
 pub(super) mod masks;
 
 use eframe::egui::{self, DragValue, Rect, RichText, Sense, Stroke, Ui, vec2};

@@ -25,7 +25,7 @@ fn color(p: &Palette, level: Level) -> Color32 {
 
 /// What can be done with a file that was written.
 fn links(cx: &mut Cx<'_>, ui: &mut Ui, place: &Path) {
-    let show = ui.link(RichText::new("Show in its folder").size(12.0));
+    let show = ui.link(RichText::new("Open folder").size(12.0));
     if show.on_hover_text(place.display().to_string()).clicked() {
         cx.push(TasksCommand::Reveal(place.to_owned()));
     }

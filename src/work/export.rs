@@ -1,4 +1,4 @@
-//! Masks as training folders for a mask UNet: [`plan`] says what goes where, [`export_masks`] writes it. The studio and
+//! Masks for training, in a form of one's choice: [`plan`] says what goes where, [`export_masks`] writes it. The studio and
 //! `touch2touch masks export` both end here.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,7 +16,7 @@ use crate::domain::rig::{PadId, Rig};
 use crate::domain::sample::Sample;
 use crate::domain::units::counted;
 use crate::io::dataset::Dataset;
-use crate::io::export_unet::{self, Content, ExportConfig, ExportEntry, ExportReport, LoadFailure, PARTS};
+use crate::io::exchange::{self, Content, ExportConfig, ExportEntry, ExportReport, Format, LoadFailure, PARTS};
 
 /// What it is called in errors.
 const WHAT: &str = "Export masks";
@@ -97,6 +97,8 @@ pub struct ExportChoice {
     pub hand_checked: bool,
     /// Decides which pair lands in which part.
     pub seed: u64,
+    /// In which form.
+    pub format: Format,
 }
 
 /// What is exported.
@@ -176,6 +178,7 @@ impl Plan {
 
 fn split_of(dataset: &Dataset, choice: ExportChoice) -> ExportConfig {
     ExportConfig {
+        format: choice.format,
         seed: choice.seed,
         by_tool: choice.by_tool,
         held_out_in_train: choice.test_in_train,
@@ -219,8 +222,8 @@ pub fn plan(dataset: &Dataset, masks: &HandMasks<'_>, setup: &ExportSetup) -> Re
             plan.ids.push(id);
         }
     }
-    plan.counts = export_unet::counts(&plan.entries, &split_of(dataset, choice))
-        .map_err(|err| TaskError::from_error(WHAT, &err))?;
+    plan.counts =
+        exchange::counts(&plan.entries, &split_of(dataset, choice)).map_err(|err| TaskError::from_error(WHAT, &err))?;
     plan.drawn = drawn;
     Ok(plan)
 }
@@ -228,7 +231,7 @@ pub fn plan(dataset: &Dataset, masks: &HandMasks<'_>, setup: &ExportSetup) -> Re
 /// Makes the mask of a finger that has none by hand.
 pub type Automatic<'a> = &'a mut dyn FnMut(&Sample, PadId, Option<&str>) -> Result<Mask, TaskError>;
 
-/// Writes images and masks as [`plan`] says, and reads them back by the loader's rules. Without `automatic`, only masks
+/// Writes masks as [`plan`] says, and reads them back by the rules of their form. Without `automatic`, only masks
 /// drawn by hand can be written.
 ///
 /// # Errors
@@ -259,10 +262,10 @@ pub fn export_masks(
             .iter()
             .filter(|e| drawn.contains(&(e.pair.clone(), e.finger)) && !masks.changed.contains_key(&e.pair));
         let store = masks.labels.store(WHAT)?;
-        export_unet::check_stored(store, stored).map_err(|err| TaskError::from_error(WHAT, &err))?;
+        exchange::check_stored(store, stored).map_err(|err| TaskError::from_error(WHAT, &err))?;
     }
     let total = entries.len() as u64;
-    let report = export_unet::export(folder, entries, &split_of(dataset, setup.choice), |at| {
+    let report = exchange::export(folder, entries, &split_of(dataset, setup.choice), |at| {
         let entry = &entries[at];
         cx.check(WHAT).map_err(|_| LoadFailure::Stop)?;
         cx.progress(at as u64, total, format!("{}, {}", entry.pair, dataset.rig.pad_key(entry.finger)));

@@ -256,6 +256,12 @@ impl HandMask {
         Arc::make_mut(&mut self.marks).replace(Arc::make_mut(&mut self.mask), new, by, keep_hand)
     }
 
+    /// Takes another mask over with what it ignores; see [`Marks::take_over`].
+    pub fn take_over(&mut self, new: &Mask, ignored: Option<&Mask>, by: Provenance, keep_hand: bool) -> [usize; 2] {
+        let (mask, marks) = (Arc::make_mut(&mut self.mask), Arc::make_mut(&mut self.marks));
+        marks.take_over(mask, new, ignored, by, keep_hand)
+    }
+
     /// Cleans it up; whether anything changed. Sizes are those of the rig's depth images.
     pub fn clean(&mut self, clean_up: CleanUp, rig: &Rig) -> bool {
         let clean = clean_up.apply(&self.mask, rig.depth_px_per_mm());

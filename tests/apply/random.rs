@@ -49,11 +49,13 @@ use touch2touch::domain::pose::Rejection;
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::io::dataset::ToolUnit;
+use touch2touch::io::exchange::Format;
 use touch2touch::io::statistics::ShiftStatistics;
 use touch2touch::work::error::TaskError;
 use touch2touch::work::evaluate::{Evaluation, Setup};
 use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::figure::FigurePane;
+use touch2touch::work::import::Import;
 use touch2touch::work::job::{PreviewPicture, Progress};
 use touch2touch::work::propose::Batch;
 use touch2touch::work::queue::QueueBy;
@@ -226,13 +228,14 @@ fn form() -> impl Strategy<Value = FigureForm> {
 }
 
 fn mask_choice() -> impl Strategy<Value = ExportChoice> {
-    let flags = (any_of::<Which>(), any::<[bool; 3]>(), any::<u64>());
-    flags.prop_map(|(which, [test_in_train, by_tool, hand_checked], seed)| ExportChoice {
+    let flags = (any_of::<Which>(), any::<[bool; 3]>(), any::<u64>(), any_of::<Format>());
+    flags.prop_map(|(which, [test_in_train, by_tool, hand_checked], seed, format)| ExportChoice {
         which,
         test_in_train,
         by_tool,
         hand_checked,
         seed,
+        format,
     })
 }
 
@@ -446,6 +449,9 @@ draws! {
         1 SetForm(form()),
         1 AskMasks(any::<bool>()),
         1 SetMasks(mask_choice()),
+        1 AskImport(select(vec![None, Some(PathBuf::from("no/such/folder"))])),
+        1 ImportOverHand(any::<bool>()),
+        1 Import,
         1 Place(output()),
         1 OwnPreferences,
         1 WriteCase(Just(PathBuf::from("no/such/folder/a.t2tcase")), Just(String::new())),
@@ -547,6 +553,9 @@ draws! {
         1 Swept(ticket(), Just(()).prop_map(|()| Arc::new(swept()))),
         1 ProposedAll(ticket(), select(vec!["tool_a/data_0", "elsewhere"]).prop_map(|name| {
             Box::new(Batch { masks: 1, changed: vec![name.to_owned()], ..Batch::default() })
+        })),
+        1 Imported(ticket(), select(vec!["tool_a/data_0", "elsewhere"]).prop_map(|name| {
+            Box::new(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
         })),
         1 Adapted(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(adapted())), Just(None)),
         1 Trained(ticket(), Just(()).prop_map(|()| Arc::new(trained())), Just(()).prop_map(|()| {

@@ -225,7 +225,7 @@ fn all_damaged_masks_are_listed_and_leftovers_of_killed_exports_go() {
     assert!(done.status.success(), "{}", error_text(&done));
     assert!(!left.exists() && out.join("train/imgs").is_dir());
     // The stems say whose they are in the manifest.
-    let manifest = std::fs::read(out.join(touch2touch::io::export_unet::MANIFEST)).unwrap();
+    let manifest = std::fs::read(out.join(touch2touch::io::exchange::MANIFEST)).unwrap();
     let manifest: Value = serde_json::from_slice(&manifest).unwrap();
     let named: Vec<&str> = manifest["stems"].as_object().unwrap().values().map(|v| v[0].as_str().unwrap()).collect();
     assert!(dataset.index.pairs.iter().all(|entry| named.contains(&entry.name.as_str())), "{named:?}");

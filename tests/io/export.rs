@@ -4,7 +4,7 @@ use std::path::Path;
 
 use touch2touch::domain::grid::{Grid, Mask};
 use touch2touch::domain::rig::lab;
-use touch2touch::io::export_unet::{
+use touch2touch::io::exchange::{
     Content, ExportConfig, ExportEntry, ExportError, IGNORED, MANIFEST, PARTS, check_folder, export,
 };
 use touch2touch::io::images;

@@ -70,7 +70,7 @@ fn a_figure_of_four_pairs_takes_no_more_than_eight_actions() {
     let state = rig.harness.state().state();
     assert!(!state.export.asking && state.log.entries.back().unwrap().place.as_deref() == Some(&*file));
     // The note says where, and can be taken along.
-    rig.harness.get_all_by_label("Show in its folder").next().expect("the note leads to its folder");
+    rig.harness.get_all_by_label("Open folder").next().expect("the note leads to its folder");
     rig.shoot("figure-saved");
     rig.harness.get_all_by_label("Copy the path").next().unwrap().click();
     rig.harness.step();

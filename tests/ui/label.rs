@@ -10,7 +10,7 @@ use touch2touch::domain::grid::Mask;
 use touch2touch::domain::label::CleanKind;
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::io::dataset::Dataset;
-use touch2touch::io::export_unet::check_folder;
+use touch2touch::io::exchange::check_folder;
 use touch2touch::io::masks::MaskStore;
 
 use super::rig::Rig;

@@ -22,6 +22,7 @@ use crate::work::cloud::Clouds;
 use crate::work::error::TaskError;
 use crate::work::export::ExportChoice;
 use crate::work::figure::{FigureLook, FigurePane, FigureSetup, FigureTheme, note};
+use crate::work::import::ImportSetup;
 use crate::work::mask::made_of;
 use crate::work::pair_files::{PairFile, PairParts, write};
 use crate::work::pose::PoseResult;
@@ -87,8 +88,32 @@ pub struct ExportState {
     pub asking_masks: bool,
     /// What it says.
     pub masks: ExportChoice,
+    /// The import of masks that is asked about.
+    pub importing: Option<ImportForm>,
+    /// How many imports were asked about.
+    pub(in crate::app) imports: u64,
     /// Whether the prediction of a case that was opened is still to be made.
     pub predict: bool,
+}
+
+/// An import of masks that is asked about: what it would change is said before anything changes.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ImportForm {
+    /// The folder or file.
+    pub from: PathBuf,
+    /// Whether what was painted by hand is replaced as well.
+    pub over_hand: bool,
+    /// Which asking it is: files may be others than at the one before.
+    pub(in crate::app) asked: u64,
+}
+
+impl State {
+    /// What is imported as the form says, while it is open.
+    pub fn import_setup(&self) -> Option<ImportSetup> {
+        let form = self.export.importing.as_ref()?;
+        let person = Some(self.person()).filter(|name| !name.is_empty());
+        Some(ImportSetup { from: form.from.clone(), format: None, over_hand: form.over_hand, person })
+    }
 }
 
 /// Something to be written once the place is chosen.

@@ -5,6 +5,7 @@ use super::super::state::State;
 use super::super::tasks::state::{Level, Task, Ticket};
 use super::end_stroke;
 use crate::work::bundles::BundleKind;
+use crate::work::import::Import;
 use crate::work::labels::ImprintSource;
 use crate::work::propose::{Batch, BatchSetup, ProposeSetup};
 
@@ -58,13 +59,32 @@ pub(super) fn propose_all(state: &mut State, effects: &mut Vec<Effect>) {
     effects.push(Effect::ProposeAll { ticket, source, setup: Box::new(setup) });
 }
 
-/// Has the masks that were proposed read again where they are looked at. What was done to those pairs is in their journals,
-/// so that undo takes the proposals back too.
+/// Has the masks that were proposed read again where they are looked at, and says what became of them.
 pub(in crate::app) fn proposed(state: &mut State, ticket: Ticket, batch: &Batch) {
     if state.document.batch.take_if(|running| *running == ticket).is_none() {
         return;
     }
-    for name in &batch.changed {
+    reread(state, &batch.changed);
+    state.selection.proposing &= batch.masks == 0;
+    let level = if batch.left_out.is_empty() { Level::Info } else { Level::Warning };
+    let why = batch.left_out.first().map(|first| format!("the first: {}: {}", first.name, first.why));
+    state.log.push(level, batch.text(), why, None);
+}
+
+/// Has the masks that were imported read again where they are looked at, and says what became of them.
+pub(in crate::app) fn imported(state: &mut State, import: &Import) {
+    reread(state, &import.changed);
+    let level = if import.is_whole() { Level::Info } else { Level::Warning };
+    state.log.push(level, import.text(), None, None);
+    if let Some(entry) = state.log.entries.back_mut().filter(|_| import.total() > 0) {
+        entry.place = Some(import.labels.clone());
+    }
+}
+
+/// Has labels that were changed on the disk read again. What was done to them is in their journals, so that undo takes it
+/// back too.
+fn reread(state: &mut State, names: &[String]) {
+    for name in names {
         let doc = &mut state.document;
         let drawn_on = doc.stroke.as_ref().is_some_and(|stroke| stroke.pair == *name);
         // What is on its way to the disk is merged there, and comes back merged.
@@ -74,8 +94,4 @@ pub(in crate::app) fn proposed(state: &mut State, ticket: Ticket, batch: &Batch)
         doc.reread(name);
         state.history.forget(name);
     }
-    state.selection.proposing &= batch.masks == 0;
-    let level = if batch.left_out.is_empty() { Level::Info } else { Level::Warning };
-    let why = batch.left_out.first().map(|first| format!("the first: {}: {}", first.name, first.why));
-    state.log.push(level, batch.text(), why, None);
 }

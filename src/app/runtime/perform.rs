@@ -23,6 +23,7 @@ use crate::io::folders;
 use crate::work::error::TaskError;
 use crate::work::evaluate;
 use crate::work::figure::figure;
+use crate::work::import::import_masks;
 use crate::work::job::{Cancel, JobCx};
 use crate::work::models::Wanted;
 use crate::work::statistics::{STUDIO_PAIRS, StatisticsSetup, statistics};
@@ -258,6 +259,16 @@ impl Runtime {
                         Ok(Answer::Revealed)
                     }),
                 );
+            }
+            Effect::ImportMasks { ticket, source, mut setup } => {
+                let body = Box::new(move |cx: &JobCx| {
+                    let dataset = source.as_dataset().ok_or_else(|| {
+                        TaskError::new("Import masks", "this kind of source cannot be read outside the studio")
+                    })?;
+                    setup.from = absolute(setup.from);
+                    Ok(Answer::Imported(ticket, Box::new(import_masks(dataset, &setup, cx)?)))
+                });
+                self.task(Lane::Files, ticket, "Import masks".into(), body);
             }
             Effect::ExportMasks { ticket, source, labels, choice, folder } => {
                 let body = Box::new(move |cx: &JobCx| {

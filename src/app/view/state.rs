@@ -72,6 +72,8 @@ pub enum UiRequest {
     PickTableFolder,
     /// Ask where something is to be written; answer with `ExportCommand::Write`.
     PickOutput(Output),
+    /// Ask for the folder of masks that are imported; answer with `ExportCommand::AskImport`.
+    PickMasks,
     /// Turn the 3D cameras.
     Camera(CameraPreset),
     /// Write the camera of the 3D view under the pointer to the clipboard.

@@ -1,12 +1,14 @@
 //! The form of an export of masks: what goes where is said before anything is written.
 
 use eframe::egui::{self, DragValue, RichText, vec2};
+use strum::IntoEnumIterator as _;
 
 use super::super::cx::Cx;
 use super::super::theme::caption;
 use crate::app::command::ExportCommand;
 use crate::app::export::Output;
 use crate::app::state::Lookup;
+use crate::io::exchange::Format;
 use crate::work::export::{ExportChoice, Which};
 
 /// The form, where it is open. It blocks nothing: pairs can be drawn and marked beside it.
@@ -27,8 +29,10 @@ pub(in crate::ui) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
         ui.horizontal(|ui| {
             let write = ui.add_enabled(ready, egui::Button::new("Choose folder…"));
             let write = write.accessible_name("Choose the folder of the export");
-            let tip = "An empty or new folder, or a previous export: {train,val,test}/{imgs,masks}, as the lab's UNet \
-                       training reads them. What was written is read back and checked.";
+            let tip = format!(
+                "An empty or new folder, or a previous export. {}. What was written is read back and checked.",
+                choice.format.text()
+            );
             if write.on_hover_text(tip).clicked() {
                 cx.push(ExportCommand::Place(Output::Masks));
             }
@@ -58,12 +62,20 @@ fn choices(cx: &Cx<'_>, ui: &mut egui::Ui, choice: &mut ExportChoice) {
             }
         }
     });
+    ui.horizontal(|ui| {
+        ui.label(caption("Form", cx.p));
+        for format in Format::iter() {
+            if ui.radio(choice.format == format, format.name()).on_hover_text(format.text()).clicked() {
+                choice.format = format;
+            }
+        }
+    });
     let tip = "Else pairs that the data set keeps for tests (test_only) go to test, so that no score is of what was \
                trained on";
     ui.checkbox(&mut choice.test_in_train, "train on pairs kept for tests").on_hover_text(tip);
     let tip = "A score on tools that were not trained on. Else each pair goes to a part by itself";
     ui.checkbox(&mut choice.by_tool, "all pairs of a tool in the same part").on_hover_text(tip);
-    let tip = "All other pixels are ignored: they are written to ignore/ beside the masks";
+    let tip = "All other pixels are ignored: they are written beside the masks as pixels of which these say nothing";
     ui.checkbox(&mut choice.hand_checked, "only pixels painted by hand").on_hover_text(tip);
     ui.horizontal(|ui| {
         ui.label(caption("Seed of the division", cx.p));

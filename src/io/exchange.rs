@@ -1,17 +1,26 @@
-//! Masks for UNet training: `{train,val,test}/{imgs,masks}/<stem>.png`, as the lab's loader takes them.
+//! Masks in the forms that other programs read and write ([`Format`]): [`export`] writes them, [`list`] finds them again.
 //!
-//! * image: 8-bit gray, `(imprint + 0.0116) / 0.0341 * 255`, cut to whole numbers, limited to 0..255;
-//! * mask: 8-bit gray, 0 and 255;
-//! * per image exactly one mask of the same stem and size, nothing else in the folders;
-//! * where pixels are ignored, beside them `ignore/<stem>.png`: 255 where the mask says nothing. The lab's loader does not
-//!   look there: such pixels are free of contact to it.
+//! Every export has parts (`train`, `val`, `test`) and a file [`MANIFEST`] that lists what was written. Names of files are
+//! stems (`split.rs`), from which pair and finger can be told again.
 //!
-//! Source: `utils/data_loading.py` lines 22-30, 111-126 and 253-296 of the lab's UNet repository, and
-//! `ICP_dataset_cal.py` lines 641-676 for the scale.
+//! | form | image | mask | ignored pixels |
+//! | --- | --- | --- | --- |
+//! | [`Format::Unet`] | `PART/imgs/STEM.png` | `PART/masks/STEM.png`, 0 and 255 | `PART/ignore/STEM.png`, 255 = ignored |
+//! | [`Format::Npy`] | `PART/STEM.imprint.npy`, f32, meters | `PART/STEM.mask.npy`, u8, 0 and 255 | `PART/STEM.ignore.npy` |
+//! | [`Format::Coco`] | `PART/STEM.png` | `annotations/PART.json`, run lengths, category `contact` | category `ignore` |
+//! | [`Format::Png`] | | `PART/STEM.png`, 0 and 255 | `PART/STEM.ignore.png` |
+//!
+//! Images are 8-bit gray: `(imprint + 0.0116) / 0.0341 * 255`, cut to whole numbers, limited to 0..255. A file of ignored
+//! pixels is there only where some are. All are in the raw orientation of the data set.
 
-mod check;
+mod arrays;
+mod coco;
+mod format;
+mod plain;
+mod read;
 mod split;
 mod staging;
+mod unet;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,14 +30,19 @@ use serde::{Deserialize, Serialize};
 
 use super::digest::sha256;
 use super::files;
-use super::images::{self, PictureError};
+use super::images::PictureError;
 use super::masks::MaskStore;
+use super::npz::NpzError;
 use crate::domain::dataset::Problem;
-use crate::domain::grid::{DepthMap, Grid, Mask};
+use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::rig::{PadId, Rig};
 
-pub use check::{CheckReport, check_folder};
+pub use format::Format;
+use format::Place;
+pub use read::{Listed, Listing, ReadError, list};
+pub use split::Stems;
 use staging::Staging;
+pub use unet::{CheckReport, check_folder};
 
 /// The imprint that becomes 0, meters.
 pub const IMAGE_LO_M: f64 = -0.0116;
@@ -57,6 +71,9 @@ pub enum ExportError {
     /// A picture cannot be written or read again.
     #[error(transparent)]
     Picture(#[from] PictureError),
+    /// An array cannot be written.
+    #[error(transparent)]
+    Array(#[from] NpzError),
     /// The folder holds something else.
     #[error("the folder is not empty and not a previous export: it holds {found} ({})", folder.display())]
     NotOurs {
@@ -96,11 +113,15 @@ pub enum ExportError {
         test: f64,
     },
     /// What was written is not what the loader accepts or not what was meant.
-    #[error("the written folder failed its check: {}", problems.first().map_or("", |p| p.what.as_str()))]
+    #[error("the written folder failed its check: {}", first(problems))]
     Check {
         /// All mismatches.
         problems: Vec<Problem>,
     },
+}
+
+fn first(problems: &[Problem]) -> String {
+    problems.first().map_or_else(String::new, |p| format!("{} ({})", p.what, p.file.display()))
 }
 
 /// One failure as it is, several one below the other.
@@ -130,9 +151,11 @@ pub struct ExportEntry {
     pub held_out: bool,
 }
 
-/// How to divide.
+/// In which form, and how to divide.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExportConfig {
+    /// The form.
+    pub format: Format,
     /// Decides which pair lands where; the same seed and pairs give the same parts.
     pub seed: u64,
     /// Share of pairs for validation.
@@ -152,6 +175,7 @@ pub struct ExportConfig {
 impl Default for ExportConfig {
     fn default() -> Self {
         Self {
+            format: Format::default(),
             seed: 0,
             val: 0.1,
             test: 0.1,
@@ -166,13 +190,13 @@ impl Default for ExportConfig {
 /// What was exported.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ExportReport {
-    /// Images in train, val and test.
+    /// Masks in train, val and test.
     pub counts: [usize; 3],
-    /// Pixels below or above the range of the image; they were limited to it.
+    /// Pixels below or above the range of the image; they were limited to it. None where there is no image, or it is an array.
     pub out_of_range_px: usize,
     /// Pixels of which their masks say nothing.
     pub ignored_px: usize,
-    /// Pixels without measurement; they were written as an imprint of 0.
+    /// Pixels without measurement; in pictures they are an imprint of 0, in arrays NaN.
     pub unmeasured_px: usize,
     /// Parts without any image: the lab's trainer refuses those.
     pub empty_parts: Vec<&'static str>,
@@ -182,6 +206,9 @@ pub struct ExportReport {
 struct Manifest {
     format: String,
     version: u32,
+    /// The form of the masks; exports before there were several say none.
+    #[serde(default)]
+    masks: Format,
     seed: u64,
     /// Relative path to the SHA-256 of the file.
     files: BTreeMap<String, String>,
@@ -191,6 +218,14 @@ struct Manifest {
 }
 
 const FORMAT: &str = "touch2touch-unet-export";
+
+impl Manifest {
+    /// That of a folder; `None` if it is no export.
+    fn read(folder: &Path) -> Option<Self> {
+        let bytes = files::read(&folder.join(MANIFEST), files::SMALL).ok()?;
+        serde_json::from_slice(&bytes).ok().filter(|manifest: &Self| manifest.format == FORMAT)
+    }
+}
 
 /// Reads every stored mask of `entries`, before anything is computed for the others.
 ///
@@ -273,25 +308,24 @@ pub fn export(
     staging::sweep(&parent);
     let staging = Staging::new(&folder).map_err(|s| io(&parent, "make a folder in", s))?;
     let root = staging.new_content();
-    for part in PARTS {
-        for kind in ["imgs", "masks"] {
-            let path = root.join(part).join(kind);
-            std::fs::create_dir_all(&path).map_err(|s| io(&path, "make the folder", s))?;
-        }
+    let mut writer = config.format.writer();
+    for relative in writer.folders() {
+        make_folder(&root.join(relative))?;
     }
     let mut report = ExportReport::default();
     let source = |entry: &ExportEntry| (entry.pair.clone(), config.rig.pad_key(entry.finger).into_owned());
     let mut manifest = Manifest {
         format: FORMAT.into(),
         version: 1,
+        masks: config.format,
         seed: config.seed,
         files: BTreeMap::new(),
         stems: stems.iter().cloned().zip(entries.iter().map(source)).collect(),
     };
-    let mut mismatches = Vec::new();
+    let mut written = BTreeMap::new();
     let mut failures = Vec::new();
     for (i, (stem, &part)) in stems.iter().zip(&parts).enumerate() {
-        let Content { imprint, mask, ignored } = match load(i) {
+        let mut content = match load(i) {
             Ok(content) => content,
             Err(LoadFailure::Bad(reason)) => {
                 failures.push((place(&entries[i], &config.rig), reason));
@@ -303,42 +337,37 @@ pub fn export(
         if !failures.is_empty() {
             continue;
         }
-        for mask in std::iter::once(&mask).chain(&ignored) {
-            if imprint.size() != mask.size() {
-                return Err(ExportError::Size { stem: stem.clone(), mask: mask.size(), imprint: imprint.size() });
+        let size = content.imprint.size();
+        for mask in std::iter::once(&content.mask).chain(&content.ignored) {
+            if mask.size() != size {
+                return Err(ExportError::Size { stem: stem.clone(), mask: mask.size(), imprint: size });
             }
         }
-        let image = image_from_imprint(&imprint, &mut report);
-        let gray = |mask: &Mask| mask.map(|&v| if v { 255u8 } else { 0 });
+        content.ignored = content.ignored.filter(|ignored| ignored.as_slice().contains(&true));
+        let ignored = content.ignored.iter().flat_map(Mask::as_slice).filter(|v| **v);
+        report.ignored_px += ignored.count();
         report.counts[part] += 1;
-        let mut pictures = vec![("imgs", image), ("masks", gray(&mask))];
-        if let Some(ignored) = ignored.filter(|ignored| ignored.as_slice().contains(&true)) {
-            report.ignored_px += ignored.as_slice().iter().filter(|v| **v).count();
-            let path = root.join(PARTS[part]).join(IGNORED);
-            std::fs::create_dir_all(&path).map_err(|s| io(&path, "make the folder", s))?;
-            pictures.push((IGNORED, gray(&ignored)));
-        }
-        for (kind, picture) in &pictures {
-            let relative = format!("{}/{kind}/{stem}.png", PARTS[part]);
-            let path = root.join(&relative);
-            images::write_gray8(&path, picture)?;
-            if images::read_gray8(&path)? != *picture {
-                mismatches.push(Problem {
-                    file: folder.join(&relative),
-                    what: "the file reads back differently".into(),
-                    hint: "check the disk".into(),
-                });
-            }
-            let bytes = files::read(&path, files::SMALL).map_err(|s| io(&path, "read", s))?;
-            manifest.files.insert(relative, sha256(&bytes));
-        }
+        let (pair, finger) = source(&entries[i]);
+        writer.add(&Place { root: &root, part, stem, pair: &pair, finger: &finger }, &content, &mut report)?;
+        written.insert(stem.clone(), digest(&content.mask, content.ignored.as_ref()));
     }
     if !failures.is_empty() {
         return Err(ExportError::Sources { failures });
     }
-    mismatches.extend(check_folder(&root).problems);
-    if !mismatches.is_empty() {
-        return Err(ExportError::Check { problems: mismatches });
+    writer.finish(&root)?;
+    let problems = check_written(&root, config.format, written);
+    if !problems.is_empty() {
+        // Where the files would have come to lie.
+        let moved = |file: PathBuf| file.strip_prefix(&root).map(|f| folder.join(f)).unwrap_or(file);
+        let problems = problems.into_iter().map(|p| Problem { file: moved(p.file), ..p }).collect();
+        return Err(ExportError::Check { problems });
+    }
+    let mut files = Vec::new();
+    find(&root, &root, &mut files).map_err(|s| io(&root, "list the folder", s))?;
+    for relative in files {
+        let path = root.join(&relative);
+        let bytes = files::read(&path, files::MODEL).map_err(|s| io(&path, "read", s))?;
+        manifest.files.insert(relative, sha256(&bytes));
     }
     let path = root.join(MANIFEST);
     let text = serde_json::to_vec_pretty(&manifest).map_err(|err| io(&path, "write", err.into()))?;
@@ -363,39 +392,55 @@ fn io(path: &Path, what: &'static str, source: std::io::Error) -> ExportError {
     ExportError::Io { path: path.to_owned(), what, source }
 }
 
-/// The loader's 8-bit image of an imprint, in 32-bit arithmetic as the lab's script has it.
-fn image_from_imprint(imprint: &DepthMap, report: &mut ExportReport) -> Grid<u8> {
-    let range = (IMAGE_HI_M - IMAGE_LO_M) as f32;
-    imprint.map(|&meters| {
-        let meters = if meters.is_finite() {
-            meters
-        } else {
-            report.unmeasured_px += 1;
-            0.0
-        };
-        let value = (meters - IMAGE_LO_M as f32) / range * 255.0;
-        if !(0.0..256.0).contains(&value) {
-            report.out_of_range_px += 1;
+fn make_folder(path: &Path) -> Result<(), ExportError> {
+    std::fs::create_dir_all(path).map_err(|source| io(path, "make the folder", source))
+}
+
+/// What tells one mask with its ignored pixels from all others.
+fn digest(mask: &Mask, ignored: Option<&Mask>) -> String {
+    let [width, height] = mask.size();
+    let bits = |mask: &Mask| mask.as_slice().iter().map(|&v| u8::from(v)).collect::<Vec<_>>();
+    let ignored = ignored.map(bits).unwrap_or_default();
+    sha256(&[&width.to_le_bytes()[..], &height.to_le_bytes(), &bits(mask), &ignored].concat())
+}
+
+/// Reads what was written by the rules of its loader: each of `written` (stem to [`digest`]) must be there and the same, and
+/// nothing else.
+fn check_written(root: &Path, format: Format, mut written: BTreeMap<String, String>) -> Vec<Problem> {
+    let problem = |file: &Path, what: String| Problem {
+        file: file.to_owned(),
+        what,
+        hint: "check the disk, and export again".into(),
+    };
+    let mut problems = if format == Format::Unet { check_folder(root).problems } else { Vec::new() };
+    let listing = match list(root, Some(format)) {
+        Ok(listing) => listing,
+        Err(err) => return vec![problem(&err.file, err.what)],
+    };
+    problems.extend(listing.refused.iter().map(|err| problem(&err.file, err.what.clone())));
+    for listed in &listing.masks {
+        let expected = written.remove(&listed.stem);
+        match listed.read() {
+            Err(err) => problems.push(problem(&err.file, err.what)),
+            Ok((mask, ignored)) if expected != Some(digest(&mask, ignored.as_ref())) => {
+                problems.push(problem(&listed.file, format!("the mask of {} reads back differently", listed.stem)));
+            }
+            Ok(_) => {}
         }
-        // Truncates like the lab's cast, but saturates where that would wrap around.
-        value as u8
-    })
+    }
+    problems.extend(written.into_keys().map(|stem| problem(root, format!("the mask of {stem} is not there"))));
+    problems
 }
 
 /// An existing folder must be empty, or hold exactly what its manifest says.
 fn refuse_foreign(folder: &Path) -> Result<(), ExportError> {
     let mut files = Vec::new();
-    match list(folder, folder, &mut files) {
+    match find(folder, folder, &mut files) {
         Ok(()) => {}
         Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(()),
         Err(source) => return Err(io(folder, "list the folder", source)),
     }
-    let known: BTreeMap<String, String> = files::read(&folder.join(MANIFEST), files::SMALL)
-        .ok()
-        .and_then(|bytes| serde_json::from_slice::<Manifest>(&bytes).ok())
-        .filter(|manifest| manifest.format == FORMAT)
-        .map(|manifest| manifest.files)
-        .unwrap_or_default();
+    let known = Manifest::read(folder).map(|manifest| manifest.files).unwrap_or_default();
     let is_manifest = |file: &str| file == MANIFEST && !known.is_empty();
     match files.into_iter().find(|file| !known.contains_key(file) && !is_manifest(file)) {
         Some(found) => Err(ExportError::NotOurs { folder: folder.to_owned(), found }),
@@ -404,13 +449,13 @@ fn refuse_foreign(folder: &Path) -> Result<(), ExportError> {
 }
 
 /// All files below `folder`, relative to `root`, with `/`. Links are files: they are never followed.
-fn list(root: &Path, folder: &Path, out: &mut Vec<String>) -> std::io::Result<()> {
+fn find(root: &Path, folder: &Path, out: &mut Vec<String>) -> std::io::Result<()> {
     let mut entries: Vec<_> = std::fs::read_dir(folder)?.collect::<Result<_, _>>()?;
     entries.sort_by_key(std::fs::DirEntry::file_name);
     for entry in entries {
         let path = entry.path();
         if entry.file_type()?.is_dir() {
-            list(root, &path, out)?;
+            find(root, &path, out)?;
         } else {
             let relative = path.strip_prefix(root).unwrap_or(&path);
             let parts: Vec<String> = relative.iter().map(|p| p.to_string_lossy().into_owned()).collect();

@@ -1,11 +1,59 @@
-//! The loader's rules, checked on what is on the disk.
+//! The lab's UNet layout: `{train,val,test}/{imgs,masks}/<stem>.png`, and its loader's rules, checked on what is on the disk.
+//!
+//! Per image exactly one mask of the same stem and size, 0 and 255, nothing else in the folders. The loader does not look
+//! into `ignore/`: such pixels are free of contact to it.
+//!
+//! Source: `utils/data_loading.py` lines 22-30, 111-126 and 253-296 of the lab's UNet repository, and
+//! `ICP_dataset_cal.py` lines 641-676 for the scale.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::PARTS;
+use super::format::{Place, Writer, gray};
+use super::{Content, ExportError, ExportReport, IGNORED, IMAGE_HI_M, IMAGE_LO_M, PARTS, make_folder};
 use crate::domain::dataset::Problem;
+use crate::domain::grid::{DepthMap, Grid};
 use crate::io::images;
+
+/// Writes the layout.
+pub(super) struct Folders;
+
+impl Writer for Folders {
+    fn folders(&self) -> Vec<String> {
+        PARTS.iter().flat_map(|part| ["imgs", "masks"].map(|kind| format!("{part}/{kind}"))).collect()
+    }
+
+    fn add(&mut self, to: &Place<'_>, content: &Content, report: &mut ExportReport) -> Result<(), ExportError> {
+        let part = to.root.join(PARTS[to.part]);
+        let file = |kind: &str| part.join(kind).join(format!("{}.png", to.stem));
+        images::write_gray8(&file("imgs"), &image_from_imprint(&content.imprint, report))?;
+        images::write_gray8(&file("masks"), &gray(&content.mask))?;
+        if let Some(ignored) = &content.ignored {
+            make_folder(&part.join(IGNORED))?;
+            images::write_gray8(&file(IGNORED), &gray(ignored))?;
+        }
+        Ok(())
+    }
+}
+
+/// The loader's 8-bit image of an imprint, in 32-bit arithmetic as the lab's script has it.
+pub(super) fn image_from_imprint(imprint: &DepthMap, report: &mut ExportReport) -> Grid<u8> {
+    let range = (IMAGE_HI_M - IMAGE_LO_M) as f32;
+    imprint.map(|&meters| {
+        let meters = if meters.is_finite() {
+            meters
+        } else {
+            report.unmeasured_px += 1;
+            0.0
+        };
+        let value = (meters - IMAGE_LO_M as f32) / range * 255.0;
+        if !(0.0..256.0).contains(&value) {
+            report.out_of_range_px += 1;
+        }
+        // Truncates like the lab's cast, but saturates where that would wrap around.
+        value as u8
+    })
+}
 
 /// What a training folder holds and what the loader would refuse.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

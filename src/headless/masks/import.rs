@@ -1,0 +1,67 @@
+//! `touch2touch masks import`: masks that lie in one of the forms of an export.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use strum::IntoEnumIterator as _;
+
+use super::super::args::DatasetArgs;
+use super::super::{Common, Output, VerbResult};
+use crate::io::exchange::Format;
+use crate::work::import::{ImportSetup, import_masks, plan_import};
+
+/// Arguments of `masks import`.
+#[derive(Debug, Args)]
+pub(in super::super) struct ImportArgs {
+    #[command(flatten)]
+    dataset: DatasetArgs,
+    /// The folder of the masks, one of its parts, or one file. Names are those that an export gives.
+    #[arg(long, value_name = "DIR")]
+    from: PathBuf,
+    /// Their form; else the one that lies there.
+    #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(Format::iter().map(Format::key)))]
+    format: Option<String>,
+    /// Replace what was painted by hand as well, also of pairs marked "done", "flagged" or "skip".
+    #[arg(long)]
+    over_hand: bool,
+    /// Who imports; else whom the system says.
+    #[arg(long, value_name = "NAME")]
+    person: Option<String>,
+    /// Says what would be taken over, and writes nothing.
+    #[arg(long)]
+    dry_run: bool,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(args: &ImportArgs) -> VerbResult {
+    let dataset = args.dataset.open()?;
+    let output = Output::new(args.common, "importing", 1);
+    let setup = ImportSetup {
+        from: args.from.clone(),
+        // The parser has compared the key with the list.
+        format: args.format.as_ref().and_then(|key| key.parse().ok()),
+        over_hand: args.over_hand,
+        person: args.person.clone(),
+    };
+    let planned = plan_import(&dataset, &setup, &output.job())?;
+    let found = if args.dry_run {
+        planned
+    } else {
+        for line in planned.lines() {
+            output.note(&line);
+        }
+        import_masks(&dataset, &setup, &output.job())?
+    };
+    for remark in found.unmatched.iter().chain(&found.refused) {
+        output.note(&format!("left out: {}: {}", remark.name, remark.why));
+    }
+    output.finish(&found, || {
+        if args.dry_run {
+            [found.lines(), vec!["nothing was written (--dry-run)".into()]].concat().join("\n")
+        } else {
+            found.text()
+        }
+    })?;
+    Ok(found.is_whole())
+}

@@ -1,0 +1,272 @@
+//! Masks that lie on the disk in one of the forms: [`list`] finds them, [`Listed::read`] reads one.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::coco::{self, ANNOTATIONS, Coded};
+use super::{Format, IGNORED, Manifest, PARTS};
+use crate::domain::grid::{Grid, Mask};
+use crate::io::{images, npz};
+
+pub(super) const IMPRINT_NPY: &str = ".imprint.npy";
+pub(super) const MASK_NPY: &str = ".mask.npy";
+pub(super) const IGNORE_NPY: &str = ".ignore.npy";
+pub(super) const IGNORE_PNG: &str = ".ignore.png";
+
+/// Why masks cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{what} ({})", file.display())]
+pub struct ReadError {
+    /// The file or folder.
+    pub file: PathBuf,
+    /// What is wrong.
+    pub what: String,
+    /// What to do about it.
+    pub hint: &'static str,
+}
+
+impl ReadError {
+    pub(super) fn new(file: &Path, what: impl Into<String>, hint: &'static str) -> Self {
+        Self { file: file.to_owned(), what: what.into(), hint }
+    }
+}
+
+/// Where the pixels of a mask lie.
+#[derive(Clone, Debug)]
+pub(super) enum Stored {
+    /// In pictures: mask and ignored pixels.
+    Pictures(Option<PathBuf>),
+    /// In arrays: mask and ignored pixels.
+    Arrays(Option<PathBuf>),
+    /// In what was read already.
+    Coded(Coded),
+}
+
+/// A mask that was found.
+#[derive(Clone, Debug)]
+pub struct Listed {
+    /// Its name, without folder and ending.
+    pub stem: String,
+    /// The file.
+    pub file: PathBuf,
+    /// Pair and finger, where the export says them.
+    pub of: Option<(String, String)>,
+    pub(super) stored: Stored,
+}
+
+impl Listed {
+    /// Contact, and the pixels of which it says nothing; `None` where no file names any.
+    ///
+    /// # Errors
+    /// If a file cannot be read, or has other values than those of a mask.
+    pub fn read(&self) -> Result<(Mask, Option<Mask>), ReadError> {
+        let (read, ignored): (fn(&Path) -> Result<Mask, ReadError>, _) = match &self.stored {
+            Stored::Pictures(ignored) => (picture, ignored),
+            Stored::Arrays(ignored) => (array, ignored),
+            Stored::Coded(coded) => {
+                let hint = "write the annotations again";
+                return coded.masks().map_err(|why| ReadError::new(&self.file, format!("{}: {why}", self.stem), hint));
+            }
+        };
+        Ok((read(&self.file)?, ignored.as_deref().map(read).transpose()?))
+    }
+}
+
+/// The masks of a folder or file.
+#[derive(Clone, Debug, Default)]
+pub struct Listing {
+    /// Their form.
+    pub format: Format,
+    /// The masks.
+    pub masks: Vec<Listed>,
+    /// What looks like one and cannot be taken.
+    pub refused: Vec<ReadError>,
+}
+
+const VALUES: &str = "save the mask with the values 0 and 255, or 0 and 1";
+
+/// The mask of values; 0 and 255, or 0 and 1.
+fn mask_of(file: &Path, size: [usize; 2], values: impl Iterator<Item = f32> + Clone) -> Result<Mask, ReadError> {
+    if let Some(value) = values.clone().find(|v| ![0.0, 1.0, 255.0].contains(v)) {
+        return Err(ReadError::new(file, format!("the mask has the value {value}"), VALUES));
+    }
+    if values.clone().any(|v| v == 1.0) && values.clone().any(|v| v == 255.0) {
+        return Err(ReadError::new(file, "the mask has the values 1 and 255", VALUES));
+    }
+    let bits = values.map(|v| v != 0.0).collect();
+    Grid::from_vec(size[0], size[1], bits).map_err(|err| ReadError::new(file, err.to_string(), VALUES))
+}
+
+fn picture(file: &Path) -> Result<Mask, ReadError> {
+    let gray = images::read_gray8(file).map_err(|err| ReadError::new(file, unplaced(&err, file), err.hint()))?;
+    mask_of(file, gray.size(), gray.as_slice().iter().map(|&v| f32::from(v)))
+}
+
+fn array(file: &Path) -> Result<Mask, ReadError> {
+    let array = npz::read_npy(file)
+        .map_err(|err| ReadError::new(file, unplaced(&err, file), "save the mask again with numpy.save"))?;
+    let &[height, width] = array.shape.as_slice() else {
+        let what = format!("the mask has the shape {:?}, and not (height, width)", array.shape);
+        return Err(ReadError::new(file, what, "save each mask as an array of its own"));
+    };
+    mask_of(file, [width, height], array.into_f32().into_iter())
+}
+
+/// What an error says apart from its file, which is said once.
+fn unplaced(err: &impl std::fmt::Display, file: &Path) -> String {
+    err.to_string().replace(&format!(" ({})", file.display()), "")
+}
+
+/// The masks of a folder, of an export or of one of its parts, or of one file; in the form named, else in the one that lies
+/// there. No pixels are read, except those that COCO's annotations hold.
+///
+/// # Errors
+/// If the form cannot be told, or a file of annotations cannot be read.
+pub fn list(path: &Path, format: Option<Format>) -> Result<Listing, ReadError> {
+    if !path.exists() {
+        return Err(ReadError::new(path, "there is no such file or folder", "name the folder of an export, or a file"));
+    }
+    let manifest = path.ancestors().take(3).find_map(Manifest::read);
+    let known = manifest.as_ref().map(|manifest| manifest.masks);
+    let format = match format.or(known) {
+        Some(format) => format,
+        None => recognized(path)?,
+    };
+    let mut listing = Listing { format, ..Listing::default() };
+    if format == Format::Coco {
+        let files = if path.is_file() { vec![path.to_owned()] } else { annotations(path) };
+        if files.is_empty() {
+            let what = format!("there is no {ANNOTATIONS}/*.json");
+            return Err(ReadError::new(path, what, "name the file of the annotations itself"));
+        }
+        for file in files {
+            coco::read(&file, &mut listing)?;
+        }
+    } else {
+        for file in files_of(path, format) {
+            listing.masks.extend(listed(&file, format));
+        }
+    }
+    if let Some(stems) = manifest.map(|manifest| manifest.stems) {
+        for listed in &mut listing.masks {
+            listed.of = listed.of.take().or_else(|| stems.get(&listed.stem).cloned());
+        }
+    }
+    apart(&mut listing);
+    if listing.masks.is_empty() && listing.refused.is_empty() {
+        let what = format!("there are no masks in the form \"{}\"", format.key());
+        return Err(ReadError::new(path, what, "name the folder of an export, or another form"));
+    }
+    Ok(listing)
+}
+
+/// Leaves out masks whose names others have as well: nobody can say which one is meant.
+fn apart(listing: &mut Listing) {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    listing.masks.iter().for_each(|listed| *counts.entry(listed.stem.clone()).or_default() += 1);
+    let (kept, twice) = std::mem::take(&mut listing.masks).into_iter().partition(|listed| counts[&listed.stem] == 1);
+    listing.masks = kept;
+    let twice: Vec<Listed> = twice;
+    listing.refused.extend(twice.into_iter().map(|listed| {
+        let what = format!("{} masks have the name {}", counts[&listed.stem], listed.stem);
+        ReadError::new(&listed.file, what, "take the others away")
+    }));
+}
+
+/// The folder and its parts.
+fn bases(path: &Path) -> Vec<PathBuf> {
+    std::iter::once(path.to_owned()).chain(PARTS.iter().map(|part| path.join(part))).collect()
+}
+
+/// The files of a folder with an ending, by name.
+fn with_ending(folder: &Path, ending: &str) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let is_meant = |path: &PathBuf| path.is_file() && path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).filter(is_meant).collect();
+    files.sort();
+    files
+}
+
+fn annotations(path: &Path) -> Vec<PathBuf> {
+    let folder = if path.ends_with(ANNOTATIONS) { path.to_owned() } else { path.join(ANNOTATIONS) };
+    with_ending(&folder, "json")
+}
+
+fn mask_folders(path: &Path) -> Vec<PathBuf> {
+    if path.ends_with("masks") {
+        return vec![path.to_owned()];
+    }
+    bases(path).into_iter().map(|base| base.join("masks")).filter(|folder| folder.is_dir()).collect()
+}
+
+/// All files in which masks of a form lie, those of ignored pixels and imprints among them.
+fn files_of(path: &Path, format: Format) -> Vec<PathBuf> {
+    if path.is_file() {
+        return vec![path.to_owned()];
+    }
+    let (folders, ending) = match format {
+        Format::Unet => (mask_folders(path), "png"),
+        Format::Npy => (bases(path), "npy"),
+        Format::Png => (bases(path), "png"),
+        Format::Coco => (Vec::new(), "json"),
+    };
+    folders.iter().flat_map(|folder| with_ending(folder, ending)).collect()
+}
+
+/// The mask of a file; `None` for one that holds something else.
+fn listed(file: &Path, format: Format) -> Option<Listed> {
+    let name = file.file_name()?.to_string_lossy().into_owned();
+    let beside = |path: PathBuf| path.is_file().then_some(path);
+    let (stem, stored) = match format {
+        Format::Npy => {
+            if name.ends_with(IGNORE_NPY) || name.ends_with(IMPRINT_NPY) {
+                return None;
+            }
+            let stem = name.strip_suffix(MASK_NPY).unwrap_or(&name[..name.len() - ".npy".len()]);
+            (stem.to_owned(), Stored::Arrays(beside(file.with_file_name(format!("{stem}{IGNORE_NPY}")))))
+        }
+        _ if name.ends_with(IGNORE_PNG) => return None,
+        _ => {
+            let stem = file.file_stem()?.to_string_lossy().into_owned();
+            let ignored = match format {
+                Format::Unet => file.parent()?.with_file_name(IGNORED).join(&name),
+                _ => file.with_file_name(format!("{stem}{IGNORE_PNG}")),
+            };
+            (stem, Stored::Pictures(beside(ignored)))
+        }
+    };
+    Some(Listed { stem, file: file.to_owned(), of: None, stored })
+}
+
+/// The form that lies in a place.
+fn recognized(path: &Path) -> Result<Format, ReadError> {
+    const NAME: &str = "name the form: unet, npy, coco or png";
+    if path.is_file() {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
+        return match ending.as_str() {
+            "json" => Ok(Format::Coco),
+            "npy" => Ok(Format::Npy),
+            "png" if path.parent().is_some_and(|folder| folder.ends_with("masks")) => Ok(Format::Unet),
+            "png" => Ok(Format::Png),
+            _ => Err(ReadError::new(path, "this is no file of masks", "name a .png, a .npy or COCO's .json")),
+        };
+    }
+    let found: Vec<Format> = [
+        (Format::Coco, !annotations(path).is_empty()),
+        (Format::Npy, !files_of(path, Format::Npy).is_empty()),
+        (Format::Unet, !files_of(path, Format::Unet).is_empty()),
+    ]
+    .into_iter()
+    .filter_map(|(format, there)| there.then_some(format))
+    .collect();
+    match found.as_slice() {
+        [only] => Ok(*only),
+        // Images lie beside annotations and in folders of their own: pictures are masks only where nothing else is.
+        [] if !files_of(path, Format::Png).is_empty() => Ok(Format::Png),
+        [] => Err(ReadError::new(path, "there are no masks here", "name the folder of an export, or a file of masks")),
+        several => {
+            let keys: Vec<&str> = several.iter().map(|format| format.key()).collect();
+            Err(ReadError::new(path, format!("masks in several forms lie here: {}", keys.join(", ")), NAME))
+        }
+    }
+}
