@@ -22,5 +22,6 @@ pub mod ply;
 pub mod pt;
 pub mod shards;
 pub mod simulated;
+pub(crate) mod staging;
 pub mod statistics;
 pub mod stl;

@@ -1,5 +1,6 @@
 //! The studio and the command line are one program: what a button does, a verb does, and with the same numbers.
 
+mod exchange;
 mod influence;
 mod proposals;
 

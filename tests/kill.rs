@@ -1,11 +1,13 @@
 //! The studio's saving under SIGKILL: what was said to be saved is on the disk, whatever the moment.
 //!
 //! One test plays both parts. The parent starts this binary again on the same test with [`ROLE`] set; that child drives
-//! the application model over real files (every drawing tool, contact and ignored pixels, clean-ups, undo, navigation, review states, by a seeded script) and
-//! says after each round up to which act a pair is saved, as the model's document has it. The parent plays the same script
+//! the application model over real files (every drawing tool, contact and ignored pixels, clean-ups, undo, navigation, review
+//! states, exports in every form, by a seeded script) and says after each round up to which act a pair is saved, as the
+//! model's document has it. The parent plays the same script
 //! by itself, without saving, so that it knows every mask after every act; kills the child at a random moment; and reads
 //! the folder with the product's reader. Each mask and review state must be one that was there at the last confirmation or
-//! later, and every file must parse. The next round goes on in the folder that the last one left.
+//! later, and every file must parse; an export that has its list must be whole. The next round goes on in the folder that the
+//! last one left. What a kill leaves of a training is looked at in `training.rs`, where there are models.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -17,8 +19,12 @@ use std::time::Duration;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use sha2::Digest as _;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Opened, Pane, SettingsCommand, ViewCommand};
+use touch2touch::app::command::{
+    Command, ExportCommand, LabelsCommand, LibraryCommand, Opened, Pane, SettingsCommand, ViewCommand,
+};
+use touch2touch::app::export::Output;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::{HandMask, MaskPlace, PairLabels, Review};
 use touch2touch::app::library::Place;
@@ -36,11 +42,12 @@ use touch2touch::domain::mesh::TriMesh;
 use touch2touch::domain::rig::lab;
 use touch2touch::domain::sample::Sample;
 use touch2touch::infer::engine::EngineChoice;
+use touch2touch::io::exchange::{Format, MANIFEST, list};
 use touch2touch::io::images;
 use touch2touch::io::masks::{FOLDER, MaskStore};
 use touch2touch::work::bundles::BundleInfo;
 use touch2touch::work::error::TaskError;
-use touch2touch::work::export::{ExportChoice, Plan};
+use touch2touch::work::export::{ExportChoice, Plan, Which};
 use touch2touch::work::job::JobCx;
 use touch2touch::work::labels::Deed;
 use touch2touch::work::models::Wanted;
@@ -94,12 +101,25 @@ impl DataSource for Source {
 
     fn export_masks(
         &self,
-        _: &BTreeMap<String, PairLabels>,
-        _: ExportChoice,
-        _: &Path,
-        _: &JobCx,
+        changed: &BTreeMap<String, PairLabels>,
+        choice: ExportChoice,
+        folder: &Path,
+        cx: &JobCx,
     ) -> Result<String, TaskError> {
-        Err(TaskError::new("Export", "not part of this test"))
+        if !self.saves {
+            return Ok(String::new());
+        }
+        // The pictures have a right finger only.
+        let mut right = BTreeMap::new();
+        for entry in &self.live.index().pairs {
+            let mut labels = match changed.get(&entry.name) {
+                Some(labels) => labels.clone(),
+                None => self.live.load_labels(&entry.name)?,
+            };
+            labels.masks.retain(|place, _| place.pad == lab::RIGHT);
+            right.insert(entry.name.clone(), labels);
+        }
+        self.live.export_masks(&right, choice, folder, cx)
     }
 }
 
@@ -151,13 +171,18 @@ impl Services for Files {
     }
 }
 
+/// Where the exports of a data set go: beside it.
+fn exported(folder: &Path) -> PathBuf {
+    folder.with_file_name("exported")
+}
+
 /// The script of a seed: what a person does, one gesture an act.
-fn script(seed: u64) -> Vec<Vec<Command>> {
+fn script(folder: &Path, seed: u64) -> Vec<Vec<Command>> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut acts = vec![vec![Command::Library(LibraryCommand::Select(PairId(rng.random_range(0..PAIRS))))]];
     while acts.len() < ACTS {
         let finger = if rng.random() { lab::RIGHT } else { lab::LEFT };
-        acts.push(match rng.random_range(0..20) {
+        acts.push(match rng.random_range(0..22) {
             0..11 => {
                 let tool = [MaskTool::Brush, MaskTool::Eraser, MaskTool::Lasso, MaskTool::Polygon, MaskTool::Rectangle]
                     .into_iter()
@@ -202,6 +227,15 @@ fn script(seed: u64) -> Vec<Vec<Command>> {
             16 => vec![Command::Labels(LabelsCommand::SetReview(
                 [Review::Done, Review::Flagged, Review::Skip][rng.random_range(0..3)],
             ))],
+            17 | 18 => {
+                let formats: Vec<Format> = Format::iter().collect();
+                let format = formats[rng.random_range(0..formats.len())];
+                let choice = ExportChoice { which: Which::Begun, format, ..ExportChoice::default() };
+                vec![
+                    Command::Export(ExportCommand::SetMasks(choice)),
+                    Command::Export(ExportCommand::Write(Output::Masks, exported(folder))),
+                ]
+            }
             _ => vec![Command::Library(LibraryCommand::Select(PairId(rng.random_range(0..PAIRS))))],
         });
     }
@@ -247,7 +281,7 @@ fn act(role: &str) -> ! {
         }
         unsaved.clone_from(&state.document.unsaved);
     };
-    for (i, commands) in script(seed).into_iter().enumerate() {
+    for (i, commands) in script(Path::new(folder), seed).into_iter().enumerate() {
         loop {
             runtime.tick(&mut state, Vec::new());
             confirm(&state, i);
@@ -286,7 +320,7 @@ fn played(folder: &Path, seed: u64) -> Vec<BTreeMap<String, Labels>> {
         now.insert(entry.name.clone(), plain(&source.load_labels(&entry.name).unwrap()));
     }
     let mut all = vec![now.clone()];
-    for commands in script(seed) {
+    for commands in script(folder, seed) {
         assert!(all.len() == 1 || ready(&state));
         runtime.tick(&mut state, commands);
         runtime.settle(&mut state);
@@ -388,6 +422,56 @@ fn compare(folder: &Path, played: &[BTreeMap<String, Labels>], said: &Said) -> u
     newer
 }
 
+/// One more export, which is whole, and takes away what kills left of others.
+fn finish(folder: &Path) {
+    let live = open_source(&Place::Path(folder.to_owned())).unwrap();
+    let source = Source { live, saves: true };
+    let choice = ExportChoice { which: Which::Begun, ..ExportChoice::default() };
+    match source.export_masks(&BTreeMap::new(), choice, &exported(folder), &JobCx::unwatched()) {
+        Ok(_) => {
+            let mut seen = Exports::default();
+            look_at_exports(folder.parent().unwrap(), &mut seen);
+            assert_eq!((seen.whole, seen.cut), (1, 0), "what was cut off is gone");
+        }
+        // All pairs may have been skipped or flagged.
+        Err(err) => assert!(err.why.contains("there is no mask to export"), "{err}"),
+    }
+}
+
+/// What the kills left of exports.
+#[derive(Default)]
+struct Exports {
+    /// Times that there was a whole one.
+    whole: usize,
+    /// Times that one was under way.
+    cut: usize,
+}
+
+/// Every folder that has an export's list holds all that it lists, to the byte, and its masks can be read: where an export
+/// goes, and where one is made first.
+fn look_at_exports(beside: &Path, seen: &mut Exports) {
+    for entry in std::fs::read_dir(beside).unwrap().map(|entry| entry.unwrap()) {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        seen.cut += usize::from(name.starts_with(".touch2touch-new-"));
+        for folder in [entry.path(), entry.path().join("new"), entry.path().join("old")] {
+            let Ok(text) = std::fs::read(folder.join(MANIFEST)) else {
+                assert!(!folder.ends_with("exported"), "an export without its list lies in its place");
+                continue;
+            };
+            let says: serde_json::Value = serde_json::from_slice(&text).unwrap();
+            for (file, sha256) in says["files"].as_object().unwrap() {
+                let bytes = std::fs::read(folder.join(file)).unwrap_or_else(|err| panic!("{file}: {err}"));
+                let found: String = sha2::Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
+                assert_eq!(*sha256, found, "{file}");
+            }
+            let found = list(&folder, None).unwrap();
+            assert_eq!((found.masks.len(), found.refused.len()), (says["stems"].as_object().unwrap().len(), 0));
+            assert!(found.masks.iter().all(|listed| listed.read().is_ok()));
+            seen.whole += usize::from(folder.ends_with("exported"));
+        }
+    }
+}
+
 #[test]
 fn no_confirmed_stroke_is_lost_to_a_kill() {
     if let Ok(role) = std::env::var(ROLE) {
@@ -395,6 +479,7 @@ fn no_confirmed_stroke_is_lost_to_a_kill() {
     }
     let next = AtomicUsize::new(0);
     let totals = Mutex::new((0, 0, 0));
+    let exports = Mutex::new(Exports::default());
     let workers = std::thread::available_parallelism().map_or(1, usize::from).clamp(1, 4);
     std::thread::scope(|scope| {
         for _ in 0..workers {
@@ -405,8 +490,10 @@ fn no_confirmed_stroke_is_lost_to_a_kill() {
                         break;
                     }
                     let dir = tempfile::tempdir().unwrap();
+                    let folder = dir.path().join("set");
+                    std::fs::create_dir(&folder).unwrap();
                     for pair in 0..PAIRS {
-                        let file = |kind: &str| dir.path().join(format!("touch_{pair}_{kind}.png"));
+                        let file = |kind: &str| folder.join(format!("touch_{pair}_{kind}.png"));
                         let gray = Grid::from_fn(32, 32, |x, y| ((x * y * (pair as usize + 1)) % 256) as u8);
                         images::write_gray8(&file("bubble"), &gray).unwrap();
                         images::write_rgb8(&file("gelslim"), &Grid::from_fn(32, 32, |x, _| [x as f32; 3])).unwrap();
@@ -415,19 +502,24 @@ fn no_confirmed_stroke_is_lost_to_a_kill() {
                         let seed = (series * ROUNDS + round) as u64;
                         let mut rng = ChaCha8Rng::seed_from_u64(seed + 1_000_000);
                         let (acts, after) = (rng.random_range(1..16), rng.random_range(0..30_000));
-                        let played = played(dir.path(), seed);
-                        let said = kill_one(dir.path(), seed, acts, Duration::from_micros(after));
-                        let newer = compare(dir.path(), &played, &said);
+                        let played = played(&folder, seed);
+                        let said = kill_one(&folder, seed, acts, Duration::from_micros(after));
+                        let newer = compare(&folder, &played, &said);
+                        look_at_exports(dir.path(), &mut exports.lock().unwrap());
                         let mut totals = totals.lock().unwrap();
                         *totals = (totals.0 + said.begun, totals.1 + said.confirmations, totals.2 + newer);
                     }
+                    finish(&folder);
                 }
             });
         }
     });
     let (acts, confirmations, newer) = *totals.lock().unwrap();
+    let Exports { whole, cut } = exports.into_inner().unwrap();
     eprintln!("{KILLS} kills, {acts} acts, {confirmations} confirmed saves, {newer} masks newer than confirmed");
+    eprintln!("exports: {whole} times a whole one, {cut} times one that was cut off");
     // Kills that come before anything was saved would show nothing.
     // On a busy machine fewer acts fit between two kills; enough of them must have been confirmed to mean anything.
     assert!(acts > 5 * KILLS && confirmations > KILLS / 5);
+    assert!(whole > 0 && cut > 0, "exports: {whole} whole, {cut} cut off");
 }

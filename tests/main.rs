@@ -13,6 +13,7 @@ mod apply;
 mod cli;
 #[cfg(feature = "onnx")]
 mod cli_generate;
+mod exchange;
 mod fuzz;
 mod io;
 mod kill;

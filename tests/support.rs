@@ -49,15 +49,20 @@ fn require(variable: &str) -> bool {
 
 /// Runs the program; `data` stands for all folders of the user.
 pub(crate) fn run(args: &[&str], data: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_touch2touch"))
+    command(args, data).output().unwrap()
+}
+
+/// The program as [`run`] runs it.
+pub(crate) fn command(args: &[&str], data: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_touch2touch"));
+    command
         .args(args)
         // Nothing of the user's may be read or written by a test.
         .env("TOUCH2TOUCH_DATA", data)
         .env("XDG_DATA_HOME", data)
         .env("XDG_CONFIG_HOME", data)
-        .env("TOUCH2TOUCH_CACHE", data)
-        .output()
-        .unwrap()
+        .env("TOUCH2TOUCH_CACHE", data);
+    command
 }
 
 /// All Rust files below a folder.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Stdio;
 use std::sync::Arc;
 
 use serde_json::Value;
@@ -23,7 +24,7 @@ use touch2touch::work::models::Models;
 use touch2touch::work::train::{TrainChoice, TrainSetup, Trained, plan, train};
 use touch2touch::work::tuning::Tuning;
 
-use crate::support::run;
+use crate::support::{command, run};
 
 /// Simulated grasps of two tools, all of whose masks were corrected to the truth by a person and marked done.
 pub(crate) fn corrected(root: &Path, grasps: u64) {
@@ -175,6 +176,57 @@ fn a_run_that_is_stopped_leaves_no_bundle_and_goes_on_to_the_same_last_bit() {
     assert_eq!((&resumed.curves, &resumed.held_out), (&whole.curves, &whole.held_out));
     assert!(bytes(&stopped) == bytes(&straight));
     assert_eq!(std::fs::read_dir(&kept).unwrap().count(), 0, "nothing is left of a finished run");
+}
+
+/// A training that is killed at any moment leaves no bundle, or a whole one; it neither keeps the next one from its place nor
+/// costs a label.
+#[test]
+fn a_killed_training_leaves_no_bundle_that_cannot_be_opened() {
+    const KILLS: u32 = 12;
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    corrected(&set, 1);
+    let dataset = Dataset::open(&set).unwrap();
+    let labels = || -> Vec<_> {
+        let all = Labels::of(&dataset);
+        dataset.index.pairs.iter().map(|entry| all.load(&entry.name).unwrap()).collect()
+    };
+    let before = labels();
+    let models = dir.path().join("models");
+    let train = |out: &Path| {
+        let [set, out] = [&set, out].map(|path| path.to_str().unwrap());
+        let args = ["masks", "train", set, "--held-out", "0", "--steps", "1", "--runtime", "rten", "--out", out];
+        let mut command = command(&args, dir.path());
+        command.stdout(Stdio::null()).stderr(Stdio::null());
+        command
+    };
+    let start = std::time::Instant::now();
+    assert!(train(&models.join("whole")).status().unwrap().success());
+    let (whole, mut trained) = (start.elapsed(), 0);
+    for kill in 1..=KILLS {
+        let out = models.join(format!("killed {}", kill % 3));
+        let mut child = train(&out).spawn().unwrap();
+        // From before it reads anything to after it wrote; the end, where it writes, is met most often.
+        std::thread::sleep(whole.mul_f64(f64::from(kill).sqrt() / f64::from(KILLS).sqrt() * 1.05));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        if out.exists() {
+            let bundle = bundles::open("Open", &out).unwrap();
+            assert!(bundle.trained);
+            std::fs::remove_dir_all(&out).unwrap();
+            trained += 1;
+        }
+        assert_eq!(labels(), before, "kill {kill}");
+    }
+    eprintln!("{KILLS} trainings killed, {trained} of them had written their bundle");
+    // Whatever was left, the same training has its place, and nothing else lies there then.
+    let out = models.join("killed 0");
+    assert!(train(&out).status().unwrap().success());
+    let of_run = bytes(&models.join("whole"));
+    assert!(bytes(&out) == of_run, "a run that was cut off goes on to the same last bit");
+    let mut names: Vec<_> = std::fs::read_dir(&models).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["killed 0", "whole"]);
 }
 
 #[test]

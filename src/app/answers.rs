@@ -176,7 +176,9 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         }
         Answer::Imported(ticket, import) => {
             state.tasks.running.remove(&ticket);
-            labels::imported(state, &import);
+            if state.export.import.take_if(|under_way| *under_way == ticket).is_some() {
+                labels::imported(state, &import);
+            }
         }
         Answer::Adapted(ticket, adapted, bundle) => {
             state.tasks.running.remove(&ticket);

@@ -139,9 +139,13 @@ pub(super) fn predict_case(state: &mut State, effects: &mut Vec<Effect>) {
 
 fn import(state: &mut State, effects: &mut Vec<Effect>) {
     let (Some(setup), Some(open)) = (state.import_setup(), &state.library.open) else { return };
+    if state.export.import.is_some_and(|ticket| state.tasks.running.contains_key(&ticket)) {
+        return;
+    }
     let source = open.source.clone();
     state.export.importing = None;
     let ticket = state.tasks.start("Import masks".into(), Vec::new());
+    state.export.import = Some(ticket);
     effects.push(Effect::ImportMasks { ticket, source, setup });
 }
 

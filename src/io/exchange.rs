@@ -16,10 +16,10 @@
 mod arrays;
 mod coco;
 mod format;
+mod found;
 mod plain;
 mod read;
 mod split;
-mod staging;
 mod unet;
 
 use std::collections::BTreeMap;
@@ -33,15 +33,16 @@ use super::files;
 use super::images::PictureError;
 use super::masks::MaskStore;
 use super::npz::NpzError;
+use super::staging::{self, Staging};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::rig::{PadId, Rig};
 
 pub use format::Format;
-use format::Place;
-pub use read::{Listed, Listing, ReadError, list};
+use format::{Place, Writer};
+pub use found::{Listed, Listing, ReadError};
+pub use read::list;
 pub use split::Stems;
-use staging::Staging;
 pub use unet::{CheckReport, check_folder};
 
 /// The imprint that becomes 0, meters.
@@ -273,6 +274,15 @@ pub struct Content {
     pub ignored: Option<Mask>,
 }
 
+fn writer(format: Format) -> Box<dyn Writer> {
+    match format {
+        Format::Unet => Box::new(unet::Folders),
+        Format::Npy => Box::new(arrays::Arrays),
+        Format::Coco => Box::new(coco::Annotations::default()),
+        Format::Png => Box::new(plain::Pictures),
+    }
+}
+
 /// How many of `entries` go to each of [`PARTS`].
 ///
 /// # Errors
@@ -308,7 +318,7 @@ pub fn export(
     staging::sweep(&parent);
     let staging = Staging::new(&folder).map_err(|s| io(&parent, "make a folder in", s))?;
     let root = staging.new_content();
-    let mut writer = config.format.writer();
+    let mut writer = writer(config.format);
     for relative in writer.folders() {
         make_folder(&root.join(relative))?;
     }
@@ -348,7 +358,8 @@ pub fn export(
         report.ignored_px += ignored.count();
         report.counts[part] += 1;
         let (pair, finger) = source(&entries[i]);
-        writer.add(&Place { root: &root, part, stem, pair: &pair, finger: &finger }, &content, &mut report)?;
+        let to = Place { root: &root, part, stem, pair: &pair, finger: &finger };
+        writer.add(&to, &content, &mut report).map_err(|err| meant(err, &root, &folder))?;
         written.insert(stem.clone(), digest(&content.mask, content.ignored.as_ref()));
     }
     if !failures.is_empty() {
@@ -357,10 +368,7 @@ pub fn export(
     writer.finish(&root)?;
     let problems = check_written(&root, config.format, written);
     if !problems.is_empty() {
-        // Where the files would have come to lie.
-        let moved = |file: PathBuf| file.strip_prefix(&root).map(|f| folder.join(f)).unwrap_or(file);
-        let problems = problems.into_iter().map(|p| Problem { file: moved(p.file), ..p }).collect();
-        return Err(ExportError::Check { problems });
+        return Err(meant(ExportError::Check { problems }, &root, &folder));
     }
     let mut files = Vec::new();
     find(&root, &root, &mut files).map_err(|s| io(&root, "list the folder", s))?;
@@ -374,16 +382,7 @@ pub fn export(
     super::atomic::write_bytes(&path, &text).map_err(|s| io(&path, "write", s))?;
     // Once more, in case something appeared while the masks were computed.
     refuse_foreign(&folder)?;
-    if folder.exists() {
-        let old = staging.old_content();
-        std::fs::rename(&folder, &old).map_err(|s| io(&folder, "move the previous export away from", s))?;
-        if let Err(source) = std::fs::rename(&root, &folder) {
-            std::fs::rename(&old, &folder).map_err(|s| io(&folder, "put the previous export back to", s))?;
-            return Err(io(&folder, "put the export to", source));
-        }
-    } else {
-        std::fs::rename(&root, &folder).map_err(|s| io(&folder, "put the export to", s))?;
-    }
+    staging.put(&folder).map_err(|source| io(&folder, "put the export to", source))?;
     report.empty_parts = PARTS.iter().zip(report.counts).filter(|(_, n)| *n == 0).map(|(p, _)| *p).collect();
     Ok(report)
 }
@@ -394,6 +393,14 @@ fn io(path: &Path, what: &'static str, source: std::io::Error) -> ExportError {
 
 fn make_folder(path: &Path) -> Result<(), ExportError> {
     std::fs::create_dir_all(path).map_err(|source| io(path, "make the folder", source))
+}
+
+/// A failed check that names files where they would have come to lie, in `folder`, instead of where they were made.
+fn meant(err: ExportError, root: &Path, folder: &Path) -> ExportError {
+    let ExportError::Check { problems } = err else { return err };
+    let moved = |file: PathBuf| file.strip_prefix(root).map(|f| folder.join(f)).unwrap_or(file);
+    let problems = problems.into_iter().map(|p| Problem { file: moved(p.file), ..p }).collect();
+    ExportError::Check { problems }
 }
 
 /// What tells one mask with its ignored pixels from all others.

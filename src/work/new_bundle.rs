@@ -9,6 +9,7 @@ use super::bundles::BundleInfo;
 use super::error::TaskError;
 use crate::infer::bundle::{Bundle, MANIFEST, Role};
 use crate::io::digest::sha256;
+use crate::io::staging::{self, Staging};
 use crate::io::{atomic, files, folders};
 
 /// Where the program keeps models that were made with it, and looks for them at its start; `None` without a folder for
@@ -41,24 +42,26 @@ pub(super) fn check_folder(
     if empty || replaced() { Ok(()) } else { fail(format!("{} holds other files", out.display())) }
 }
 
-/// Writes a bundle: the graphs of `from`, with others in place of some of them, and its manifest as `change` makes it. The
-/// manifest comes last, so that a folder without one is no bundle.
+/// Writes a bundle: the graphs of `from`, with others in place of some of them, and its manifest as `change` makes it, which
+/// may add files to the folder that it is given. Made and opened beside `out` first: a kill leaves no part of a bundle there.
 pub(super) fn write(
     what: &str,
     out: &Path,
     from: &BundleInfo,
     graphs: &BTreeMap<Role, Vec<u8>>,
-    change: impl FnOnce(&mut Value) -> Result<(), TaskError>,
+    change: impl FnOnce(&Path, &mut Value) -> Result<(), TaskError>,
 ) -> Result<(), TaskError> {
     let source = from.open(what)?;
     let io = |file: &Path, err: std::io::Error| {
         TaskError::new(what, format!("cannot be written: {err} ({})", file.display()))
     };
-    std::fs::create_dir_all(out).map_err(|err| io(out, err))?;
-    let manifest_file = out.join(MANIFEST);
-    if manifest_file.exists() {
-        std::fs::remove_file(&manifest_file).map_err(|err| io(&manifest_file, err))?;
-    }
+    let place = std::path::absolute(out).map_err(|err| io(out, err))?;
+    let parent = place.parent().unwrap_or(&place);
+    std::fs::create_dir_all(parent).map_err(|err| io(parent, err))?;
+    staging::sweep(parent);
+    let staging = Staging::new(&place).map_err(|err| io(parent, err))?;
+    let folder = staging.new_content();
+    std::fs::create_dir(&folder).map_err(|err| io(&folder, err))?;
     let read = |name: &str| {
         let file = source.origin().file(name);
         file.read(files::MODEL)
@@ -68,7 +71,7 @@ pub(super) fn write(
     let mut manifest: Value = serde_json::from_slice(&text).map_err(|err| TaskError::new(what, err))?;
     for (role, _) in source.files() {
         let name = manifest["files"][role.key()]["path"].as_str().unwrap_or_default().to_owned();
-        let file = out.join(&name);
+        let file = folder.join(&name);
         if let Some(folder) = file.parent() {
             std::fs::create_dir_all(folder).map_err(|err| io(folder, err))?;
         }
@@ -79,10 +82,11 @@ pub(super) fn write(
             atomic::write_bytes(&file, &read(&name)?).map_err(|err| io(&file, err))?;
         }
     }
-    change(&mut manifest)?;
+    change(&folder, &mut manifest)?;
+    let manifest_file = folder.join(MANIFEST);
     let text = serde_json::to_string_pretty(&manifest).map_err(|err| TaskError::new(what, err))?;
     atomic::write_bytes(&manifest_file, text.as_bytes()).map_err(|err| io(&manifest_file, err))?;
     // What was written is what will be read.
-    Bundle::open(out).map_err(|err| TaskError::from_error(what, &err))?;
-    Ok(())
+    Bundle::open(&folder).map_err(|err| TaskError::from_error(what, &err))?;
+    staging.put(&place).map_err(|err| io(out, err))
 }

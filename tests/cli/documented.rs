@@ -80,6 +80,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch case check", How::Run(&[], "", &[0])),
     ("touch2touch label", How::Run(&[], "", &[0])),
     ("touch2touch masks export", How::Run(&[], "", &[0])),
+    ("touch2touch masks import", How::Run(&[], "", &[0])),
     ("touch2touch masks train", How::Run(&[("10", "0.01")], "--test-in-train", &[0])),
     ("touch2touch masks compare", How::Run(&[], "", &[0])),
     ("touch2touch masks propose", How::Run(&[("24", "1")], "", &[0])),
@@ -142,6 +143,9 @@ impl Stage {
         store.save(&name, lab::RIGHT, Some(&stored)).unwrap();
         MaskStore::in_folder(dir.path().join("other")).save(&name, lab::RIGHT, Some(&stored)).unwrap();
         store.save_review(&name, &StoredReview { review: "done".into(), ..StoredReview::default() }).unwrap();
+        let (set, masks) = (set.to_str().unwrap(), dir.path().join("masks"));
+        let done = run(&["masks", "export", set, "--out", masks.to_str().unwrap()], dir.path());
+        assert!(done.status.success(), "{}", error_text(&done));
         let robot = dir.path().join("robot");
         std::fs::create_dir(&robot).unwrap();
         let touch = dataset.gelslim_file(id).unwrap();
@@ -160,6 +164,7 @@ impl Stage {
                 ("PATH", _) => at("set"),
                 ("NAME", _) => self.name.clone(),
                 ("OTHER", _) => at("other"),
+                ("MASKS", _) => at("masks"),
                 ("TOOL.stl", _) => at("set/tools_stls/pattern_36.stl"),
                 ("DIR", "--out" | "--influence") => at(&format!("out {number}")),
                 ("DIR", "--cases") => at("known"),

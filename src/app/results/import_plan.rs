@@ -24,9 +24,7 @@ impl Computes for ImportPlanKey {
         let source = state.library.open.as_ref()?.source.clone();
         let setup = state.import_setup()?;
         Some(Job::new(Lane::Files, "Plan of an import", move |cx| {
-            let what = "Import masks";
-            let none = || TaskError::new(what, "this kind of source cannot be read outside the studio");
-            plan_import(source.as_dataset().ok_or_else(none)?, &setup, cx)
+            plan_import(source.on_disk("Plan of an import")?, &setup, cx)
         }))
     }
 

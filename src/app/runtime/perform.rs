@@ -262,9 +262,7 @@ impl Runtime {
             }
             Effect::ImportMasks { ticket, source, mut setup } => {
                 let body = Box::new(move |cx: &JobCx| {
-                    let dataset = source.as_dataset().ok_or_else(|| {
-                        TaskError::new("Import masks", "this kind of source cannot be read outside the studio")
-                    })?;
+                    let dataset = source.on_disk("Import masks")?;
                     setup.from = absolute(setup.from);
                     Ok(Answer::Imported(ticket, Box::new(import_masks(dataset, &setup, cx)?)))
                 });

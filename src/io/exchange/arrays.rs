@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::format::{Place, Writer, gray};
-use super::read::{IGNORE_NPY, IMPRINT_NPY, MASK_NPY};
+use super::format::{Place, Writer, differs, gray};
+use super::found::{IGNORE_NPY, IMPRINT_NPY, MASK_NPY};
 use super::{Content, ExportError, ExportReport, PARTS, io};
 use crate::io::{atomic, npz};
 
@@ -28,7 +28,12 @@ impl Writer for Arrays {
     fn add(&mut self, to: &Place<'_>, content: &Content, report: &mut ExportReport) -> Result<(), ExportError> {
         let file = |end: &str| to.root.join(PARTS[to.part]).join(format!("{}{end}", to.stem));
         report.unmeasured_px += content.imprint.as_slice().iter().filter(|v| !v.is_finite()).count();
-        npz::write_npy(&file(IMPRINT_NPY), &content.imprint)?;
+        let imprint = file(IMPRINT_NPY);
+        npz::write_npy(&imprint, &content.imprint)?;
+        let same = |(a, b): (f32, &f32)| a.to_bits() == b.to_bits();
+        if !npz::read_npy(&imprint)?.into_f32().into_iter().zip(content.imprint.as_slice()).all(same) {
+            return Err(differs(&imprint));
+        }
         npz::write_npy_gray(&file(MASK_NPY), &gray(&content.mask))?;
         if let Some(ignored) = &content.ignored {
             npz::write_npy_gray(&file(IGNORE_NPY), &gray(ignored))?;

@@ -13,12 +13,12 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::format::{Place, Writer};
-use super::read::{Listed, Listing, ReadError, Stored};
+use super::format::{Place, Writer, write_image};
+use super::found::{Coded, Listed, Listing, ReadError, Stored};
 use super::unet::image_from_imprint;
 use super::{Content, ExportError, ExportReport, PARTS, io};
 use crate::domain::grid::Mask;
-use crate::domain::label::{coco_runs, coco_runs_of, coco_text, mask_of_coco_runs};
+use crate::domain::label::{coco_runs, coco_runs_of, coco_text};
 use crate::io::{atomic, files, images};
 
 /// The folder of the annotations.
@@ -50,7 +50,7 @@ impl Writer for Annotations {
     fn add(&mut self, to: &Place<'_>, content: &Content, report: &mut ExportReport) -> Result<(), ExportError> {
         let name = format!("{}.png", to.stem);
         let picture = image_from_imprint(&content.imprint, report);
-        images::write_gray8(&to.root.join(PARTS[to.part]).join(&name), &picture)?;
+        write_image(&to.root.join(PARTS[to.part]).join(&name), &picture)?;
         let (images, annotations) = &mut self.parts[to.part];
         self.last[0] += 1;
         let of = Of { pair: to.pair.to_owned(), finger: to.finger.to_owned() };
@@ -147,32 +147,6 @@ enum Counts {
     Runs(Vec<u32>),
 }
 
-/// The masks of an image as they are in the file.
-#[derive(Clone, Debug)]
-pub(super) struct Coded {
-    /// Columns and rows.
-    size: [usize; 2],
-    contact: Vec<Vec<u32>>,
-    ignored: Vec<Vec<u32>>,
-}
-
-impl Coded {
-    /// Contact and ignored pixels.
-    pub(super) fn masks(&self) -> Result<(Mask, Option<Mask>), String> {
-        let [width, height] = self.size;
-        let mut masks = [&self.contact, &self.ignored].map(|parts| {
-            parts.iter().map(|runs| mask_of_coco_runs(width, height, runs)).reduce(|one, other| {
-                let (mut one, other) = (one?, other?);
-                one.as_mut_slice().iter_mut().zip(other.as_slice()).for_each(|(a, b)| *a |= b);
-                Ok(one)
-            })
-        });
-        let ignored = masks[1].take().transpose().map_err(|err| err.to_string())?;
-        let none = || mask_of_coco_runs(width, height, &[u32::try_from(width.saturating_mul(height)).unwrap_or(0)]);
-        Ok((masks[0].take().unwrap_or_else(none).map_err(|err| err.to_string())?, ignored))
-    }
-}
-
 /// The masks of an annotations file. An image of another program without an annotation is one that nobody labeled.
 pub(super) fn read(file: &Path, listing: &mut Listing) -> Result<(), ReadError> {
     let bad = |what: String| ReadError::new(file, what, "name a COCO annotations file with run lengths");
@@ -218,6 +192,9 @@ pub(super) fn read(file: &Path, listing: &mut Listing) -> Result<(), ReadError> 
     for image in content.images {
         let name = PathBuf::from(&image.file_name);
         let stem = name.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        if image.width.max(image.height) > images::MAX_SIDE as usize {
+            wrong.insert(image.id, format!("{} x {} pixels are more than are read", image.width, image.height));
+        }
         if let Some(why) = wrong.remove(&image.id) {
             listing.refused.push(bad(format!("{}: {why}", image.file_name)));
             continue;

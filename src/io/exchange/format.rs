@@ -5,8 +5,10 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
-use super::{Content, ExportError, ExportReport, PARTS, arrays, coco, plain, unet};
+use super::{Content, ExportError, ExportReport, PARTS};
+use crate::domain::dataset::Problem;
 use crate::domain::grid::{Grid, Mask};
+use crate::io::images;
 
 /// A form of masks that other programs read and write.
 #[derive(
@@ -72,15 +74,6 @@ impl Format {
             Self::Png => "Masks alone as 8-bit pictures by part, 0 and 255; ignored pixels as pictures of their own",
         }
     }
-
-    pub(super) fn writer(self) -> Box<dyn Writer> {
-        match self {
-            Self::Unet => Box::new(unet::Folders),
-            Self::Npy => Box::new(arrays::Arrays),
-            Self::Coco => Box::new(coco::Annotations::default()),
-            Self::Png => Box::new(plain::Pictures),
-        }
-    }
 }
 
 /// Where a mask belongs in an export.
@@ -108,6 +101,18 @@ pub(super) trait Writer {
     fn finish(&mut self, _root: &Path) -> Result<(), ExportError> {
         Ok(())
     }
+}
+
+/// Writes an image, which must read back the same.
+pub(super) fn write_image(file: &Path, picture: &Grid<u8>) -> Result<(), ExportError> {
+    images::write_gray8(file, picture)?;
+    if images::read_gray8(file)? == *picture { Ok(()) } else { Err(differs(file)) }
+}
+
+/// That a file reads back differently.
+pub(super) fn differs(file: &Path) -> ExportError {
+    let (what, hint) = ("the file reads back differently".into(), "check the disk".into());
+    ExportError::Check { problems: vec![Problem { file: file.to_owned(), what, hint }] }
 }
 
 /// A mask as the values 0 and 255.

@@ -12,7 +12,7 @@ impl Writer for Pictures {
         let file = |end: &str| to.root.join(PARTS[to.part]).join(format!("{}{end}", to.stem));
         images::write_gray8(&file(".png"), &gray(&content.mask))?;
         if let Some(ignored) = &content.ignored {
-            images::write_gray8(&file(super::read::IGNORE_PNG), &gray(ignored))?;
+            images::write_gray8(&file(super::found::IGNORE_PNG), &gray(ignored))?;
         }
         Ok(())
     }

@@ -9,7 +9,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::format::{Place, Writer, gray};
+use super::format::{Place, Writer, gray, write_image};
 use super::{Content, ExportError, ExportReport, IGNORED, IMAGE_HI_M, IMAGE_LO_M, PARTS, make_folder};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::{DepthMap, Grid};
@@ -26,7 +26,7 @@ impl Writer for Folders {
     fn add(&mut self, to: &Place<'_>, content: &Content, report: &mut ExportReport) -> Result<(), ExportError> {
         let part = to.root.join(PARTS[to.part]);
         let file = |kind: &str| part.join(kind).join(format!("{}.png", to.stem));
-        images::write_gray8(&file("imgs"), &image_from_imprint(&content.imprint, report))?;
+        write_image(&file("imgs"), &image_from_imprint(&content.imprint, report))?;
         images::write_gray8(&file("masks"), &gray(&content.mask))?;
         if let Some(ignored) = &content.ignored {
             make_folder(&part.join(IGNORED))?;

@@ -64,7 +64,6 @@ fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
         }
         Lookup::Failed(err) => {
             line(err.to_string(), cx.p.wrong);
-            err.hint.iter().for_each(|hint| line(hint.clone(), cx.p.text));
             false
         }
         Lookup::Waiting | Lookup::Absent(_) => {

@@ -30,9 +30,9 @@ pub(super) fn bundle<'a>(
     fitted: &Fitted,
     graphs: &BTreeMap<Role, Vec<u8>>,
 ) -> Result<&'a Path, TaskError> {
-    new_bundle::write(WHAT, out, from, graphs, |manifest| {
+    new_bundle::write(WHAT, out, from, graphs, |folder, manifest| {
         let pads: Vec<String> = rig.pads().map(|pad| rig.pad_key(pad).into_owned()).collect();
-        let file = out.join(FIT_FILE);
+        let file = folder.join(FIT_FILE);
         write_fit(&file, &pads, fitted).map_err(|err| TaskError::from_error(WHAT, &err))?;
         let bytes = std::fs::read(&file)
             .map_err(|err| TaskError::new(WHAT, format!("cannot be read: {err} ({})", file.display())))?;

@@ -50,7 +50,7 @@ pub(super) fn bundle(setup: &TrainSetup, graph: Vec<u8>, said: &Provenance<'_>) 
         "before": said.before,
         "after": said.after,
     });
-    new_bundle::write(WHAT, &setup.out, &setup.start, &BTreeMap::from([(Role::MaskUnet, graph)]), |manifest| {
+    new_bundle::write(WHAT, &setup.out, &setup.start, &BTreeMap::from([(Role::MaskUnet, graph)]), |_, manifest| {
         manifest["name"] = json!(name);
         let before = manifest["provenance"].take();
         let mut provenance = serde_json::Map::new();

@@ -1,4 +1,5 @@
-//! The folder beside an export in which the new one is made. What a killed run leaves is taken away by the next one.
+//! The folder beside another one in which its new content is made, so that it is there whole or not at all. What a killed
+//! run leaves is taken away by the next one.
 
 use std::fs::File;
 use std::io;
@@ -6,17 +7,19 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use crate::io::{atomic, files};
+use super::{atomic, files};
 
 /// How the folder's name begins.
-const PREFIX: &str = ".touch2touch-export-";
-/// The file in it that is locked while a program works there, and names the folder that is being exported.
+const PREFIX: &str = ".touch2touch-new-";
+/// How that of programs before this one began.
+const OLD_PREFIX: &str = ".touch2touch-export-";
+/// The file in it that is locked while a program works there, and names the folder whose content is being made.
 const LOCK: &str = "lock";
 const NEW: &str = "new";
 const OLD: &str = "old";
 
 /// A folder that is gone when it is dropped.
-pub(super) struct Staging {
+pub(crate) struct Staging {
     folder: TempDir,
     /// Held locked.
     _lock: File,
@@ -24,7 +27,7 @@ pub(super) struct Staging {
 
 impl Staging {
     /// A folder beside `target`.
-    pub(super) fn new(target: &Path) -> io::Result<Self> {
+    pub(crate) fn new(target: &Path) -> io::Result<Self> {
         let parent = target.parent().unwrap_or(target);
         let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(parent)?;
         // Locked before it has its place: a folder without a lock is one that is still being made.
@@ -37,22 +40,38 @@ impl Staging {
     }
 
     /// Where the new content is made.
-    pub(super) fn new_content(&self) -> PathBuf {
+    pub(crate) fn new_content(&self) -> PathBuf {
         self.folder.path().join(NEW)
     }
 
     /// Where the previous content is put out of the way.
-    pub(super) fn old_content(&self) -> PathBuf {
+    fn old_content(&self) -> PathBuf {
         self.folder.path().join(OLD)
+    }
+
+    /// Puts the new content in the place of `target`, which is as it was if that cannot be done.
+    pub(crate) fn put(self, target: &Path) -> io::Result<()> {
+        let (new, old) = (self.new_content(), self.old_content());
+        let there = target.exists();
+        if there {
+            std::fs::rename(target, &old)?;
+        }
+        let put = std::fs::rename(new, target);
+        if put.is_err() && there && std::fs::rename(&old, target).is_err() {
+            // Left where it is, where the next run finds it.
+            log::error!("the previous content cannot be put back: {}", self.folder.keep().display());
+        }
+        put
     }
 }
 
 /// Removes what killed runs left in `parent`. A run that was killed between moving the previous export away and putting
 /// the new one in its place gets the previous one back.
-pub(super) fn sweep(parent: &Path) {
+pub(crate) fn sweep(parent: &Path) {
     let Ok(entries) = std::fs::read_dir(parent) else { return };
     for entry in entries.flatten() {
-        let ours = entry.file_name().to_string_lossy().starts_with(PREFIX);
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let ours = name.starts_with(PREFIX) || name.starts_with(OLD_PREFIX);
         if !ours || !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
             continue;
         }
@@ -76,7 +95,7 @@ pub(super) fn sweep(parent: &Path) {
             continue;
         }
         if let Err(err) = std::fs::remove_dir_all(&left) {
-            log::warn!("what a killed export left cannot be removed: {err}: {}", left.display());
+            log::warn!("what a killed run left cannot be removed: {err}: {}", left.display());
         }
     }
 }
@@ -97,6 +116,23 @@ mod tests {
         let running = Staging::new(&target).unwrap();
         sweep(dir.path());
         assert!(!left.exists() && running.folder.path().is_dir());
+    }
+
+    #[test]
+    fn new_content_takes_the_place_of_old_and_nothing_is_left() {
+        let dir = tempfile::tempdir().unwrap();
+        let target = dir.path().join("unet");
+        for text in ["one", "two"] {
+            let staging = Staging::new(&target).unwrap();
+            std::fs::create_dir(staging.new_content()).unwrap();
+            std::fs::write(staging.new_content().join("mask"), text).unwrap();
+            staging.put(&target).unwrap();
+            assert_eq!(std::fs::read_to_string(target.join("mask")).unwrap(), text);
+        }
+        // Without new content the old one stays.
+        assert!(Staging::new(&target).unwrap().put(&target).is_err());
+        assert_eq!(std::fs::read_to_string(target.join("mask")).unwrap(), "two");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
     }
 
     #[test]

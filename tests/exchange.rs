@@ -1,0 +1,404 @@
+//! Masks in the forms of other programs: what is exported comes back the same, and an import keeps what people did.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use strum::IntoEnumIterator as _;
+use touch2touch::domain::catalog;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::grid::{Grid, Mask};
+use touch2touch::domain::label::{Marks, Provenance};
+use touch2touch::domain::rig::{PadId, lab};
+use touch2touch::domain::sim;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::exchange::{Format, MANIFEST, PARTS};
+use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch::io::{images, npz};
+use touch2touch::work::export::{ExportChoice, ExportSetup, HandMasks, Which, export_masks};
+use touch2touch::work::import::{Import, ImportSetup, import_masks, plan_import};
+use touch2touch::work::job::{Cancel, JobCx, Progress};
+use touch2touch::work::labels::{Act, Deed, HandMask, Labels, MaskPlace, PairLabels, Review};
+
+use crate::support::run;
+
+/// A data set of four grasps whose masks Anna painted, each with some ignored pixels and one without contact; the last pair
+/// is in progress, the others are done.
+fn painted(root: &Path) -> Dataset {
+    let tool = &catalog::tools()[0];
+    for index in 0..4 {
+        let sample = sim::simulate(tool, sim::random_grasp(index + 3), index, &sim::SimConfig::default());
+        write_pair(root, Layout::Train, &tool.name, index, &sample).unwrap();
+    }
+    write_tools(root, &[(tool.name.as_str(), tool.seen, tool.mesh())]).unwrap();
+    let dataset = Dataset::open(root).unwrap();
+    for (at, entry) in (0..).zip(&dataset.index.pairs) {
+        let sample = dataset.load(PairId(at)).unwrap();
+        let mut stored = PairLabels { review: Review::Done, ..PairLabels::default() };
+        if at == 3 {
+            stored.review = Review::InProgress;
+        }
+        for (pad, touch) in sample.pads.entries() {
+            let truth = touch.depth().unwrap().truth.as_ref().unwrap().contact.clone();
+            let empty = at == 1 && pad == lab::LEFT;
+            let mask = if empty { truth.map(|_| false) } else { truth };
+            let ignored = (at != 2).then(|| Mask::from_fn(mask.width(), mask.height(), |x, y| x / 7 == 3 && y > 60));
+            stored.masks.insert(MaskPlace::measured(pad), by(&mask, ignored.as_ref(), Provenance::hand("Anna")));
+        }
+        Labels::of(&dataset).save(&entry.name, &stored, &Deed::named("test")).unwrap();
+    }
+    dataset
+}
+
+fn by(mask: &Mask, ignored: Option<&Mask>, from: Provenance) -> HandMask {
+    let mut hand = HandMask::new(mask.clone(), from.clone());
+    hand.take_over(mask, ignored, from, false);
+    hand
+}
+
+fn export(dataset: &Dataset, folder: &Path, format: Format) {
+    let choice = ExportChoice { which: Which::Begun, format, ..ExportChoice::default() };
+    let masks = HandMasks { labels: &Labels::of(dataset), changed: &BTreeMap::new() };
+    let setup = ExportSetup { pairs: None, choice };
+    let (plan, report) = export_masks(dataset, &masks, &setup, folder, None, &JobCx::unwatched()).unwrap();
+    assert_eq!((plan.total(), report.counts.iter().sum::<usize>()), (8, 8), "{format:?}");
+}
+
+fn from(path: &Path) -> ImportSetup {
+    ImportSetup { from: path.to_owned(), person: Some("Ben".into()), ..ImportSetup::default() }
+}
+
+fn import(dataset: &Dataset, setup: &ImportSetup) -> Import {
+    let planned = plan_import(dataset, setup, &JobCx::unwatched()).unwrap();
+    let found = import_masks(dataset, setup, &JobCx::unwatched()).unwrap();
+    assert_eq!(planned, found, "what is said is what is done");
+    found
+}
+
+fn all(dataset: &Dataset) -> BTreeMap<(String, PadId), HandMask> {
+    let labels = Labels::of(dataset);
+    let load = |(pair, pad): (String, PadId)| {
+        let hand = labels.load(&pair).unwrap().measured(pad).unwrap().clone();
+        ((pair, pad), hand)
+    };
+    labels.masks().into_iter().map(load).collect()
+}
+
+fn forget(dataset: &Dataset) {
+    std::fs::remove_dir_all(Labels::of(dataset).folder().unwrap()).unwrap();
+}
+
+#[test]
+fn every_form_comes_back_the_same_into_an_empty_folder_of_labels() {
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = painted(&dir.path().join("set"));
+    let before = all(&dataset);
+    let folders: BTreeMap<Format, PathBuf> = Format::iter().map(|f| (f, dir.path().join(f.key()))).collect();
+    for (format, folder) in &folders {
+        export(&dataset, folder, *format);
+    }
+    for (format, folder) in &folders {
+        // As it lies there, without its list, and of a part alone.
+        for with_list in [true, false] {
+            forget(&dataset);
+            if !with_list {
+                std::fs::remove_file(folder.join(MANIFEST)).unwrap();
+            }
+            let found = import(&dataset, &from(folder));
+            assert_eq!((found.new, found.total(), found.is_whole()), (8, 8, true), "{format:?}: {found:?}");
+            assert_eq!(found.format, format.key());
+            let after = all(&dataset);
+            assert!(after.keys().eq(before.keys()), "{format:?}");
+            for (of, hand) in &after {
+                let was = &before[of];
+                assert!(hand.mask == was.mask && hand.marks.ignored() == was.marks.ignored(), "{format:?} {of:?}");
+                let layers = hand.marks.layers();
+                assert!(layers.iter().all(|(from, _)| matches!(from, Provenance::Imported { .. })), "{layers:?}");
+            }
+            let labels = Labels::of(&dataset);
+            assert!(labels.reviews().states.is_empty(), "no pair is marked");
+            let records = labels.records(&dataset.index.pairs[0].name).unwrap();
+            assert_eq!((&*records[0].name, &*records[0].person, records[0].act), ("import of masks", "Ben", Act::Do));
+            let again = import(&dataset, &from(folder));
+            assert_eq!((again.same, again.total()), (8, 0), "{format:?}: {again:?}");
+        }
+        let part = match format {
+            Format::Unet => folder.join("train/masks"),
+            Format::Coco => folder.join("annotations/train.json"),
+            Format::Npy | Format::Png => folder.join("train"),
+        };
+        let found = import(&dataset, &from(&part));
+        assert!(found.same > 0 && found.same < 8 && found.is_whole(), "{format:?}: {found:?}");
+    }
+}
+
+/// Rule 12 of those distilled from complaints. The rules are those of the lab's loader, spelled out here once more: every file
+/// of `imgs` has exactly one of its stem in `masks`, `stem.*` finds no second one, both are 8-bit gray and of one size, masks
+/// have at most the values 0 and 255, and no part that the trainer opens is empty.
+#[test]
+fn rule_12_an_exported_training_folder_passes_the_loaders_rules_with_no_edits() {
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = painted(&dir.path().join("set"));
+    let folder = dir.path().join("unet");
+    export(&dataset, &folder, Format::Unet);
+    let names = |folder: PathBuf| -> Vec<String> {
+        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+    };
+    let mut pictures = 0;
+    for part in PARTS {
+        let (imgs, masks) = (names(folder.join(part).join("imgs")), names(folder.join(part).join("masks")));
+        assert!(imgs.len() == masks.len() && !imgs.is_empty(), "{part}: {imgs:?} {masks:?}");
+        for name in imgs {
+            let (stem, ending) = name.rsplit_once('.').unwrap();
+            assert!(ending == "png" && !stem.contains(['.', '*', '?', '[', ']']), "{name}");
+            let of_stem: Vec<&String> = masks.iter().filter(|m| m.starts_with(&format!("{stem}."))).collect();
+            assert_eq!(of_stem.len(), 1, "{name}");
+            let read = |kind: &str, name: &str| images::read_gray8(&folder.join(part).join(kind).join(name)).unwrap();
+            let (image, mask) = (read("imgs", &name), read("masks", of_stem[0]));
+            assert_eq!((image.size(), mask.size()), ([175, 140], [175, 140]));
+            assert!(mask.as_slice().iter().all(|v| [0, 255].contains(v)), "{name}");
+            pictures += 1;
+        }
+    }
+    assert_eq!(pictures, 8);
+}
+
+#[test]
+fn arrays_say_meters_and_annotations_are_what_loaders_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = painted(&dir.path().join("set"));
+    let (arrays, coco) = (dir.path().join("npy"), dir.path().join("coco"));
+    export(&dataset, &arrays, Format::Npy);
+    export(&dataset, &coco, Format::Coco);
+    let said = std::fs::read_to_string(arrays.join("README.txt")).unwrap();
+    assert!(said.contains("float32") && said.contains("meters") && said.contains("(height, width)"), "{said}");
+    let (mut seen, mut ids, mut images_of) = (0, Vec::new(), 0);
+    for part in PARTS {
+        let text = std::fs::read(coco.join("annotations").join(format!("{part}.json"))).unwrap();
+        let content: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        assert_eq!(content["categories"][0]["name"], "contact");
+        for image in content["images"].as_array().unwrap() {
+            images_of += 1;
+            let file = coco.join(part).join(image["file_name"].as_str().unwrap());
+            assert_eq!(images::read_gray8(&file).unwrap().size(), [175, 140]);
+            let stem = file.file_stem().unwrap().to_str().unwrap().to_owned();
+            let imprint = npz::read_npy(&arrays.join(part).join(format!("{stem}.imprint.npy"))).unwrap();
+            assert_eq!(imprint.shape, [140, 175]);
+            assert!(imprint.into_f32().iter().all(|m| m.abs() < 0.05), "meters");
+        }
+        for one in content["annotations"].as_array().unwrap() {
+            ids.push(one["id"].as_u64().unwrap());
+            // Ignored pixels are a crowd, so that training leaves them out; masks are none, so that it does not.
+            assert_eq!(one["iscrowd"].as_u64().unwrap() + 1, one["category_id"].as_u64().unwrap());
+            assert_eq!(one["segmentation"]["size"], serde_json::json!([140, 175]));
+            let (area, bbox) = (one["area"].as_u64().unwrap(), one["bbox"].as_array().unwrap());
+            assert!(area > 0 && area <= bbox[2].as_u64().unwrap() * bbox[3].as_u64().unwrap(), "{one}");
+            seen += 1;
+        }
+    }
+    // One of eight masks has no contact, six have ignored pixels.
+    assert_eq!((images_of, seen), (8, 7 + 6));
+    ids.sort_unstable();
+    assert!(ids[0] == 1 && ids.windows(2).all(|pair| pair[0] < pair[1]), "{ids:?}");
+}
+
+#[test]
+fn what_people_did_stays_unless_asked_and_undo_brings_back_what_was() {
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = painted(&dir.path().join("set"));
+    let folder = dir.path().join("png");
+    export(&dataset, &folder, Format::Png);
+    // All masks are others now: of a threshold, with one column by hand. The first pair is done.
+    let labels = Labels::of(&dataset);
+    let names: Vec<String> = dataset.index.pairs.iter().map(|pair| pair.name.clone()).collect();
+    for (at, name) in names.iter().enumerate() {
+        let mut stored = labels.load(name).unwrap();
+        stored.review = if at == 0 { Review::Done } else { Review::Todo };
+        for hand in stored.masks.values_mut() {
+            let all = hand.mask.map(|_| true);
+            *hand = HandMask::new(all, Provenance::Threshold { min_m: 0.001 });
+            let column = Mask::from_fn(175, 140, |x, _| x == 5);
+            let rect = touch2touch::domain::label::Rect { x: 5, y: 0, width: 1, height: 140 };
+            let (mask, marks) = (Arc::make_mut(&mut hand.mask), Arc::make_mut(&mut hand.marks));
+            let anna = Provenance::hand("Anna");
+            marks.paint(mask, (&column, rect), touch2touch::domain::label::Paint::Contact, None, anna);
+        }
+        labels.save(name, &stored, &Deed::named("test")).unwrap();
+    }
+    let before = all(&dataset);
+    let found = import(&dataset, &from(&folder));
+    assert_eq!((found.new, found.replaced, found.kept, found.judged), (0, 6, 6, 2), "{found:?}");
+    assert_eq!(found.changed, names[1..]);
+    let after = all(&dataset);
+    for ((pair, pad), hand) in &after {
+        let was = &before[&(pair.clone(), *pad)];
+        assert_eq!(hand.is_same(was), *pair == names[0], "a judged pair");
+        let checked: &Marks = &hand.marks;
+        assert!((0..140).all(|y| hand.mask[(5, y)] && checked.at(5, y) == Some(&Provenance::hand("Anna"))));
+    }
+    assert_eq!(labels.load(&names[0]).unwrap().review, Review::Done);
+    // The journal leads back.
+    let fresh = Labels::of(&dataset);
+    let stored = fresh.load(&names[1]).unwrap();
+    assert_eq!(stored.review, Review::Todo);
+    let (done, _) = fresh.past(&names[1], &stored);
+    let last = done.last().unwrap();
+    assert_eq!(last.name, "import of masks");
+    for (place, [old, new]) in &last.change.masks {
+        let of = (names[1].clone(), place.pad);
+        assert!(old.as_ref().unwrap().is_same(&before[&of]) && new.as_ref().unwrap().is_same(&after[&of]));
+    }
+    // Asked for, all of it is taken; states stay.
+    let found = import(&dataset, &ImportSetup { over_hand: true, ..from(&folder) });
+    assert_eq!((found.replaced, found.kept, found.judged), (8, 0, 0), "{found:?}");
+    assert_eq!(labels.reviews().states, BTreeMap::from([(names[0].clone(), Review::Done)]));
+    let again = import(&dataset, &from(&folder));
+    assert_eq!((again.same, again.total()), (8, 0));
+}
+
+#[test]
+fn what_does_not_fit_is_said_with_its_file_and_changes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = painted(&dir.path().join("set"));
+    let folder = dir.path().join("png");
+    export(&dataset, &folder, Format::Png);
+    std::fs::remove_file(folder.join(MANIFEST)).unwrap();
+    let mut files: Vec<PathBuf> = PARTS
+        .iter()
+        .flat_map(|part| std::fs::read_dir(folder.join(part)).unwrap().map(|entry| entry.unwrap().path()))
+        .filter(|path| !path.to_str().unwrap().ends_with(".ignore.png"))
+        .collect();
+    files.sort();
+    let gray = |value: u8| Grid::filled(175, 140, value);
+    images::write_gray8(&files[0], &gray(7)).unwrap();
+    images::write_gray8(&files[1], &Grid::filled(17, 14, 255u8)).unwrap();
+    images::write_rgb8(&files[2], &Grid::filled(175, 140, [0.0; 3])).unwrap();
+    images::write_gray8(&files[3], &Grid::from_fn(175, 140, |x, _| if x < 9 { 1 } else { 255u8 })).unwrap();
+    std::fs::write(&files[4], "no picture").unwrap();
+    images::write_gray8(&folder.join("train/elsewhere_right.png"), &gray(0)).unwrap();
+    // The same name in two parts: nobody can say which one is meant.
+    for part in PARTS {
+        std::fs::copy(&files[7], folder.join(part).join(files[7].file_name().unwrap())).unwrap();
+    }
+    let before = all(&dataset);
+    let found = import(&dataset, &from(&folder));
+    let why = |list: &[touch2touch::work::error::Remark]| list.iter().map(|r| r.why.clone()).collect::<Vec<_>>();
+    assert_eq!((found.same, found.total(), found.is_whole()), (2, 0, false), "{found:?}");
+    assert_eq!(found.unmatched.len(), 1);
+    assert!(why(&found.unmatched)[0].contains("no pair and finger"), "{found:?}");
+    let refused = why(&found.refused);
+    for word in ["the value 7", "17 x 14", "Rgb8", "1 and 255", "not a readable PNG", "3 masks have the name"] {
+        assert!(refused.iter().any(|why| why.contains(word)), "{word}: {refused:#?}");
+    }
+    assert!(refused.iter().filter(|why| why.contains(".png)")).count() >= 5, "each names its file: {refused:#?}");
+    let after = all(&dataset);
+    assert!(before.iter().all(|(of, hand)| hand.is_same(&after[of])));
+
+    let fail = |path: &Path, format: Option<Format>| {
+        let setup = ImportSetup { format, ..from(path) };
+        plan_import(&dataset, &setup, &JobCx::unwatched()).unwrap_err()
+    };
+    let empty = dir.path().join("empty");
+    std::fs::create_dir(&empty).unwrap();
+    assert!(fail(&empty, None).why.contains("no masks here"));
+    assert!(fail(&folder, Some(Format::Npy)).why.contains("no masks in the form"));
+    assert!(fail(&dir.path().join("none"), None).why.contains("no such file"));
+    std::fs::create_dir(empty.join("masks")).unwrap();
+    images::write_gray8(&empty.join("masks/a.png"), &gray(0)).unwrap();
+    npz::write_npy_gray(&empty.join("a.npy"), &gray(0)).unwrap();
+    let several = fail(&empty, None);
+    assert!(several.why.contains("several forms") && several.hint.unwrap().contains("unet, npy, coco or png"));
+}
+
+#[test]
+fn annotations_of_other_programs_are_read_by_category_and_never_by_iscrowd() {
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = painted(&dir.path().join("set"));
+    let folder = dir.path().join("png");
+    export(&dataset, &folder, Format::Png);
+    let stems: Vec<String> = {
+        let list: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.join(MANIFEST)).unwrap()).unwrap();
+        list["stems"].as_object().unwrap().keys().cloned().collect()
+    };
+    forget(&dataset);
+    let image = |id: usize| serde_json::json!({"id": id, "file_name": format!("imgs/{}.png", stems[id]), "width": 175, "height": 140});
+    let note = |id: usize, segmentation: serde_json::Value| serde_json::json!({"image_id": id, "category_id": 9, "iscrowd": 1, "segmentation": segmentation});
+    // Two columns in contact, as numbers; a polygon; and an image that nobody labeled.
+    let mut content = serde_json::json!({
+        "images": [image(0), image(1), image(2)],
+        "categories": [{"id": 9, "name": "tool"}],
+        "annotations": [
+            note(0, serde_json::json!({"size": [140, 175], "counts": [280, 280, 23940]})),
+            note(1, serde_json::json!([[1, 1, 5, 1, 5, 5]])),
+        ],
+    });
+    let file = dir.path().join("theirs.json");
+    let write = |content: &serde_json::Value| std::fs::write(&file, content.to_string()).unwrap();
+    write(&content);
+    let found = import(&dataset, &from(&file));
+    assert_eq!((found.new, found.refused.len(), found.unmatched.len()), (1, 1, 0), "{found:?}");
+    assert!(found.refused[0].why.contains("polygons"), "{found:?}");
+    let columns = Mask::from_fn(175, 140, |x, _| x == 2 || x == 3);
+    assert!(all(&dataset).values().all(|hand| *hand.mask == columns));
+    // Of several categories one must be the contact.
+    content["categories"] = serde_json::json!([{"id": 9, "name": "tool"}, {"id": 10, "name": "rim"}]);
+    write(&content);
+    let err = plan_import(&dataset, &from(&file), &JobCx::unwatched()).unwrap_err();
+    assert!(err.why.contains("\"contact\"") && err.why.contains("theirs.json"), "{err}");
+    content["categories"][0]["name"] = "contact".into();
+    content["annotations"][0]["segmentation"]["counts"] = "no runs\u{7f}".into();
+    write(&content);
+    let found = import(&dataset, &from(&file));
+    assert!(found.refused.iter().any(|r| r.why.contains("run lengths are not understood")), "{found:?}");
+}
+
+#[test]
+fn an_import_stops_between_pairs_and_keeps_what_was_done() {
+    let dir = tempfile::tempdir().unwrap();
+    let dataset = painted(&dir.path().join("set"));
+    let folder = dir.path().join("npy");
+    export(&dataset, &folder, Format::Npy);
+    forget(&dataset);
+    let cancel = Cancel::default();
+    let told = cancel.clone();
+    let watch = move |progress: Progress| {
+        if progress.done == 1 {
+            told.cancel();
+        }
+    };
+    let found = import_masks(&dataset, &from(&folder), &JobCx::new(cancel.clone(), Arc::new(watch))).unwrap();
+    assert_eq!((found.new, found.changed.len(), found.complete), (4, 2, false), "{found:?}");
+    assert!(found.text().contains("stopped early"));
+    assert_eq!(all(&dataset).len(), 4);
+    // Before the first it is an error.
+    let cx = JobCx::new(cancel, Arc::new(|_| {}));
+    assert!(import_masks(&dataset, &from(&folder), &cx).unwrap_err().is_cancelled());
+}
+
+#[test]
+fn the_verb_says_what_it_would_do_and_does_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    let dataset = painted(&set);
+    let folder = dir.path().join("coco");
+    let [set, out] = [&set, &folder].map(|path| path.to_str().unwrap());
+    let verb = |args: &[&str]| {
+        let done = run(args, dir.path());
+        let (said, error) = (String::from_utf8(done.stdout).unwrap(), String::from_utf8(done.stderr).unwrap());
+        (done.status.code(), said, error)
+    };
+    let export = ["masks", "export", set, "--out", out, "--format", "coco", "--pairs", "begun", "--json"];
+    let (code, said, error) = verb(&export);
+    assert!(code == Some(0) && said.contains("\"format\":\"coco\""), "{said} {error}");
+    let before = all(&dataset);
+    forget(&dataset);
+    let (code, said, error) = verb(&["masks", "import", set, "--from", out, "--dry-run"]);
+    assert!(code == Some(0) && said.contains("8 masks new") && said.contains("--dry-run"), "{said} {error}");
+    assert!(all(&dataset).is_empty());
+    let (code, said, error) = verb(&["masks", "import", set, "--from", out, "--person", "Ben"]);
+    assert!(code == Some(0) && said.contains("8 masks new") && error.contains("8 masks new"), "{said} {error}");
+    let after = all(&dataset);
+    assert!(before.iter().all(|(of, hand)| hand.mask == after[of].mask));
+    let (code, _, error) = verb(&["masks", "import", set, "--from", out, "--format", "npy"]);
+    assert!(code != Some(0) && error.contains("no masks in the form"), "{error}");
+}
