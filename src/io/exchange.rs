@@ -471,3 +471,63 @@ fn find(root: &Path, folder: &Path, out: &mut Vec<String>) -> std::io::Result<()
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use strum::IntoEnumIterator as _;
+
+    use super::*;
+    use crate::domain::rig::lab;
+    use crate::io::npz;
+
+    /// Another mask, a mask that is gone, and one that nobody wrote are told with their files.
+    #[test]
+    fn what_is_not_what_was_written_is_found_in_every_form() {
+        let dir = tempfile::tempdir().unwrap();
+        let entries: Vec<ExportEntry> = (0..3)
+            .map(|i| ExportEntry { pair: format!("data_{i}"), tool: None, finger: lab::RIGHT, held_out: false })
+            .collect();
+        let mask = |i: usize| Mask::from_fn(9, 7, |x, y| x > i && y > 2);
+        let content = |i: usize| Content {
+            imprint: DepthMap::filled(9, 7, 0.003),
+            mask: mask(i),
+            ignored: (i == 1).then(|| Mask::from_fn(9, 7, |x, _| x == 0)),
+        };
+        for format in Format::iter() {
+            let folder = dir.path().join(format.key());
+            let config = ExportConfig { format, val: 0.0, test: 0.0, ..ExportConfig::default() };
+            export(&folder, &entries, &config, |i| Ok(content(i))).unwrap();
+            let stems = split::stems(&entries, &config.rig);
+            let written = |i: usize| (stems[i].clone(), digest(&mask(i), content(i).ignored.as_ref()));
+            let check = |which: &[usize]| check_written(&folder, format, which.iter().map(|&i| written(i)).collect());
+            assert_eq!(check(&[0, 1, 2]), [], "{format:?}");
+            assert!(check(&[0, 1])[0].what.contains("reads back differently"), "nobody wrote the third");
+            let extra = BTreeMap::from([0, 1, 2].map(written)).into_iter().chain([("gone".to_owned(), String::new())]);
+            let gone = check_written(&folder, format, extra.collect());
+            assert!(gone.len() == 1 && gone[0].what.contains("the mask of gone is not there"), "{gone:?}");
+            let (other, stem) = (format::gray(&mask(5)), &stems[2]);
+            let file = match format {
+                Format::Unet => folder.join(format!("train/masks/{stem}.png")),
+                Format::Npy => folder.join(format!("train/{stem}.mask.npy")),
+                Format::Png => folder.join(format!("train/{stem}.png")),
+                Format::Coco => folder.join("annotations/train.json"),
+            };
+            match format {
+                Format::Unet | Format::Png => crate::io::images::write_gray8(&file, &other).unwrap(),
+                Format::Npy => npz::write_npy_gray(&file, &other).unwrap(),
+                Format::Coco => {
+                    let text = String::from_utf8(files::read(&file, files::SMALL).unwrap()).unwrap();
+                    let counts = crate::domain::label::coco_text(&crate::domain::label::coco_runs(&mask(2)));
+                    let wrong = crate::domain::label::coco_text(&crate::domain::label::coco_runs(&mask(5)));
+                    assert!(text.contains(&counts));
+                    std::fs::write(&file, text.replace(&format!("\"{counts}\""), &format!("\"{wrong}\""))).unwrap();
+                }
+            }
+            let found = check(&[0, 1, 2]);
+            assert!(found.len() == 1 && found[0].file == file, "{format:?}: {found:?}");
+            let err = meant(ExportError::Check { problems: found }, &folder, Path::new("/there"));
+            let name = file.file_name().unwrap().to_str().unwrap();
+            assert!(err.to_string().contains("/there/") && err.to_string().contains(name), "{err}");
+        }
+    }
+}
