@@ -169,10 +169,12 @@ pub(super) fn read(file: &Path, listing: &mut Listing) -> Result<(), ReadError> 
         let Some(of) = coded.get_mut(&id) else {
             return Err(bad(format!("an annotation is of image {id}, which it does not list")));
         };
-        let to = match () {
-            () if ignore.contains(&category) => &mut of.ignored,
-            () if contact.is_empty() || contact.contains(&category) => &mut of.contact,
-            () => continue,
+        let to = if ignore.contains(&category) {
+            &mut of.ignored
+        } else if contact.is_empty() || contact.contains(&category) {
+            &mut of.contact
+        } else {
+            continue;
         };
         match &annotation.segmentation {
             Segmentation::Runs { size: [rows, columns], .. } if [*columns, *rows] != of.size => {
@@ -182,7 +184,9 @@ pub(super) fn read(file: &Path, listing: &mut Listing) -> Result<(), ReadError> 
             Segmentation::Runs { counts: Counts::Runs(runs), .. } => to.push(runs.clone()),
             Segmentation::Runs { counts: Counts::Text(text), .. } => match coco_runs_of(text) {
                 Some(runs) => to.push(runs),
-                None => drop(wrong.insert(id, "its run lengths are not understood".into())),
+                None => {
+                    wrong.insert(id, "its run lengths are not understood".into());
+                }
             },
             Segmentation::Other(_) => {
                 wrong.insert(id, "a mask is no run lengths (polygons are not read)".into());
