@@ -85,15 +85,14 @@ impl Listed {
     /// # Errors
     /// If a file cannot be read, or has other values than those of a mask.
     pub fn read(&self) -> Result<(Mask, Option<Mask>), ReadError> {
-        let (read, ignored): (fn(&Path) -> Result<Mask, ReadError>, _) = match &self.stored {
-            Stored::Pictures(ignored) => (picture, ignored),
-            Stored::Arrays(ignored) => (array, ignored),
+        let hint = "write the annotations again";
+        match &self.stored {
+            Stored::Pictures(ignored) => Ok((picture(&self.file)?, ignored.as_deref().map(picture).transpose()?)),
+            Stored::Arrays(ignored) => Ok((array(&self.file)?, ignored.as_deref().map(array).transpose()?)),
             Stored::Coded(coded) => {
-                let hint = "write the annotations again";
-                return coded.masks().map_err(|why| ReadError::new(&self.file, format!("{}: {why}", self.stem), hint));
+                coded.masks().map_err(|why| ReadError::new(&self.file, format!("{}: {why}", self.stem), hint))
             }
-        };
-        Ok((read(&self.file)?, ignored.as_deref().map(read).transpose()?))
+        }
     }
 }
 
