@@ -17,6 +17,7 @@ mod paint;
 mod provenance;
 mod region;
 mod rle;
+mod sight;
 
 use glam::DVec2;
 
@@ -36,6 +37,7 @@ pub use packed::{PackError, PackedMask};
 pub use paint::Paint;
 pub use provenance::{CadPose, Provenance};
 pub use rle::{RleError, decode_runs, encode_runs};
+pub use sight::{Layers, Seen, Sight};
 
 /// A rectangle of pixels; `x`, `y` is its top-left one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
