@@ -31,6 +31,7 @@ mod masks;
 mod metrics;
 mod palette;
 mod pane;
+mod pen;
 mod poses;
 mod results;
 mod saved;

@@ -1,6 +1,7 @@
 //! The studio and the command line are one program: what a button does, a verb does, and with the same numbers.
 
 mod exchange;
+mod in_3d;
 mod influence;
 mod proposals;
 
@@ -51,6 +52,10 @@ enum How {
     /// It takes back, stops or repeats: a verb is stopped by Ctrl-C and repeated by running it again.
     Shell,
 }
+
+/// A drawing in 3D, as the journal has it.
+const IN_3D: &str = r#"{"tool": "brush", "radius_px": 9, "points": [[99, 99]], "sight": {"clip_from_grasp":
+    [9, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, -1, 0, 0, 0.01, 0.2], "size_px": [400, 300], "layers": "all"}}"#;
 
 /// A new action does not compile until it is said here how it is had from the command line.
 fn how(action: Action) -> How {
@@ -123,6 +128,7 @@ fn how(action: Action) -> How {
             "--draw",
             r#"{"tool": "lasso", "paint": "contact", "points": [[9, 9], [30, 9], [9, 30]]}"#,
         ]),
+        A::PaintIn3d | A::PaintLayers => Verb(&["label", "demo", "--pair", "a", "--draw", IN_3D]),
         A::PanTool | A::LastTool | A::PaintIgnore | A::LetThrough | A::BrushSmaller | A::BrushLarger => Window,
         A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger | A::Ghosts | A::Lens => Window,
         A::Influence => Verb(&["pose", "demo", "--pair", "a", "--influence", "folder"]),

@@ -45,7 +45,11 @@ const RULES: [(u32, &str, &[&str]); 7] = [
     (
         12,
         "An exported folder is what the loader takes, without a change by hand",
-        &["the_folder_is_what_the_loader_accepts", "the_check_finds_what_the_loader_would_trip_over"],
+        &[
+            "rule_12_an_exported_training_folder_passes_the_loaders_rules_with_no_edits",
+            "the_folder_is_what_the_loader_accepts",
+            "the_check_finds_what_the_loader_would_trip_over",
+        ],
     ),
 ];
 

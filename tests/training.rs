@@ -280,7 +280,7 @@ fn ignored_pixels_are_neither_learned_from_nor_scored() {
                 let imprint = &sample.pad(place.pad).unwrap().depth().unwrap().imprint;
                 let ground = Ground::new(imprint);
                 let points = vec![[40.0, 20.0], [110.0, 90.0]];
-                let ignore = Drawing { tool: DrawTool::Rectangle, points, paint: Paint::Ignore };
+                let ignore = Drawing { tool: DrawTool::Rectangle, points, paint: Paint::Ignore, sight: None };
                 hand.draw(&ignore, ground, Provenance::Hand { person: "Anna".into() });
                 if flipped {
                     let ignored = hand.marks.ignored().unwrap().clone();

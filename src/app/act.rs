@@ -144,6 +144,11 @@ impl Action {
             Self::RectangleTool => does(SettingsCommand::SetMaskTool(MaskTool::Rectangle)),
             Self::Wand => does(SettingsCommand::SetMaskTool(MaskTool::Wand)),
             Self::PanTool => does(SettingsCommand::SetMaskTool(MaskTool::Pan)),
+            Self::PaintIn3d => toggle(state, SceneTool::Paint),
+            Self::PaintLayers => {
+                let layers = settings.mask.layers.other();
+                does(SettingsCommand::SetMask(MaskSettings { layers, ..settings.mask.clone() }))
+            }
             Self::PaintIgnore => {
                 let on = settings.mask.paint == Paint::Ignore;
                 does(SettingsCommand::SetPaint(if on { Paint::Contact } else { Paint::Ignore }))

@@ -133,6 +133,8 @@ actions! {
     RectangleTool, Mask, "Rectangle", "Adds a rectangle; the right button removes", [plain(K::R)];
     Wand, Mask, "Wand", "Adds what is connected with the point and about as deep; drag to the right for more", [plain(K::M)];
     PanTool, Mask, "Move the image", "The pointer moves the image instead of drawing", [plain(K::Num8)];
+    PaintIn3d, Mask, "Draw in 3D", "Mask tools draw on the points of the 3D views, or the pointer turns the views again", [alt(K::B)];
+    PaintLayers, Mask, "Draw through all layers", "Drawings in 3D reach all points under them, also hidden ones, or only the front-most", [alt(K::L)];
     PaintIgnore, Mask, "Paint ignored pixels", "Tools mark pixels that count neither as contact nor as free of it, or paint contact again", [shift(K::B)];
     LastTool, Mask, "Last tool", "Goes back to the tool before", [plain(K::Q)];
     BrushSmaller, Mask, "Smaller brush", "Makes the brush smaller", [plain(K::OpenBracket)];
@@ -271,6 +273,7 @@ impl Action {
             Self::NextShift => "depth offset gain millimeters scale",
             Self::Refit => "statistics mean deviation shift",
             Self::AdoptAutomatic => "use copy automatic mask",
+            Self::PaintIn3d | Self::PaintLayers => "cloud points brush lasso front occlusion",
             Self::PaintIgnore => "unknown unsure void class",
             Self::Propose | Self::NextProposal | Self::ProposeAll => "prelabel batch pre-label suggest auto cad",
             Self::Accept => "confirm take yes",

@@ -11,6 +11,8 @@ pub use state::{Changed, Document, HandMask, MaskPlace, Merged, PairLabels, Repe
 
 use std::borrow::Cow;
 
+use glam::DVec3;
+
 use super::effect::{Effect, LabelsToSave};
 use super::history::{Edit, Gesture, KeptMask};
 use super::keys::ImprintSource;
@@ -19,8 +21,9 @@ use super::state::{Lookup, State};
 use super::tasks::state::Level;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{CleanUp, DrawTool, Drawing, Paint, Provenance};
+use crate::domain::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, Seen, Sight};
 use crate::domain::rig::PadId;
+use crate::work::cloud::seen;
 use crate::work::error::TaskError;
 use crate::work::labels::{Act, Deed, note, system_person};
 use crate::work::propose::accepted;
@@ -39,9 +42,11 @@ pub enum LabelsCommand {
         /// Whether to remove instead of the tool's own effect.
         erase: bool,
     },
-    /// Pointer moved, raw bubble pixels.
+    /// Pointer down on a 3D view.
+    BeginIn3d(Box<StrokeIn3d>),
+    /// Pointer moved, raw bubble pixels, or pixels of the picture that the stroke began on.
     StrokeTo([f32; 2]),
-    /// A corner of a drawing that is made of clicks, raw bubble pixels.
+    /// A corner of a drawing that is made of clicks, pixels as of [`Self::StrokeTo`].
     Corner([f32; 2]),
     /// Pointer up, or the last corner.
     EndStroke,
@@ -73,10 +78,31 @@ pub enum LabelsCommand {
     Save,
 }
 
+/// How a drawing in a 3D view begins.
+#[derive(Clone, Debug)]
+pub struct StrokeIn3d {
+    /// The finger drawn on: whose point the pointer meant.
+    pub finger: PadId,
+    /// The imprint it is drawn on.
+    pub source: ImprintSource,
+    /// The picture.
+    pub sight: Sight,
+    /// Position in the picture, pixels.
+    pub at_px: [f32; 2],
+    /// The point at whose depth the brush has its size, meters, grasp frame.
+    pub size_at: DVec3,
+    /// Whether to remove instead of the tool's own effect.
+    pub erase: bool,
+}
+
 pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<Effect>) {
     match command {
         LabelsCommand::BeginStroke { finger, source, at_px, erase } => {
-            begin_stroke(state, finger, source, at_px, erase, effects);
+            begin_stroke(state, (finger, source), (at_px, erase), None, effects);
+        }
+        LabelsCommand::BeginIn3d(begin) => {
+            let StrokeIn3d { finger, source, sight, at_px, size_at, erase } = *begin;
+            begin_stroke(state, (finger, source), (at_px, erase), Some((sight, size_at)), effects);
         }
         LabelsCommand::StrokeTo(at_px) => stroke_to(state, at_px),
         LabelsCommand::EndStroke => end_stroke(state, effects),
@@ -154,18 +180,32 @@ impl State {
         let is_there = |source: &ImprintSource| self.imprint(*source, finger).ready().is_some();
         [chosen, chosen.other()].into_iter().find(is_there).unwrap_or(chosen)
     }
+
+    /// Half the width of the brush in a 3D picture, pixels: as many millimeters as on the image, at the depth of a point
+    /// (meters, grasp frame).
+    pub fn brush_px(&self, sight: &Sight, size_at: DVec3) -> f32 {
+        let radius_m = f64::from(self.settings.mask.radius_px) / self.rig().depth_px_per_mm() * 1e-3;
+        sight.px_per_m(size_at).map_or(0.0, |scale| (radius_m * scale) as f32)
+    }
+
+    /// Where the pixels of a finger's imprint lie in a 3D picture.
+    fn seen(&self, source: ImprintSource, finger: PadId, sight: &Sight) -> Result<Seen, TaskError> {
+        let sample = self.sample().ready().ok_or_else(|| TaskError::new("Draw in 3D", "the pair is not read yet"))?;
+        let imprints = sample.rig.pads().map(|pad| self.imprint(source, pad).ready()).collect();
+        seen(sample, &imprints, finger, sight)
+    }
 }
 
+/// Begins a stroke, on the image or (with a picture and the point at whose depth a brush has its size) in 3D.
 fn begin_stroke(
     state: &mut State,
-    finger: PadId,
-    source: ImprintSource,
-    at_px: [f32; 2],
-    erase: bool,
+    (finger, source): (PadId, ImprintSource),
+    (at_px, erase): ([f32; 2], bool),
+    in_3d: Option<(Sight, DVec3)>,
     effects: &mut Vec<Effect>,
 ) {
     end_stroke(state, effects);
-    let Some((tool, paint)) = state.settings.mask.drawing() else { return };
+    let Some((mut tool, paint)) = state.settings.mask.drawing() else { return };
     if !state.fingers().contains(&finger) || !check_editable(state, "Correct the mask") {
         return;
     }
@@ -178,6 +218,13 @@ fn begin_stroke(
         Err(why) => return state.log.error(&TaskError::new("Paint within limits", why)),
     };
     let Some(place) = state.mask_place(source, finger) else { return };
+    let seen = match in_3d.as_ref().map(|(sight, _)| state.seen(source, finger, sight)).transpose() {
+        Ok(seen) => seen,
+        Err(err) => return state.log.error(&err),
+    };
+    if let (Some((sight, size_at)), DrawTool::Brush { radius_px }) = (&in_3d, &mut tool) {
+        *radius_px = state.brush_px(sight, *size_at);
+    }
     let proposed = state.shown_proposal(source, finger).cloned();
     if paint == Paint::LetThrough && proposed.is_none() {
         let err = TaskError::new("Let the proposal through", "no proposal is shown here");
@@ -188,11 +235,12 @@ fn begin_stroke(
     start.revision = state.document.next_revision();
     let labels = state.document.labels.entry(pair.clone()).or_default();
     let before = labels.put(&place, Some(start.clone()));
-    let drawing = Drawing::begin(tool, at_px, if erase { paint.reversed() } else { paint });
+    let mut drawing = Drawing::begin(tool, at_px, if erase { paint.reversed() } else { paint });
+    drawing.sight = in_3d.map(|(sight, _)| Box::new(sight));
     let [width, height] = start.mask.size();
     let touched = Mask::filled(width, height, false);
     let by = Provenance::hand(state.person());
-    let stroke = Stroke { pair, place, source, drawing, allowed, proposed, pose, before, start, touched, by };
+    let stroke = Stroke { pair, place, source, drawing, allowed, proposed, seen, pose, before, start, touched, by };
     state.document.stroke = Some(stroke);
     redraw(state, 0);
 }
@@ -245,8 +293,9 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
         (DrawTool::Rectangle, _) => "rectangle",
         (DrawTool::Wand { .. }, _) => "wand",
     };
+    let name = if stroke.drawing.sight.is_some() { format!("{name} in 3D") } else { name.to_owned() };
     let how = serde_json::to_value(&stroke.drawing).ok();
-    record(state, &pair, Deed { how, ..Deed::named(name) }, edit, effects);
+    record(state, &pair, Deed { how, ..Deed::named(name.clone()) }, edit, effects);
     let (source, mask, before) = (stroke.source, Some(stroke.start.mask), stroke.pose);
     let revision = state.document.next_revision();
     state.document.changed = Some(Changed { pair, source, name: name.into(), finger, revision, mask, before });

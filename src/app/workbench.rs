@@ -63,6 +63,11 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
             bench.section = section.filter(|s| s.at_m.is_finite()).map(within);
         }
         WorkbenchCommand::SetTool(tool) => {
+            // Where nothing is drawn in 3D any more, nobody can end what is.
+            if state.document.stroke.as_ref().is_some_and(|stroke| stroke.drawing.sight.is_some()) {
+                labels::end_stroke(state, effects);
+            }
+            let bench = &mut state.workbench;
             bench.tool = tool;
             bench.marks.clear();
             if tool != SceneTool::Pose {

@@ -18,6 +18,7 @@ mod paint;
 mod provenance;
 mod region;
 mod rle;
+mod sight;
 
 use glam::DVec2;
 
@@ -38,6 +39,7 @@ pub use packed::{PackError, PackedMask};
 pub use paint::Paint;
 pub use provenance::{CadPose, Provenance};
 pub use rle::{RleError, decode_runs, encode_runs};
+pub use sight::{Layers, Seen, Sight};
 
 /// A rectangle of pixels; `x`, `y` is its top-left one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

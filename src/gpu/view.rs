@@ -8,6 +8,8 @@ use glam::{DAffine3, DMat4, DVec2, DVec3, DVec4, Vec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use crate::domain::label::{Layers, Sight};
+
 /// Up on the screen, in world coordinates.
 const UP: DVec3 = DVec3::NEG_Z;
 /// Distances that make sense for things between a hair and a room, meters.
@@ -238,6 +240,12 @@ impl Camera {
         (back + 0.55 * up - 0.45 * right).normalize()
     }
 
+    /// The picture of `size` pixels, cut open by planes, as what a mask is drawn on.
+    pub fn sight(&self, size: [u32; 2], layers: Layers, cut: &[Plane]) -> Sight {
+        let cut = cut.iter().take(MAX_PLANES).map(|plane| plane.normal.extend(plane.offset_m).as_vec4()).collect();
+        Sight { clip_from_grasp: self.clip_from_world(size).as_mat4(), size_px: size, layers, cut }
+    }
+
     /// The camera for the device, with the first [`MAX_PLANES`] planes that cut.
     pub(super) fn uniform(&self, size: [u32; 2], cut: &[Plane]) -> ViewUniform {
         let [_, up, back] = self.axes();
@@ -356,6 +364,20 @@ mod tests {
                 assert!((ray.origin + ray.direction * along - p).length() < 1e-12);
                 assert!((depth - (camera.eye() - p).dot(camera.axes()[2])).abs() < 1e-12);
             }
+        }
+    }
+
+    #[test]
+    fn a_sight_shows_points_where_the_camera_does() {
+        for camera in cameras() {
+            let sight = camera.sight(SIZE, Layers::Front, &[]);
+            for p in [DVec3::new(0.02, 0.01, 0.0), DVec3::new(-0.01, -0.03, 0.05), camera.target] {
+                let (px, _) = camera.project(p, SIZE).unwrap();
+                // There the middle of the first pixel is 0.5, here 0.
+                assert!((sight.project(p).unwrap() + 0.5 - px).length() < 0.01, "{camera:?} {p}");
+            }
+            let scale = sight.px_per_m(camera.target).unwrap();
+            assert!((scale / camera.px_per_m(SIZE) - 1.0).abs() < 1e-4, "{camera:?} {scale}");
         }
     }
 

@@ -29,7 +29,7 @@ pub(super) enum BenchVerb {
     Generator(generator::GeneratorArgs),
     /// Write fresh known grasps of the built-in simulator, for `bench registration`.
     Cases(cases::CasesArgs),
-    /// What proposed contact masks are worth on simulated grasps, and what a stroke costs.
+    /// What proposed contact masks are worth on simulated grasps, what a stroke costs, and what a mask takes a person.
     Labelling(labelling::LabellingArgs),
     /// Seconds for a whole data set on all cores, on simulated pairs.
     Dataset(dataset::DatasetArgs),

@@ -18,6 +18,7 @@ use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::Sample;
 use crate::io::dataset::Dataset;
+use crate::work::cloud::seen;
 use crate::work::error::TaskError;
 use crate::work::job::JobCx;
 use crate::work::label_stats::LabelStats;
@@ -181,7 +182,10 @@ fn change(
                 }
                 if let Some(imprint) = &found.imprints[pad] {
                     for drawing in &args.draw {
-                        hand.draw(drawing, Ground::new(imprint), by());
+                        let sight = drawing.sight.as_deref();
+                        let seen = sight.map(|sight| seen(&touch.sample, &found.imprints.as_ref(), pad, sight));
+                        let seen = seen.transpose()?;
+                        hand.draw(drawing, Ground { seen: seen.as_ref(), ..Ground::new(imprint) }, by());
                     }
                 }
                 for clean_up in &args.clean {

@@ -208,7 +208,7 @@ impl StudioApp {
             )
         }) {
             // The pen is not to be followed into another state.
-            self.panes.memories.images.lift_pen();
+            self.lift_pen();
         }
         if commands.iter().any(|c| matches!(c, Command::Settings(SettingsCommand::ResetSettings))) {
             self.trees.clear();
@@ -538,6 +538,12 @@ impl eframe::App for StudioApp {
 impl StudioApp {
     /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more. `readout` is what the
     /// status bar shows.
+    /// Follows the pen no further; whether it was drawing.
+    fn lift_pen(&mut self) -> bool {
+        let memories = &mut self.panes.memories;
+        memories.images.lift_pen() | memories.scene.lift_pen()
+    }
+
     fn after_panes(&mut self, ctx: &egui::Context, readout: Option<&String>, out: &mut Vec<Command>) {
         if self.panes.drawn != self.state.selection.panes {
             out.push(Command::View(ViewCommand::ShowPanes(self.panes.drawn.clone())));
@@ -551,7 +557,7 @@ impl StudioApp {
         }
         // What is made of clicks goes on while no button is down.
         let by_clicks = self.state.document.stroke.as_ref().is_some_and(|stroke| stroke.drawing.is_by_clicks());
-        if !by_clicks && !ctx.input(|i| i.pointer.any_down()) && self.panes.memories.images.lift_pen() {
+        if !by_clicks && !ctx.input(|i| i.pointer.any_down()) && self.lift_pen() {
             out.push(Command::Labels(LabelsCommand::EndStroke));
         }
     }

@@ -11,13 +11,14 @@ use std::sync::Arc;
 use eframe::egui::{Align2, Button, Color32, Rect, RichText, Ui, UiBuilder, pos2, vec2};
 
 use super::cx::{Cx, side_color};
+use super::pen::{self, Easel};
 use super::theme::{Palette, SMALL};
 use super::widget::colorbar;
 use super::widget::empty;
 use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, shows_squares};
 use super::widget::texture::{Histogram, Memo, depth_image, picture_image};
 use crate::app::action::Action;
-use crate::app::command::{Hover, LibraryCommand, Pane, TasksCommand, ViewCommand};
+use crate::app::command::{Hover, LabelsCommand, LibraryCommand, Pane, TasksCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::results::Preview;
 use crate::app::settings::{ColorMap as MapChoice, MaskTool};
@@ -32,16 +33,6 @@ use crate::domain::units;
 use crate::work::bundles::BundleKind;
 use crate::work::error::{TaskError, UnitOffer};
 use link::Link;
-
-/// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
-pub(super) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
-/// The color of proposals.
-pub(super) const PROPOSED: Color32 = Color32::from_rgb(0x4a, 0xd9, 0xff);
-/// The color of ignored pixels.
-pub(super) const IGNORED: Color32 = Color32::from_rgb(0xff, 0xc8, 0x3d);
-
-/// The color of what was before the last change of a mask.
-pub(super) const GHOST: Color32 = Color32::from_rgb(0xc9, 0xb0, 0xff);
 
 /// What is being painted on the images.
 #[derive(Default)]
@@ -437,7 +428,20 @@ fn depth_pane(
         output.painter.circle_stroke(at, 6.0, eframe::egui::Stroke::new(1.5, cx.p.accent));
     }
     if paintable {
-        paint::stroke(cx, ui, memory, &output, (pane, source, finger));
+        let on_top = output.response.contains_pointer() || output.response.is_pointer_button_down_on();
+        let easel = Easel {
+            map: output.map,
+            painter: &output.painter,
+            response: &output.response,
+            on_top: on_top && !output.panning,
+            source,
+            finger,
+            in_3d: false,
+            radius_px: cx.state.settings.mask.radius_px,
+        };
+        pen::follow(cx, ui, (&mut memory.painting, (pane, finger)), &easel, |at_px, erase, _| {
+            Some(LabelsCommand::BeginStroke { finger, source, at_px, erase })
+        });
     }
     captions(cx, &output, pane, finger);
     if pane != Pane::Error && cx.state.selection.lens {

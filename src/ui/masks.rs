@@ -8,15 +8,15 @@ use strum::IntoEnumIterator as _;
 
 use super::browser::review_color;
 use super::cx::Cx;
-use super::images::{CONTACT, IGNORED, PROPOSED};
-use super::theme::{SMALL, caption, section};
+use super::theme::{CONTACT, IGNORED, PROPOSED, SMALL, caption, section};
 use crate::app::action::Action;
 use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Review;
 use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use crate::app::state::Lookup;
-use crate::domain::label::Paint;
+use crate::app::workbench::SceneTool;
+use crate::domain::label::{Layers, Paint};
 use crate::domain::rig::PadId;
 use crate::domain::units;
 use crate::work::labels::{MAX_NOTE, system_person};
@@ -84,7 +84,30 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
         MaskTool::Lasso | MaskTool::Polygon | MaskTool::Rectangle | MaskTool::Pan => {}
     }
     paints(cx, ui);
+    in_3d(cx, ui);
     gate(cx, ui);
+}
+
+/// Drawing on the points of the 3D views, and what that reaches.
+fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(caption("In 3D", cx.p));
+        let on = cx.state.workbench.tool == SceneTool::Paint;
+        let possible = Action::PaintIn3d.command(cx.state).is_some();
+        let button = ui.add_enabled(possible, egui::Button::selectable(on, "draw"));
+        if button.accessible_name(Action::PaintIn3d.name()).on_hover_text(cx.keys().help(Action::PaintIn3d)).clicked() {
+            cx.act(Action::PaintIn3d);
+        }
+        let now = cx.state.settings.mask.layers;
+        for (layers, text) in [(Layers::Front, "front-most"), (Layers::All, "all layers")] {
+            let button = ui.add(egui::Button::selectable(now == layers, text));
+            let tip = format!("Drawings in 3D reach {}", layers.name());
+            if button.on_hover_text(cx.keys().behind(&tip, Action::PaintLayers)).clicked() && now != layers {
+                cx.act(Action::PaintLayers);
+            }
+        }
+    });
 }
 
 /// What the tools make of the pixels.

@@ -1,6 +1,7 @@
 //! The 3D panes: cloud, contact points and CAD model, measured and predicted, with linked cameras.
 
 mod build;
+mod draw;
 mod ghost;
 mod gizmo;
 mod hands;
@@ -24,7 +25,7 @@ use steps::StepLines;
 
 use super::cx::Cx;
 use super::images;
-use super::scene_view::{SceneOutput, SceneView};
+use super::scene_view::{Grip, SceneOutput, SceneView};
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
@@ -65,6 +66,8 @@ pub(super) struct Memory {
     layer_colors: [Option<LayerColors>; 2],
     /// The handles of the pose tool.
     gizmo: Gizmo,
+    /// The side whose picture the pen draws on now.
+    drawing: Option<ImprintSource>,
     /// The CAD model on the device.
     mesh: Option<SceneMesh>,
     /// Correspondences of the step that the time machine shows.
@@ -129,6 +132,11 @@ impl Memory {
         }
     }
 
+    /// Follows the pen no further; whether it was drawing.
+    pub(super) fn lift_pen(&mut self) -> bool {
+        self.drawing.take().is_some()
+    }
+
     /// Where a point of the grasp frame (meters) appeared when a side was last drawn.
     pub(super) fn on_screen(&self, source: ImprintSource, point: DVec3) -> Option<egui::Pos2> {
         self.views[source as usize].on_screen(point)
@@ -184,7 +192,12 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
     }
     verdict::line(cx, ui, source);
     section::bar(cx, ui, source);
-    let held = memory.gizmo.holds(source);
+    let held = match (draw::is_ready(state), memory.drawing == Some(source)) {
+        (true, true) => Grip::Stroke,
+        (true, false) => Grip::Pen,
+        (false, _) if memory.gizmo.holds(source) => Grip::Primary,
+        (false, _) => Grip::Nothing,
+    };
     // The buttons and the strip of the pose in hand stand beside the picture, not on it.
     let area = ui.available_rect_before_wrap();
     let column = area.with_min_x((area.right() - BUTTONS).max(area.left()));
@@ -239,7 +252,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(120));
     }
     memory.views[source as usize].draw(ui, device, &output, &scene);
-    if matches!(lookup, Lookup::Stale(_) | Lookup::Waiting) {
+    // While a stroke is drawn, what is shown is of the move before.
+    if matches!(lookup, Lookup::Stale(_) | Lookup::Waiting) && state.document.stroke.is_none() {
         ui.painter().rect_filled(output.response.rect, 0.0, cx.p.canvas.gamma_multiply(0.45));
     }
     if let Lookup::Ready(clouds) = lookup {
@@ -253,6 +267,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
     gizmo::show(cx, ui, memory, source, &output);
     hands::tools(cx, ui, source, column);
     hands::strip(cx, ui, source, strip);
+    if let Some(clouds) = lookup.shown() {
+        draw::show(cx, ui, memory, source, &output, clouds);
+    }
     if let Lookup::Ready(clouds) = lookup {
         measure::card(cx, ui, source, rect, clouds);
     }

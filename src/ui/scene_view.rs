@@ -62,6 +62,19 @@ struct Drawn {
     generation: u64,
 }
 
+/// What the pointer's buttons are for besides the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Grip {
+    /// Nothing: the primary button turns the camera, the others move it.
+    Nothing,
+    /// The primary button is somebody else's.
+    Primary,
+    /// A pen draws with the primary and the secondary button; with Shift the primary one turns the camera.
+    Pen,
+    /// A stroke is being drawn: the camera rests.
+    Stroke,
+}
+
 /// What happened in a view.
 pub(super) struct SceneOutput {
     /// The pane's response.
@@ -92,10 +105,9 @@ fn place_on_screen(camera: &Camera, rect: Rect, size: [u32; 2], p_in_world: DVec
 }
 
 impl SceneView {
-    /// Takes the space left in `ui` and moves the camera by what the pointer does, but not by the primary button while
-    /// that is `held` by something else. Call [`Self::draw`] next, with
-    /// the scene that belongs to the new camera.
-    pub(super) fn interact(&mut self, ui: &mut Ui, label: &str, held: bool) -> SceneOutput {
+    /// Takes the space left in `ui` and moves the camera by what the pointer does, as far as its buttons are not `held` by
+    /// something else. Call [`Self::draw`] next, with the scene that belongs to the new camera.
+    pub(super) fn interact(&mut self, ui: &mut Ui, label: &str, held: Grip) -> SceneOutput {
         let space = ui.available_size().max(Vec2::splat(16.0));
         let (rect, response) = ui.allocate_exact_size(space, Sense::click_and_drag());
         response.widget_info(|| WidgetInfo::labeled(Role::Canvas, true, label));
@@ -104,20 +116,20 @@ impl SceneView {
         let mut moved = false;
         let delta = response.drag_delta() * ppp;
         let delta = DVec2::new(f64::from(delta.x), f64::from(delta.y));
-        if delta != DVec2::ZERO {
+        if delta != DVec2::ZERO && held != Grip::Stroke {
             if response.dragged_by(PointerButton::Primary) {
-                if !held {
+                if held == Grip::Nothing || (held == Grip::Pen && ui.input(|i| i.modifiers.shift)) {
                     self.camera.orbit(delta);
                     moved = true;
                 }
-            } else if response.dragged() {
+            } else if response.dragged() && (held != Grip::Pen || response.dragged_by(PointerButton::Middle)) {
                 self.camera.pan(delta, size);
                 moved = true;
             }
         }
         let pointer = response.hover_pos().map(|pos| (pos - rect.min) * ppp);
         let pointer = pointer.map(|p| DVec2::new(f64::from(p.x), f64::from(p.y)));
-        if response.contains_pointer() {
+        if response.contains_pointer() && held != Grip::Stroke {
             let (scroll, pinch) = ui.input(|i| (i.smooth_scroll_delta().y, i.zoom_delta()));
             let notches = f64::from(scroll) / f64::from(ui.ctx().options(|o| o.input_options.line_scroll_speed));
             let factor = f64::from(pinch) * ZOOM_PER_NOTCH.powf(notches);
@@ -128,7 +140,8 @@ impl SceneView {
         }
         self.placed |= moved;
         self.last = Some((rect, size));
-        let fit = response.double_clicked();
+        // Where a pen draws, two quick dabs are no double-click.
+        let fit = response.double_clicked() && matches!(held, Grip::Nothing | Grip::Primary);
         SceneOutput { response, size, pointer, moved, fit, rect }
     }
 

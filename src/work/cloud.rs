@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::error::TaskError;
 use crate::domain::cloud;
 use crate::domain::grid::{DepthMap, Mask};
+use crate::domain::label::{Seen, Sight};
 use crate::domain::rig::{PadId, PerPad};
 use crate::domain::sample::{DepthCamera, Sample};
 
@@ -110,6 +111,34 @@ pub fn contact_points(
     }
     let why = "neither finger has an imprint with camera data, so there are no points to align";
     if any { Ok(points) } else { Err(TaskError::new(WHAT, why)) }
+}
+
+/// Where the pixels of a finger's imprint lie in a 3D picture that its mask is drawn on: those that are reached. Points of
+/// the other fingers can hide them.
+///
+/// # Errors
+/// If the finger has no imprint or no camera, or as [`finger_cloud`].
+pub fn seen(sample: &Sample, imprints: &PerPad<&DepthMap>, pad: PadId, sight: &Sight) -> Result<Seen, TaskError> {
+    const WHAT: &str = "Draw in 3D";
+    let mut lifted = PerPad::default();
+    for other in sample.rig.pads() {
+        let camera = sample.pad(other).and_then(|t| t.camera());
+        if let (Some(imprint), Some(camera)) = (imprints[other], camera) {
+            let points = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error(WHAT, &err))?;
+            lifted[other] = Some(points);
+        }
+    }
+    let lacks = || {
+        let why = format!(
+            "the {} finger has no points in space: it takes an imprint and its camera",
+            sample.rig.pad_key(pad)
+        );
+        TaskError::new(WHAT, why).with_hint("Draw on the image instead.")
+    };
+    let own = lifted[pad].as_ref().ok_or_else(lacks)?;
+    let others: Vec<&[DVec3]> =
+        lifted.entries().filter(|(other, _)| *other != pad).map(|(_, points)| points.points.as_slice()).collect();
+    Ok(Seen::new(sight, (&own.points, &own.pixels), &others))
 }
 
 #[cfg(test)]

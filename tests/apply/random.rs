@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Mat4};
 use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::Union;
@@ -25,7 +25,7 @@ use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode,
     TouchKey,
 };
-use touch2touch::app::labels::{Document, MaskPlace, Review};
+use touch2touch::app::labels::{Document, MaskPlace, Review, StrokeIn3d};
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::results::ambiguity::AmbiguityKey;
 use touch2touch::app::results::{Computed, Preview};
@@ -44,7 +44,7 @@ use touch2touch::domain::evaluation::Figure;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::{DepthMap, Mask};
 use touch2touch::domain::hand::{HandAxis, HandPose};
-use touch2touch::domain::label::{CleanKind, CleanUp, Paint};
+use touch2touch::domain::label::{CleanKind, CleanUp, Layers, Paint, Sight};
 use touch2touch::domain::pose::Rejection;
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::infer::engine::EngineChoice;
@@ -376,6 +376,10 @@ draws! {
     }
     labels: LabelsCommand {
         6 BeginStroke(finger(), source(), position(), any::<bool>()),
+        4 BeginIn3d((finger(), source(), position(), point(), any::<bool>()).prop_map(|(finger, source, at_px, size_at, erase)| {
+            let sight = Sight { clip_from_grasp: Mat4::IDENTITY, size_px: [64, 48], layers: Layers::All, cut: Vec::new() };
+            Box::new(StrokeIn3d { finger, source, sight, at_px, size_at, erase })
+        })),
         6 StrokeTo(position()),
         6 EndStroke,
         1 CancelStroke,

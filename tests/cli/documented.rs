@@ -90,7 +90,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch bench registration", How::Run(&[], "--limit 2 --no-peers", &[0])),
     ("touch2touch bench generator", How::Run(&[], "--grasps 1 --steps 1 --engine rten --bundle SMALL", &[0])),
     ("touch2touch bench generator --grasps", How::Run(&[("24", "1")], "--steps 1 --engine rten --bundle SMALL", &[0])),
-    ("touch2touch bench labelling", How::Run(&[("18", "1")], "--steps 1 --bundle SMALL", &[0])),
+    ("touch2touch bench labelling", How::Run(&[("20", "1")], "--steps 1 --bundle SMALL", &[0])),
     ("touch2touch bench cases", How::Run(&[("200", "4")], "", &[0])),
     ("touch2touch bench dataset", How::Run(&[], "--pairs 20 --grasps 1", &[0])),
     ("touch2touch cache", How::Run(&[], "", &[0])),

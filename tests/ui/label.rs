@@ -2,12 +2,13 @@
 
 use eframe::egui::{Key, Modifiers, PointerButton, Pos2, Rect, pos2};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LabelsCommand, LibraryCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::command::{CameraPreset, LabelsCommand, LibraryCommand, SettingsCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
 use touch2touch::app::settings::{MaskChoice, MaskSource, MaskTool, Workspace};
+use touch2touch::app::workbench::SceneTool;
 use touch2touch::domain::grid::Mask;
-use touch2touch::domain::label::CleanKind;
+use touch2touch::domain::label::{CleanKind, Layers};
 use touch2touch::domain::rig::{PadId, lab};
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::exchange::check_folder;
@@ -115,6 +116,89 @@ fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
     }
     assert_eq!(rig.mask(lab::RIGHT), empty);
     rig.shoot("label-desk");
+}
+
+#[test]
+fn masks_are_drawn_on_the_points_of_the_3d_view() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(ViewCommand::ShowBothFingers(true));
+    with_nothing_automatic(&mut rig);
+    const VIEW: &str = "3D view, measured";
+    let look = |rig: &mut Rig, preset| {
+        let view = rig.harness.get_by_label(VIEW).rect();
+        rig.harness.hover_at(view.center());
+        rig.harness.step();
+        rig.send(ViewCommand::Ui(UiRequest::Camera(preset)));
+        rig.send(ViewCommand::Ui(UiRequest::Fit));
+    };
+    look(&mut rig, CameraPreset::Right);
+    // Where the point of a finger's pixel is on the screen.
+    let place = |rig: &Rig, finger: PadId, [x, y]: [usize; 2]| {
+        let cloud = rig.harness.state().state().cloud(ImprintSource::Measured).ready().unwrap().finger(finger).unwrap();
+        let point = cloud.points[cloud.at_pixel(x, y).unwrap()];
+        rig.harness.state().on_screen(ImprintSource::Measured, point.to_array()).unwrap()
+    };
+    let [from, to] = [[70, 60], [100, 75]].map(|pixel| place(&rig, lab::RIGHT, pixel));
+    let empty = rig.mask(lab::RIGHT);
+    // Without the tool a drag turns the view.
+    rig.drag_over(&[from, to]);
+    assert_eq!(rig.mask(lab::RIGHT), empty);
+    look(&mut rig, CameraPreset::Right);
+    rig.harness.key_press_modifiers(Modifiers::ALT, Key::B);
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(rig.harness.state().state().workbench.tool, SceneTool::Paint);
+    let [from, to] = [[70, 60], [100, 75]].map(|pixel| place(&rig, lab::RIGHT, pixel));
+    rig.drag_over(&[from, to]);
+    assert_eq!(place(&rig, lab::RIGHT, [70, 60]), from, "the view rests");
+    let drawn = rig.mask(lab::RIGHT);
+    // A way of 34 px, 8 px wide and with round ends, seen at an angle.
+    assert!(drawn[(70, 60)] && drawn[(85, 67)] && drawn[(100, 75)], "what is under the pointer");
+    let new = count(&drawn) - count(&empty);
+    assert!((150..600).contains(&new), "{new}");
+    rig.harness.query_by_label_contains("draws on front-most points").expect("the status line says what is reached");
+    rig.shoot("label-3d");
+    rig.harness.key_press_modifiers(Modifiers::CTRL, Key::Z);
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(rig.mask(lab::RIGHT), empty, "one undo takes it back");
+    // With Shift the pointer turns the view and draws nothing.
+    let press = |pressed| eframe::egui::Event::PointerButton {
+        pos: from,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::SHIFT,
+    };
+    rig.harness.hover_at(from);
+    rig.harness.event(press(true));
+    rig.harness.event(press(false));
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(rig.mask(lab::RIGHT), empty);
+    // From the other side the other finger is meant: the first press makes it the active one.
+    let left = rig.mask(lab::LEFT);
+    look(&mut rig, CameraPreset::Left);
+    let [from, to] = [[70, 60], [100, 75]].map(|pixel| place(&rig, lab::LEFT, pixel));
+    rig.drag_over(&[from, to]);
+    assert_eq!(rig.harness.state().state().selection.finger, lab::LEFT);
+    assert_eq!(rig.mask(lab::LEFT), left);
+    rig.harness.key_press(Key::L);
+    rig.harness.step();
+    let corners = [[60, 50], [110, 50], [110, 90], [60, 90]].map(|pixel| place(&rig, lab::LEFT, pixel));
+    rig.drag_over(&corners);
+    assert_eq!(rig.mask(lab::RIGHT), empty, "one finger's mask");
+    let lassoed = count(&rig.mask(lab::LEFT)) - count(&left);
+    assert!((1000..2600).contains(&lassoed), "{lassoed} of 50 x 40");
+    rig.shoot("label-3d-lasso");
+    rig.harness.key_press_modifiers(Modifiers::ALT, Key::L);
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(rig.harness.state().state().settings.mask.layers, Layers::All);
+    rig.harness.hover_at(from);
+    rig.settle();
+    rig.harness.query_by_label_contains("draws on all points").expect("it says so");
 }
 
 #[test]

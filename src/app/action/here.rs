@@ -60,7 +60,7 @@ impl Action {
             || matches!(self, A::LinkCameras | A::NextLayer | A::AnimateWeakest | A::BothClouds);
         look || self.is_nudge()
             || matches!(self, A::PoseTool | A::SixDof | A::IcpFromHere | A::Accept | A::RevertHand)
-            || matches!(self, A::MeasureDistance | A::MeasureAngle | A::PlaySteps)
+            || matches!(self, A::MeasureDistance | A::MeasureAngle | A::PlaySteps | A::PaintIn3d | A::PaintLayers)
     }
 
     /// Whether it is about the steps of a registration.

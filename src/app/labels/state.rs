@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::super::keys::{ImprintSource, PoseKey, Revision};
 use super::super::tasks::state::Ticket;
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::label::{DrawTool, Drawing, Ground, Provenance};
+use crate::domain::label::{DrawTool, Drawing, Ground, Provenance, Seen};
 use crate::domain::rig::PadId;
 use crate::work::error::TaskError;
 use crate::work::label_stats::LabelStats;
@@ -103,6 +103,8 @@ pub struct Stroke {
     pub(in crate::app) allowed: Option<Mask>,
     /// What is let through of a proposal.
     pub(in crate::app) proposed: Option<Arc<Proposal>>,
+    /// Where its pixels lie in the 3D picture that it is drawn on.
+    pub(in crate::app) seen: Option<Seen>,
     /// The pose before the stroke, as [`Changed::before`].
     pub(in crate::app) pose: Option<PoseKey>,
     /// The hand mask before the stroke; `None` if there was none.
@@ -125,7 +127,7 @@ impl Stroke {
             self.touched.as_mut_slice().fill(false);
         }
         let proposed = self.proposed.as_ref().map(|proposal| &proposal.mask);
-        let ground = Ground { imprint, allowed: self.allowed.as_ref(), proposed };
+        let ground = Ground { imprint, allowed: self.allowed.as_ref(), proposed, seen: self.seen.as_ref() };
         hand.draw_on(&self.drawing, &mut self.touched, ground, from, self.by.clone()) || undone
     }
 }

@@ -12,7 +12,7 @@ use super::super::action::Bindings;
 use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
-use crate::domain::label::{CleanKind, CleanUp, DrawTool, Gate, Paint};
+use crate::domain::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};
 use crate::domain::postprocess::RefitShift;
 use crate::domain::units::clamp_or;
 use crate::infer::engine::EngineChoice;
@@ -397,6 +397,8 @@ pub struct MaskSettings {
     pub radius_px: f32,
     /// By how much the depth may differ that the wand takes, meters.
     pub wand_m: f32,
+    /// Which points a drawing in 3D reaches.
+    pub layers: Layers,
     /// Size of the clean-ups that have one, millimeters.
     pub clean_mm: f32,
     /// Where a hand may change a mask.
@@ -420,6 +422,7 @@ impl Default for MaskSettings {
             paint: Paint::Contact,
             radius_px: 4.0,
             wand_m: 0.0005,
+            layers: Layers::default(),
             clean_mm: 1.0,
             gate: Gate::default(),
             proposal: ProposalSource::default(),

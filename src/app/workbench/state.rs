@@ -66,13 +66,15 @@ pub enum SceneTool {
     Distance,
     /// Measures at the second of three points.
     Angle,
+    /// Draws on the masks of the points, with the mask tool in hand.
+    Paint,
 }
 
 impl SceneTool {
     /// Points that make a measurement.
     pub fn marks(self) -> usize {
         match self {
-            Self::Look | Self::Pose => 0,
+            Self::Look | Self::Pose | Self::Paint => 0,
             Self::Distance => 2,
             Self::Angle => 3,
         }

@@ -5,6 +5,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::paint::Paint;
+use super::sight::{Seen, Sight};
 use super::{Rect, paint_where, region};
 use crate::domain::grid::{DepthMap, Mask};
 
@@ -14,7 +15,7 @@ use crate::domain::grid::{DepthMap, Mask};
 pub enum DrawTool {
     /// Follows the pointer's way.
     Brush {
-        /// Half its width, image pixels.
+        /// Half its width, pixels of what is drawn on.
         radius_px: f32,
     },
     /// What the pointer's way encloses, closed by a straight line.
@@ -40,11 +41,15 @@ pub struct Drawing {
     /// With what.
     #[serde(flatten)]
     pub tool: DrawTool,
-    /// The pointer's way or the corners, image pixels: `(0, 0)` is the center of the first one.
+    /// The pointer's way or the corners, pixels of the image, or of the picture of [`Self::sight`]: `(0, 0)` is the center of
+    /// the first one.
     pub points: Vec<[f32; 2]>,
     /// What it makes of the pixels.
     #[serde(default)]
     pub paint: Paint,
+    /// The picture of points in space that it was drawn on; `None` on the image itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sight: Option<Box<Sight>>,
 }
 
 /// What a drawing falls on.
@@ -56,12 +61,15 @@ pub struct Ground<'a> {
     pub allowed: Option<&'a Mask>,
     /// What [`Paint::LetThrough`] lets through.
     pub proposed: Option<&'a Mask>,
+    /// Where the pixels lie in the picture of a drawing that has a [`Drawing::sight`]; without it such a drawing touches
+    /// nothing.
+    pub seen: Option<&'a Seen>,
 }
 
 impl<'a> Ground<'a> {
     /// An imprint that may be drawn on everywhere.
     pub fn new(imprint: &'a DepthMap) -> Self {
-        Self { imprint, allowed: None, proposed: None }
+        Self { imprint, allowed: None, proposed: None, seen: None }
     }
 }
 
@@ -70,7 +78,7 @@ impl Drawing {
     pub fn begin(tool: DrawTool, at_px: [f32; 2], paint: Paint) -> Self {
         // A corner that follows the pointer until it is set.
         let points = if tool == DrawTool::Polygon { vec![at_px; 2] } else { vec![at_px] };
-        Self { tool, points, paint }
+        Self { tool, points, paint, sight: None }
     }
 
     /// Whether it is made of clicks, and not of one drag.
@@ -115,32 +123,47 @@ impl Drawing {
         let finite = |p: &&[f32; 2]| p.iter().all(|v| v.is_finite());
         let points: Vec<DVec2> =
             self.points.iter().filter(finite).map(|p| DVec2::new(p[0].into(), p[1].into())).collect();
-        if let DrawTool::Brush { radius_px } = self.tool {
-            let mut changed: Option<Rect> = None;
+        let ways = || {
             let ways = points.windows(2).skip(from.saturating_sub(1)).map(|w| [w[0], w[1]]);
-            let first = points.first().filter(|_| from == 0).map(|&p| [p, p]);
-            for way in first.into_iter().chain(ways) {
-                let rect = paint_where(touched, way, radius_px.into(), true, allowed);
-                changed = match (changed, rect) {
-                    (Some(a), Some(b)) => Some(a.union(b)),
-                    (a, b) => a.or(b),
-                };
-            }
-            return changed;
-        }
-        let (first, last) = (*points.first()?, *points.last()?);
-        let region = match self.tool {
-            DrawTool::Rectangle => region::rectangle(touched.size(), first, last),
-            DrawTool::Wand { .. } => region::about_as_deep(ground.imprint, first, self.tolerance_m()?.into()),
-            _ => region::enclosed(touched.size(), &points),
+            points.first().filter(|_| from == 0).map(|&p| [p, p]).into_iter().chain(ways)
         };
         let mut changed: Option<Rect> = None;
+        let mut mark = |touched: &mut Mask, x: usize, y: usize| {
+            if touched.get(x, y) == Some(&false) && allowed(x, y) {
+                touched[(x, y)] = true;
+                let pixel = Rect { x, y, width: 1, height: 1 };
+                changed = Some(changed.map_or(pixel, |r| r.union(pixel)));
+            }
+        };
+        let (first, last) = (*points.first()?, *points.last()?);
+        let region = match (self.tool, self.sight.is_some()) {
+            (DrawTool::Brush { radius_px }, false) => {
+                let union = |a: Option<Rect>, b: Option<Rect>| a.zip(b).map(|(a, b)| a.union(b)).or(a).or(b);
+                let stamp = |way| paint_where(touched, way, radius_px.into(), true, allowed);
+                return ways().map(stamp).fold(None, union);
+            }
+            (DrawTool::Rectangle, false) => region::rectangle(touched.size(), first, last),
+            (DrawTool::Lasso | DrawTool::Polygon, false) => region::enclosed(touched.size(), &points),
+            (DrawTool::Wand { .. }, in_space) => {
+                let seed = if in_space { DVec2::from(ground.seen?.nearest(first)?.map(f64::from)) } else { first };
+                region::about_as_deep(ground.imprint, seed, self.tolerance_m()?.into())
+            }
+            (tool, true) => {
+                let seen = ground.seen?;
+                let reached: Vec<[u16; 2]> = match tool {
+                    DrawTool::Brush { radius_px } => {
+                        ways().flat_map(|way| seen.along(way, radius_px.into()).collect::<Vec<_>>()).collect()
+                    }
+                    _ => seen.within(&points, tool == DrawTool::Rectangle),
+                };
+                reached.into_iter().for_each(|[x, y]| mark(touched, x.into(), y.into()));
+                return changed;
+            }
+        };
         for y in 0..touched.height() {
             for x in 0..touched.width() {
-                if region.get(x, y) == Some(&true) && !touched[(x, y)] && allowed(x, y) {
-                    touched[(x, y)] = true;
-                    let pixel = Rect { x, y, width: 1, height: 1 };
-                    changed = Some(changed.map_or(pixel, |r| r.union(pixel)));
+                if region.get(x, y) == Some(&true) {
+                    mark(touched, x, y);
                 }
             }
         }
@@ -152,6 +175,8 @@ impl Drawing {
 mod tests {
     use super::super::marks::Marks;
     use super::super::provenance::Provenance;
+    use super::super::sight::Layers;
+    use super::super::sight::testing::{from_above, sheet};
     use super::*;
 
     fn imprint() -> DepthMap {
@@ -169,7 +194,7 @@ mod tests {
         let paint = if add { Paint::Contact } else { Paint::Free };
         let mut marks = Marks::all(mask.size(), Provenance::Nothing);
         let mut touched = Mask::filled(mask.width(), mask.height(), false);
-        let drawing = Drawing { tool, points: points.to_vec(), paint };
+        let drawing = Drawing { tool, points: points.to_vec(), paint, sight: None };
         let rect = drawing.touch(&mut touched, Ground::new(&imprint), 0)?;
         marks.paint(mask, (&touched, rect), paint, None, Provenance::hand(""));
         let hand = marks.hand_checked();
@@ -237,7 +262,8 @@ mod tests {
         let ground = Ground { allowed: Some(&allowed), ..Ground::new(&imprint) };
         for tool in [DrawTool::Brush { radius_px: 90.0 }, DrawTool::Rectangle, DrawTool::Wand { tolerance_m: 1.0 }] {
             let mut mask = Mask::filled(40, 20, false);
-            let drawing = Drawing { tool, points: vec![[0.0, 0.0], [39.0, 19.0]], paint: Paint::Contact };
+            let points = vec![[0.0, 0.0], [39.0, 19.0]];
+            let drawing = Drawing { tool, points, paint: Paint::Contact, sight: None };
             drawing.touch(&mut mask, ground, 0);
             assert!(mask == allowed, "{tool:?}");
         }
@@ -253,5 +279,45 @@ mod tests {
         assert_eq!(drawing.points, [[2.0, 2.0], [10.0, 2.0], [10.0, 8.0]]);
         let text = serde_json::to_string(&drawing).unwrap();
         assert_eq!(serde_json::from_str::<Drawing>(&text).unwrap(), drawing, "{text}");
+        assert!(!text.contains("sight"), "as it was stored before there was one: {text}");
+        let tool = DrawTool::Brush { radius_px: 3.3 };
+        let in_space = Drawing { tool, sight: Some(Box::new(from_above(4000.0, Layers::All))), ..drawing };
+        let text = serde_json::to_string(&in_space).unwrap();
+        assert_eq!(serde_json::from_str::<Drawing>(&text).unwrap(), in_space, "{text}");
+    }
+
+    #[test]
+    fn every_tool_draws_through_a_picture_of_points() {
+        let sight = from_above(4000.0, Layers::Front);
+        let (points, pixels) = sheet(0.0);
+        let seen = Seen::new(&sight, (&points, &pixels), &[]);
+        // A step in the middle: columns from the eleventh on are deeper.
+        let imprint = DepthMap::from_fn(21, 21, |x, _| if x < 11 { 0.001 } else { 0.005 });
+        let allowed = Mask::from_fn(21, 21, |_, y| y < 15);
+        // Points are 2 px apart around (199.5, 149.5); rows go down on the mask and up in the picture.
+        let (left, right) = ([192.5, 144.5], [206.5, 154.5]);
+        let square = vec![left, [right[0], left[1]], right, [left[0], right[1]]];
+        for (tool, way, expected) in [
+            (DrawTool::Brush { radius_px: 4.1 }, vec![[199.5, 149.5]], 13),
+            (DrawTool::Brush { radius_px: 0.1 }, vec![[189.5, 149.5], [209.5, 149.5]], 11),
+            (DrawTool::Rectangle, vec![left, right], 7 * 5),
+            (DrawTool::Lasso, square.clone(), 7 * 5),
+            (DrawTool::Polygon, square, 7 * 5),
+            (DrawTool::Wand { tolerance_m: 0.001 }, vec![[190.0, 149.0]], 11 * 21),
+        ] {
+            let drawing = Drawing { tool, points: way, paint: Paint::Contact, sight: Some(Box::new(sight.clone())) };
+            let draw = |allowed, seen| {
+                let mut touched = Mask::filled(21, 21, false);
+                let ground = Ground { allowed, seen, ..Ground::new(&imprint) };
+                let rect = drawing.touch(&mut touched, ground, 0);
+                assert_eq!(rect.is_some(), touched.as_slice().contains(&true), "{tool:?}");
+                touched
+            };
+            let all = draw(None, Some(&seen));
+            assert_eq!(count(&all), expected, "{tool:?}");
+            let gated = draw(Some(&allowed), Some(&seen));
+            assert!((0..all.len()).all(|i| gated.as_slice()[i] == (all.as_slice()[i] && allowed.as_slice()[i])));
+            assert_eq!(count(&draw(None, None)), 0, "{tool:?}: where the pixels lie is not known");
+        }
     }
 }

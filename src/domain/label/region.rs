@@ -33,6 +33,21 @@ pub(super) fn enclosed([width, height]: [usize; 2], points: &[DVec2]) -> Mask {
     mask
 }
 
+/// Whether a closed line encloses a point, as [`enclosed`] has it.
+pub(super) fn encloses(points: &[DVec2], p: DVec2) -> bool {
+    if points.len() < 3 {
+        return false;
+    }
+    let mut inside = false;
+    for (i, a) in points.iter().enumerate() {
+        let b = points[(i + 1) % points.len()];
+        if (a.y <= p.y) != (b.y <= p.y) && a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x) < p.x {
+            inside = !inside;
+        }
+    }
+    inside
+}
+
 /// The pixels whose centers lie between two opposite corners.
 pub(super) fn rectangle([width, height]: [usize; 2], a: DVec2, b: DVec2) -> Mask {
     let (lo, hi) = (a.min(b), a.max(b));
@@ -87,6 +102,8 @@ mod tests {
         let bow = enclosed([8, 6], &bow);
         assert!(bow[(1, 2)] && bow[(6, 2)] && !bow[(3, 0)] && !bow[(4, 5)]);
         assert_eq!(count(&square[..2]), 0);
+        assert!(encloses(&square, DVec2::new(4.4, 3.4)) && !encloses(&square, DVec2::new(4.6, 3.4)));
+        assert!(!encloses(&square[..2], DVec2::new(2.0, 1.5)) && !encloses(&square, DVec2::NAN));
         assert_eq!(enclosed([0, 0], &square).len(), 0);
     }
 

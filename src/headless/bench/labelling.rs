@@ -1,4 +1,7 @@
-//! `touch2touch bench labelling`: what proposed masks are worth on known grasps, and what a stroke costs.
+//! `touch2touch bench labelling`: what proposed masks are worth on known grasps, what a stroke costs, and what a mask takes
+//! a person.
+
+mod actions;
 
 use std::time::Instant;
 
@@ -35,11 +38,14 @@ const STROKES: usize = 20;
 #[derive(Debug, Args)]
 pub(in crate::headless) struct LabellingArgs {
     /// Grasps of the unseen tools, simulated.
-    #[arg(long, default_value_t = 18, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     grasps: u32,
     /// Seed of grasps and noise.
     #[arg(long, default_value_t = 1)]
     simulation_seed: u64,
+    /// Only what a mask takes a person: no predictions, no strokes.
+    #[arg(long)]
+    actions: bool,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -117,6 +123,10 @@ struct Report {
     rows: Vec<Row>,
     strokes: Vec<Stroke>,
     follows: Vec<Follow>,
+    /// The IoU at which a mask is done.
+    target: f64,
+    /// What a mask takes a person, by the way to begin.
+    actions: Vec<actions::Row>,
 }
 
 /// Proposals of one source, by grasp.
@@ -131,19 +141,29 @@ struct Found {
 pub(super) fn run(args: &LabellingArgs) -> VerbResult {
     let machine = Machine::now();
     let cases = simulate(args.grasps as usize, args.simulation_seed, |seen| !seen)?;
-    let output = Output::new(args.json.common(), "proposing", cases.len() * 2);
+    let imprints = if args.actions {
+        &[ImprintSource::Measured][..]
+    } else {
+        &[ImprintSource::Measured, ImprintSource::Predicted]
+    };
+    let output = Output::new(args.json.common(), "proposing", cases.len() * imprints.len());
     let mut predictor = Predictor::new(&args.model, &Rig::lab());
-    let mut rows = Vec::new();
-    for imprint in [ImprintSource::Measured, ImprintSource::Predicted] {
+    let (mut rows, mut persons) = (Vec::new(), Persons::default());
+    for &imprint in imprints {
         let mut found: Vec<Found> = Vec::new();
         for (at, case) in cases.iter().enumerate() {
             output.step(&case.name);
             let imprints = predictor.imprints(&case.sample, imprint, &JobCx::unwatched())?;
-            // What is carried comes from the grasp of the same tool before.
-            let from = cases[..at].iter().rev().find(|from| std::sync::Arc::ptr_eq(&from.tool, &case.tool));
+            // What is carried comes from the grasp of the same tool before, else from the next one.
+            let same = |from: &&Case| std::sync::Arc::ptr_eq(&from.tool, &case.tool);
+            let from = cases[..at].iter().rev().find(same).or_else(|| cases[at + 1..].iter().find(same));
             let truth = true_masks(case)?;
             let true_pose = registered(case, &imprints, &truth);
-            for (source, masks, ms) in proposals(&mut predictor, case, from, (imprint, &imprints), &truth)? {
+            let proposed = proposals(&mut predictor, case, from, (imprint, &imprints), &truth)?;
+            if imprint == ImprintSource::Measured {
+                persons.correct(&proposed, &imprints, &truth, args.simulation_seed);
+            }
+            for (source, masks, ms) in proposed {
                 let place = found.iter().position(|found| found.source == source).unwrap_or_else(|| {
                     found.push(Found { source, ious: vec![], errors: vec![], apart: vec![], ms: vec![] });
                     found.len() - 1
@@ -163,19 +183,69 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
         rows.extend(found.into_iter().map(|found| row(imprint, &found)));
     }
     let strokes = [([175, 140], 4.0), ([1024, 1024], 4.0), ([1024, 1024], 40.0)];
-    let strokes = strokes.into_iter().map(|(size, radius_px)| stroke(size, radius_px)).collect();
-    let (grasps, simulation_seed) = (cases.len(), args.simulation_seed);
+    let strokes = strokes.into_iter().filter(|_| !args.actions);
+    let strokes = strokes.map(|(size, radius_px)| stroke(size, radius_px)).collect();
     let threshold_m = MaskChoice::default().threshold_m;
     let by_threshold = |case: &Case| {
         let mask = |pad| Some(case.sample.pad(pad)?.depth()?.imprint.map(|&depth| depth >= threshold_m));
         Ok(case.sample.rig.pads().map(mask).collect())
     };
-    let follows = [follow("true masks", &cases, &true_masks)?, follow("threshold", &cases, &by_threshold)?];
-    let follows = follows.into_iter().flatten().collect();
-    let report = Report { machine, grasps, simulation_seed, rows, strokes, follows };
+    let mut follows = Vec::new();
+    if !args.actions {
+        follows.extend(follow("true masks", &cases, &true_masks)?);
+        follows.extend(follow("threshold", &cases, &by_threshold)?);
+    }
+    let report = Report {
+        machine,
+        grasps: cases.len(),
+        simulation_seed: args.simulation_seed,
+        rows,
+        strokes,
+        follows,
+        target: actions::TARGET,
+        actions: persons.rows(),
+    };
     args.json.write(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(true)
+}
+
+/// A scripted person for each way to begin: what is in force is taken over by a key where it is right, a proposal is shown
+/// and accepted by two, and where it was proposed for all pairs at once, by none.
+const WAYS: [(&str, Option<&str>, [usize; 2]); 6] = [
+    ("nothing", None, [0, 0]),
+    ("threshold", Some("threshold"), [0, 1]),
+    ("mask model", Some("mask model"), [0, 1]),
+    ("CAD at the true pose", Some("CAD at the true pose"), [2, 0]),
+    ("CAD at the true pose, for all at once", Some("CAD at the true pose"), [0, 0]),
+    ("another grasp's mask, carried", Some("carried from another grasp"), [2, 0]),
+];
+
+/// Who corrects the masks of each of [`WAYS`].
+#[derive(Default)]
+struct Persons(Vec<actions::Person>);
+
+impl Persons {
+    fn correct(&mut self, proposed: &[Proposed], imprints: &PerPad<DepthMap>, truth: &PerPad<Mask>, seed: u64) {
+        self.0.extend((self.0.len()..WAYS.len()).map(|_| actions::Person::new(seed)));
+        for (person, (_, source, [keys, keys_as_it_is])) in self.0.iter_mut().zip(WAYS) {
+            let found = proposed.iter().find(|(name, ..)| Some(*name) == source);
+            for (pad, imprint) in imprints.entries() {
+                let mask = match (source, found) {
+                    (None, _) => Some(Mask::filled(imprint.width(), imprint.height(), false)),
+                    (Some(_), found) => found.and_then(|(_, masks, _)| masks[pad].clone()),
+                };
+                if let (Some(mask), Some(truth)) = (mask, &truth[pad]) {
+                    let ms = found.map_or(0.0, |(_, _, ms)| *ms);
+                    person.correct(actions::Begin { mask, keys, keys_as_it_is, ms }, truth, imprint);
+                }
+            }
+        }
+    }
+
+    fn rows(&self) -> Vec<actions::Row> {
+        self.0.iter().zip(WAYS).filter_map(|(person, (way, ..))| person.row(way)).collect()
+    }
 }
 
 fn apart_deg(a: PlanarPose, b: PlanarPose) -> f64 {
@@ -407,7 +477,9 @@ fn text(report: &Report) -> String {
             number(row.ms, 1)
         ));
     }
-    lines.push("strokes, without the screen:".into());
+    if !report.strokes.is_empty() {
+        lines.push("strokes, without the screen:".into());
+    }
     for stroke in &report.strokes {
         lines.push(format!(
             "{:>4} x {:<4} brush of {:>2} px: a move {:.3} ms (worst {:.3}), the end {:.2} ms, uploads at most {:.1} % of the picture",
@@ -433,5 +505,6 @@ fn text(report: &Report) -> String {
             ms(influence)
         ));
     }
+    lines.push(actions::text(&report.actions));
     lines.join("\n")
 }

@@ -81,7 +81,8 @@ pub(in super::super) struct LabelArgs {
     pub(super) clean: Vec<CleanUp>,
     /// Draw on the mask: `{"tool": "lasso", "paint": "contact", "points": [[X, Y], ...]}` in image pixels; tools are
     /// `brush` (`radius_px`), `lasso`, `polygon`, `rectangle` and `wand` (`tolerance_m`), they paint `contact`, `free` or
-    /// `ignore`. Several are done in turn, before clean-ups.
+    /// `ignore`. Several are done in turn, before clean-ups. With a `sight` (`clip_from_grasp`, `size_px`, `layers`: `front`
+    /// or `all`), points are pixels of that picture of the points in space, as a drawing in 3D has it in the journal.
     #[arg(long, value_name = "JSON", requires = "pair", conflicts_with = "remove_mask", value_parser = parse_drawing)]
     pub(super) draw: Vec<Drawing>,
     /// Remove the corrected mask: the automatic source is in force again.

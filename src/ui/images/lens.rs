@@ -2,11 +2,12 @@
 
 use eframe::egui::{Align2, Color32, Mesh, Pos2, Rect, Shape, Stroke, StrokeKind, TextureId, pos2, vec2};
 
-use super::{CONTACT, Memory};
+use super::Memory;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::MaskTool;
 use crate::domain::rig::PadId;
 use crate::ui::cx::Cx;
+use crate::ui::theme::CONTACT;
 use crate::ui::widget::image_canvas::{CanvasMap, CanvasOutput};
 use crate::ui::widget::texture::outline;
 

@@ -9,8 +9,7 @@ use crate::app::command::SettingsCommand;
 use crate::app::settings::ProposalSource;
 use crate::app::state::Lookup;
 use crate::ui::cx::Cx;
-use crate::ui::images::PROPOSED;
-use crate::ui::theme::{SMALL, section};
+use crate::ui::theme::{PROPOSED, SMALL, section};
 use crate::work::propose::FARTHEST_M;
 
 /// Source, number, and the way to accept or reject.

@@ -20,8 +20,7 @@ use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
 use crate::gpu::view::Plane;
 use crate::ui::cx::{Cx, side_color};
-use crate::ui::images::{CONTACT, GHOST};
-use crate::ui::theme::{self, Palette};
+use crate::ui::theme::{self, CONTACT, GHOST, Palette};
 use crate::work::cloud::{Clouds, FingerCloud};
 
 /// Points as the renderer takes them, made once per cloud.
@@ -158,7 +157,7 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seco
 }
 
 /// The planes that cut a view open.
-fn cut(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Plane> {
+pub(super) fn cut(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Plane> {
     let mut planes = Vec::new();
     if let Some(section) = cx.state.workbench.section {
         let axis = section.axis.unit();

@@ -28,6 +28,7 @@ pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, column:
             (Action::PoseTool, "P", tool == SceneTool::Pose),
             (Action::MeasureDistance, "D", tool == SceneTool::Distance),
             (Action::MeasureAngle, "A", tool == SceneTool::Angle),
+            (Action::PaintIn3d, "B", tool == SceneTool::Paint),
             (Action::NextLayer, "V", layer != Layer::None),
             (Action::BothClouds, "2", both),
             (Action::Section, "X", cx.state.workbench.section.is_some()),

@@ -18,7 +18,7 @@ use crate::work::cloud::Clouds;
 /// What a click does.
 pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let tool = cx.state.workbench.tool;
-    if !output.response.clicked() || tool == SceneTool::Pose {
+    if !output.response.clicked() || matches!(tool, SceneTool::Pose | SceneTool::Paint) {
         return;
     }
     let Some(pointer) = output.pointer else { return };

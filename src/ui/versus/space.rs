@@ -16,7 +16,7 @@ use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
 use crate::ui::cx::Cx;
 use crate::ui::scene::{DISTANCE_MAP, SceneMesh, distances, guides, model_edges, outline, parts, rgb, update_mesh};
-use crate::ui::scene_view::SceneView;
+use crate::ui::scene_view::{Grip, SceneView};
 use crate::ui::theme::{self, SMALL};
 use crate::ui::widget::empty;
 
@@ -67,7 +67,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, space: &mut Space, versus: &Ver
     }
     space.view.camera.orthographic = cx.state.settings.scene.orthographic;
     let mut scene = scene(cx, space, versus, flipped);
-    let output = space.view.interact(ui, "3D view, A and B", false);
+    let output = space.view.interact(ui, "3D view, A and B", Grip::Nothing);
     if (output.fit || !space.view.placed)
         && let Some(bounds) = scene.bounds()
     {

@@ -1,0 +1,329 @@
+//! [`Sight`]: a picture of points in space, through which a mask is drawn on; [`Seen`]: where the pixels of the mask lie in
+//! that picture, and which of them a drawing reaches.
+
+use std::collections::HashMap;
+
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec4};
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
+
+use super::region;
+
+/// Which of several points that lie behind each other a drawing reaches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Layers {
+    /// Those that nothing hides.
+    #[default]
+    Front,
+    /// All of them.
+    All,
+}
+
+impl Layers {
+    /// What is reached, in words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Front => "front-most points",
+            Self::All => "all points, also hidden ones",
+        }
+    }
+
+    /// The other one.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::Front => Self::All,
+            Self::All => Self::Front,
+        }
+    }
+}
+
+/// How far behind the nearest point a point may lie and still belong to the same layer, meters.
+const LAYER_M: f64 = 0.0025;
+/// Width of the cells in which the nearest point is looked for, in distances between neighboring points: in each cell of a
+/// layer there is one.
+const CELL: f64 = 2.0;
+
+/// How a picture of points in space was taken: what a drawing on it is a drawing on.
+///
+/// In single precision, so that it is the same after it was written and read as text.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sight {
+    /// From the grasp frame (meters) to clip coordinates; depth reversed (1 near, 0 far).
+    pub clip_from_grasp: Mat4,
+    /// Columns and rows of the picture.
+    pub size_px: [u32; 2],
+    /// What is reached.
+    #[serde(default)]
+    pub layers: Layers,
+    /// Planes that cut it open: what has `xyz · p + w < 0` (meters) is neither reached nor hides anything.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub cut: Vec<Vec4>,
+}
+
+/// A matrix in double precision, so that it is taken apart once for many points.
+struct Projection {
+    clip: DMat4,
+    half_size: DVec2,
+}
+
+impl Projection {
+    fn of(sight: &Sight) -> Self {
+        let half_size = DVec2::from(sight.size_px.map(|s| 0.5 * f64::from(s.max(1))));
+        Self { clip: sight.clip_from_grasp.as_dmat4(), half_size }
+    }
+
+    /// Place in the picture, and depth along the line of sight, meters from somewhere.
+    fn place(&self, p: DVec3) -> Option<(DVec2, f64)> {
+        let clip = self.clip * p.extend(1.0);
+        // Reversed depth: in front of the near plane means z <= w.
+        let inside = clip.w > 0.0 && clip.z <= clip.w && clip.z >= 0.0;
+        let at = (DVec2::new(1.0 + clip.x / clip.w, 1.0 - clip.y / clip.w)) * self.half_size - 0.5;
+        let depth = self.depth(clip);
+        (inside && at.is_finite() && depth.is_finite()).then_some((at, depth))
+    }
+
+    /// In perspective `w` grows with the depth, in a parallel projection `z` falls with it.
+    fn depth(&self, clip: DVec4) -> f64 {
+        let (z, w) = (self.clip.row(2).truncate().length(), self.clip.row(3).truncate().length());
+        if w > 0.0 { clip.w / w } else { -clip.z / z }
+    }
+
+    fn px_per_m(&self, p: DVec3) -> Option<f64> {
+        let w = (self.clip * p.extend(1.0)).w;
+        let scale = self.clip.row(1).truncate().length() * self.half_size.y / w;
+        (scale.is_finite() && scale > 0.0).then_some(scale)
+    }
+}
+
+impl Sight {
+    /// Where a point (meters, grasp frame) appears, `(0, 0)` being the center of the first pixel; `None` behind the eye and
+    /// for a point that is not finite.
+    pub fn project(&self, p_in_grasp: DVec3) -> Option<DVec2> {
+        Some(Projection::of(self).place(p_in_grasp)?.0)
+    }
+
+    /// The picture's pixels per meter at the depth of a point (grasp frame); `None` behind the eye.
+    pub fn px_per_m(&self, p_in_grasp: DVec3) -> Option<f64> {
+        Projection::of(self).px_per_m(p_in_grasp)
+    }
+
+    fn cuts_away(&self, p: DVec3) -> bool {
+        self.cut.iter().any(|plane| plane.as_dvec4().dot(p.extend(1.0)) < 0.0)
+    }
+}
+
+/// Where the pixels of one finger's mask lie in a picture: those that a drawing on it reaches.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Seen {
+    /// Column and row in the mask, and place in the picture.
+    points: Vec<([u16; 2], DVec2)>,
+    /// Half the distance between neighbors, picture pixels: a thin brush still meets them.
+    reach_px: f64,
+}
+
+impl Seen {
+    /// The pixels of a mask by the points that were lifted from it (`own`: meters, grasp frame, row by row, and the pixel of
+    /// each), as far as they are reached; `others` are points of other fingers, which can hide them.
+    pub fn new(sight: &Sight, (own, pixels): (&[DVec3], &[[u16; 2]]), others: &[&[DVec3]]) -> Self {
+        let projection = Projection::of(sight);
+        let place = |p: &DVec3| projection.place(*p).filter(|_| !sight.cuts_away(*p));
+        let placed: Vec<([u16; 2], DVec2, f64)> =
+            own.iter().zip(pixels).filter_map(|(p, pixel)| place(p).map(|(at, depth)| (*pixel, at, depth))).collect();
+        let spacing_px = median(own.iter().filter_map(|p| projection.px_per_m(*p)))
+            .zip(spacing(own, pixels))
+            .map_or(1.0, |(scale, spacing_m)| scale * spacing_m);
+        let cell_px = (CELL * spacing_px).max(1.0);
+        let cell = |at: DVec2| ((at.x / cell_px).floor() as i64, (at.y / cell_px).floor() as i64);
+        let mut nearest: HashMap<(i64, i64), f64> = HashMap::new();
+        if sight.layers == Layers::Front {
+            let hiding = others.iter().flat_map(|points| points.iter()).filter_map(place);
+            for (at, depth) in placed.iter().map(|(_, at, depth)| (*at, *depth)).chain(hiding) {
+                let least = nearest.entry(cell(at)).or_insert(depth);
+                *least = least.min(depth);
+            }
+        }
+        let is_reached = |at: DVec2, depth: f64| nearest.get(&cell(at)).is_none_or(|least| depth <= least + LAYER_M);
+        let points =
+            placed.into_iter().filter(|(_, at, depth)| is_reached(*at, *depth)).map(|(pixel, at, _)| (pixel, at));
+        Self { points: points.collect(), reach_px: 0.5 * spacing_px }
+    }
+
+    /// The pixel whose point is nearest to a place in the picture.
+    pub(super) fn nearest(&self, at_px: DVec2) -> Option<[u16; 2]> {
+        let distance = |at: &DVec2| (*at - at_px).length_squared();
+        let found = self.points.iter().min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))?;
+        Some(found.0)
+    }
+
+    /// The pixels whose points lie within `radius_px` of the segment from `a` to `b` of the picture.
+    pub(super) fn along(&self, [a, b]: [DVec2; 2], radius_px: f64) -> impl Iterator<Item = [u16; 2]> {
+        let (along, radius) = (b - a, radius_px.max(self.reach_px));
+        let length2 = along.length_squared();
+        let hit = move |p: DVec2| {
+            let t = if length2 > 0.0 { ((p - a).dot(along) / length2).clamp(0.0, 1.0) } else { 0.0 };
+            (p - (a + along * t)).length_squared() <= radius * radius
+        };
+        self.points.iter().filter(move |(_, at)| hit(*at)).map(|(pixel, _)| *pixel)
+    }
+
+    /// The pixels whose points a closed line of the picture encloses, or with `box_only` the rectangle between its first and
+    /// its last corner.
+    pub(super) fn within(&self, corners: &[DVec2], box_only: bool) -> Vec<[u16; 2]> {
+        let ends = [corners.first(), corners.last()].map(|corner| corner.copied().unwrap_or(DVec2::NAN));
+        let bounds = |points: &[DVec2]| {
+            points.iter().fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(lo, hi), p| (lo.min(*p), hi.max(*p)))
+        };
+        let (lo, hi) = bounds(if box_only { &ends } else { corners });
+        let in_box = |p: DVec2| p.cmpge(lo).all() && p.cmple(hi).all();
+        let points = self.points.iter().filter(|(_, at)| in_box(*at) && (box_only || region::encloses(corners, *at)));
+        points.map(|(pixel, _)| *pixel).collect()
+    }
+}
+
+fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.collect();
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// The distance between points of neighboring pixels of a row, meters, median.
+fn spacing(points: &[DVec3], pixels: &[[u16; 2]]) -> Option<f64> {
+    let neighbors =
+        points.windows(2).zip(pixels.windows(2)).filter(|(_, at)| at[0][1] == at[1][1] && at[1][0] - at[0][0] == 1);
+    median(neighbors.map(|(p, _)| p[0].distance(p[1])).filter(|d| d.is_finite()))
+}
+
+#[cfg(test)]
+pub(super) mod testing {
+    use super::*;
+
+    /// Looks from 0.2 m above along -z at the origin, `scale` pixels per meter there; a picture of 400 x 300 pixels.
+    pub(crate) fn from_above(scale: f64, layers: Layers) -> Sight {
+        let (eye, half) = (0.2, [200.0, 150.0]);
+        let focal = half.map(|half| scale * eye / half);
+        let clip = DMat4::from_cols(
+            DVec4::new(focal[0], 0.0, 0.0, 0.0),
+            DVec4::new(0.0, focal[1], 0.0, 0.0),
+            DVec4::new(0.0, 0.0, 0.0, -1.0),
+            DVec4::new(0.0, 0.0, 0.01, eye),
+        );
+        Sight { clip_from_grasp: clip.as_mat4(), size_px: [400, 300], layers, cut: Vec::new() }
+    }
+
+    /// A sheet of 21 x 21 points half a millimeter apart around the axis, at a height.
+    pub(crate) fn sheet(z: f64) -> (Vec<DVec3>, Vec<[u16; 2]>) {
+        let at = |i: u16| (f64::from(i) - 10.0) * 0.0005;
+        let pixels: Vec<[u16; 2]> = (0..21).flat_map(|y| (0..21).map(move |x| [x, y])).collect();
+        (pixels.iter().map(|[x, y]| DVec3::new(at(*x), at(*y), z)).collect(), pixels)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::{from_above, sheet};
+    use super::*;
+
+    const CENTER: DVec2 = DVec2::new(199.5, 149.5);
+
+    fn stamp(seen: &Seen, at: DVec2, radius_px: f64) -> usize {
+        seen.along([at, at], radius_px).count()
+    }
+
+    #[test]
+    fn points_appear_where_they_are_and_as_large_as_they_are() {
+        let sight = from_above(4000.0, Layers::Front);
+        assert!((sight.project(DVec3::ZERO).unwrap() - CENTER).length() < 1e-4);
+        // x to the right, y up on the screen.
+        let at = sight.project(DVec3::new(0.005, 0.005, 0.0)).unwrap();
+        assert!((at - CENTER - DVec2::new(20.0, -20.0)).length() < 1e-3, "{at}");
+        assert!((sight.px_per_m(DVec3::ZERO).unwrap() - 4000.0).abs() < 1e-3);
+        assert!((sight.px_per_m(DVec3::Z * 0.1).unwrap() - 8000.0).abs() < 1e-2, "twice as large at half the way");
+        for p in [DVec3::NAN, DVec3::Z * 0.3, DVec3::Z * 0.195] {
+            assert_eq!(sight.project(p), None, "{p}: behind the eye, too near, or nowhere");
+        }
+        assert_eq!(sight.px_per_m(DVec3::Z * 0.3), None);
+    }
+
+    #[test]
+    fn of_two_sheets_the_front_one_is_reached_or_both() {
+        let (near, far) = (sheet(0.005), sheet(-0.005));
+        let reached = |own: &(Vec<DVec3>, Vec<[u16; 2]>), other: &[DVec3], layers| {
+            let seen = Seen::new(&from_above(4000.0, layers), (&own.0, &own.1), &[other]);
+            stamp(&seen, CENTER, 9.0)
+        };
+        let all = reached(&far, &near.0, Layers::All);
+        // A disc of 9 px at 4000 px/m, points 2 px apart (a bit less there: it is farther away).
+        assert!((60..80).contains(&all), "{all}");
+        assert_eq!(reached(&far, &near.0, Layers::Front), 0, "hidden");
+        assert_eq!(reached(&far, &[], Layers::Front), all);
+        assert_eq!(reached(&near, &far.0, Layers::Front), reached(&near, &[], Layers::All));
+        // Zoomed in, what is behind does not shine through between the points.
+        let seen = Seen::new(&from_above(60_000.0, Layers::Front), (&far.0, &far.1), &[&near.0]);
+        assert_eq!(stamp(&seen, CENTER, 100.0), 0);
+        // A fold of one sheet hides its own back.
+        let both = ([near.0.clone(), far.0].concat(), [near.1.clone(), far.1].concat());
+        assert_eq!(reached(&both, &[], Layers::Front), reached(&near, &[], Layers::Front));
+        // What a plane cuts away is not reached, and hides nothing.
+        let cut = Sight { cut: vec![Vec4::new(0.0, 0.0, -1.0, 0.0)], ..from_above(4000.0, Layers::Front) };
+        let far = sheet(-0.005);
+        assert_eq!(stamp(&Seen::new(&cut, (&far.0, &far.1), &[&near.0]), CENTER, 9.0), all);
+        assert_eq!(stamp(&Seen::new(&cut, (&near.0, &near.1), &[]), CENTER, 9.0), 0);
+    }
+
+    #[test]
+    fn parallel_lines_of_sight_have_layers_too() {
+        let mut sight = from_above(4000.0, Layers::Front);
+        // Depth from 1 at 0.2 m above to 0 as far below.
+        let (x, y) = (4000.0 / 200.0, 4000.0 / 150.0);
+        sight.clip_from_grasp = Mat4::from_cols(
+            Vec4::new(x, 0.0, 0.0, 0.0),
+            Vec4::new(0.0, y, 0.0, 0.0),
+            Vec4::new(0.0, 0.0, 2.5, 0.0),
+            Vec4::new(0.0, 0.0, 0.5, 1.0),
+        );
+        let (near, far) = (sheet(0.005), sheet(-0.005));
+        assert_eq!(stamp(&Seen::new(&sight, (&far.0, &far.1), &[&near.0]), CENTER, 9.0), 0);
+        assert_eq!(stamp(&Seen::new(&sight, (&near.0, &near.1), &[&far.0]), CENTER, 9.0), 69, "as on paper");
+        assert!((sight.px_per_m(DVec3::Z * 0.1).unwrap() - 4000.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn nothing_and_nonsense_reach_nothing() {
+        let sight = from_above(4000.0, Layers::Front);
+        assert_eq!(stamp(&Seen::new(&sight, (&[], &[]), &[]), CENTER, 1e9), 0);
+        assert_eq!(Seen::default().nearest(CENTER), None);
+        let (mut points, pixels) = sheet(0.0);
+        points[220] = DVec3::NAN;
+        points[221] = DVec3::Z * 0.5;
+        let seen = Seen::new(&sight, (&points, &pixels), &[]);
+        assert_eq!(stamp(&seen, CENTER, 1e9), 21 * 21 - 2);
+        assert_eq!(stamp(&seen, DVec2::NAN, 9.0), 0);
+        assert_eq!(stamp(&seen, CENTER, f64::NAN), stamp(&seen, CENTER, 0.0), "no radius is a thin one");
+        let broken = Sight { clip_from_grasp: Mat4::NAN, ..sight.clone() };
+        assert_eq!(stamp(&Seen::new(&broken, (&points, &pixels), &[&points]), CENTER, 1e9), 0);
+        let empty = Sight { size_px: [0, 0], clip_from_grasp: Mat4::ZERO, ..sight };
+        assert_eq!(stamp(&Seen::new(&empty, (&points, &pixels), &[]), CENTER, 1e9), 0);
+    }
+
+    #[test]
+    fn lines_enclose_points_and_the_nearest_is_found() {
+        let (points, pixels) = sheet(0.0);
+        let seen = Seen::new(&from_above(4000.0, Layers::Front), (&points, &pixels), &[]);
+        let square = [[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]].map(|d| CENTER + DVec2::from(d));
+        assert_eq!(seen.within(&square, false).len(), 5 * 5, "2 px apart");
+        assert_eq!(seen.within(&square[..1], false), Vec::<[u16; 2]>::new());
+        assert_eq!(seen.within(&[square[0], CENTER, square[2]], true).len(), 5 * 5);
+        assert_eq!(seen.within(&[], true).len(), 0);
+        assert_eq!(seen.nearest(CENTER + DVec2::new(4.3, -1.6)), Some([12, 11]));
+    }
+
+    #[test]
+    fn a_sight_is_the_same_after_it_was_text() {
+        let mut sight = from_above(4321.987, Layers::All);
+        sight.cut.push(Vec4::new(0.1, 0.2, 0.3, 1.0 / 3.0));
+        let text = serde_json::to_string(&sight).unwrap();
+        assert_eq!(serde_json::from_str::<Sight>(&text).unwrap(), sight, "{text}");
+    }
+}
