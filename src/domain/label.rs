@@ -24,7 +24,7 @@ use glam::DVec2;
 
 use super::grid::Mask;
 
-pub use agreement::{Agreement, agreement};
+pub use agreement::{Agreement, agreement, iou};
 pub use carry::{Carried, Surface, across, carry};
 pub use clean_up::{CleanKind, CleanUp};
 pub use coco::{coco_runs, coco_runs_of, coco_text, mask_of_coco_runs};

@@ -22,6 +22,24 @@ pub fn agreement(a: &Mask, b: &Mask, px_per_mm: f64) -> Option<Agreement> {
     if a.size() != b.size() {
         return None;
     }
+    let (both, alone) = counts(a, b);
+    let either = both + alone[0] + alone[1];
+    Some(Agreement {
+        iou: share(both, either),
+        dice: share(2 * both, either + both),
+        edge_mm: edge_distance(&edge(a), &edge(b)).map(|px| px / px_per_mm),
+        alone_px: alone,
+    })
+}
+
+/// As [`Agreement::iou`], without the rest: of masks of one size, at once.
+pub fn iou(a: &Mask, b: &Mask) -> f64 {
+    let (both, alone) = counts(a, b);
+    share(both, both + alone[0] + alone[1])
+}
+
+/// The pixels in both masks, and those in one alone.
+fn counts(a: &Mask, b: &Mask) -> (usize, [usize; 2]) {
     let (mut both, mut alone) = (0, [0; 2]);
     for (a, b) in a.as_slice().iter().zip(b.as_slice()) {
         match (a, b) {
@@ -31,14 +49,11 @@ pub fn agreement(a: &Mask, b: &Mask, px_per_mm: f64) -> Option<Agreement> {
             (false, false) => {}
         }
     }
-    let either = both + alone[0] + alone[1];
-    let share = |n: usize, of: usize| if of == 0 { 1.0 } else { n as f64 / of as f64 };
-    Some(Agreement {
-        iou: share(both, either),
-        dice: share(2 * both, either + both),
-        edge_mm: edge_distance(&edge(a), &edge(b)).map(|px| px / px_per_mm),
-        alone_px: alone,
-    })
+    (both, alone)
+}
+
+fn share(n: usize, of: usize) -> f64 {
+    if of == 0 { 1.0 } else { n as f64 / of as f64 }
 }
 
 /// The pixels of a mask that touch the outside, or the edge of the image.

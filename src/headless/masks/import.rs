@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use strum::IntoEnumIterator as _;
 
-use super::super::args::DatasetArgs;
+use super::super::args::{DatasetArgs, keyed};
 use super::super::{Common, Output, VerbResult};
 use crate::io::exchange::Format;
 use crate::work::import::{ImportSetup, import_masks, plan_import};
@@ -19,8 +18,8 @@ pub(in super::super) struct ImportArgs {
     #[arg(long, value_name = "DIR")]
     from: PathBuf,
     /// Their form; else the one that lies there.
-    #[arg(long, value_parser = clap::builder::PossibleValuesParser::new(Format::iter().map(Format::key)))]
-    format: Option<String>,
+    #[arg(long, value_parser = keyed::<Format>())]
+    format: Option<Format>,
     /// Replace what was painted by hand as well, also of pairs marked "done", "flagged" or "skip".
     #[arg(long)]
     over_hand: bool,
@@ -39,8 +38,7 @@ pub(super) fn run(args: &ImportArgs) -> VerbResult {
     let output = Output::new(args.common, "importing", 1);
     let setup = ImportSetup {
         from: args.from.clone(),
-        // The parser has compared the key with the list.
-        format: args.format.as_ref().and_then(|key| key.parse().ok()),
+        format: args.format,
         over_hand: args.over_hand,
         person: args.person.clone(),
     };

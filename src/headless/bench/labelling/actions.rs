@@ -1,8 +1,9 @@
 //! What a mask takes a person: pre-labeled grasps corrected by a scripted one, for each way to begin.
 //!
 //! The person knows the true contact, and of all that hands can do next takes what mends most: a clean-up by key or button
-//! (at the size that is set, 1 mm), or a line around what is missing or too much, drawn with [`JITTER_PX`] of unsteadiness. Times are those of the keystroke-level model (Card, Moran and Newell 1980) and of
-//! following an outline, besides what the program itself takes.
+//! (at the size that is set, 1 mm), or a line around what is missing or too much, drawn with [`JITTER_PX`] of unsteadiness.
+//! Times are those of the keystroke-level model (Card, Moran and Newell 1980) and of following an outline, besides what the
+//! program itself takes.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -13,7 +14,7 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::label::{CleanKind, CleanUp, DrawTool, Drawing, Ground, Paint, Provenance, grow, islands};
+use crate::domain::label::{CleanKind, CleanUp, DrawTool, Drawing, Ground, Paint, Provenance, grow, iou, islands};
 use crate::domain::rig::Rig;
 use crate::work::labels::HandMask;
 
@@ -236,14 +237,6 @@ fn clean_up(kind: CleanKind) -> Move {
     let by_key = matches!(kind, CleanKind::FillHoles | CleanKind::LargestIsland);
     let seconds = DECIDE_S + if by_key { KEY_S } else { POINT_S + 2.0 * BUTTON_S };
     Move { does: Does::Clean(CleanUp::from(kind)), actions: 1, seconds }
-}
-
-/// Pixels in both over pixels in either.
-fn iou(a: &Mask, b: &Mask) -> f64 {
-    let pairs = || a.as_slice().iter().zip(b.as_slice());
-    let both = pairs().filter(|(a, b)| **a && **b).count();
-    let either = pairs().filter(|(a, b)| **a || **b).count();
-    if either == 0 { 1.0 } else { both as f64 / either as f64 }
 }
 
 /// The islands of a mask with the most pixels of another one in them, apart.
