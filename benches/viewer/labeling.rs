@@ -53,7 +53,7 @@ fn button(pos: Pos2, pressed: bool) -> Event {
 /// The place of the imprint that is painted on.
 fn canvas(studio: &Studio) -> Option<Rect> {
     let state = studio.harness.state().state();
-    let name = format!("Measured {}", state.finger_name(state.selection.finger));
+    let name = format!("Measured imprint {}", state.finger_name(state.selection.finger));
     studio.harness.query_all_by_label(&name).next().map(|node| node.rect())
 }
 

@@ -83,7 +83,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch masks import", How::Run(&[], "", &[0])),
     ("touch2touch masks train", How::Run(&[("10", "0.01")], "--test-in-train", &[0])),
     ("touch2touch masks compare", How::Run(&[], "", &[0])),
-    ("touch2touch masks propose", How::Run(&[("24", "1")], "", &[0])),
+    ("touch2touch masks propose", How::Run(&[("24", "1"), ("is:todo", "tool:pattern")], "", &[0])),
     ("touch2touch masks queue", How::Run(&[], "", &[0])),
     ("touch2touch masks stats", How::Run(&[], "", &[0])),
     ("touch2touch basin", How::Run(&[], "", &[0])),

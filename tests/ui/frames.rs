@@ -166,7 +166,7 @@ fn paging_shows_no_blank_frame_and_keeps_its_budget() {
     rig.until("the imprint", felt);
     rig.harness.run_steps(5);
     let state = rig.harness.state().state();
-    let name = format!("Measured {}", state.finger_name(state.selection.finger));
+    let name = format!("Measured imprint {}", state.finger_name(state.selection.finger));
     let place = rig.harness.get_by_label(&name).rect();
     let [low, high] = spread(&mut rig, place);
     assert!(high - low > 20, "an imprint has colors: {low} to {high}");

@@ -316,7 +316,7 @@ fn proposals(
         })?;
     }
     each("other finger's true mask", &mut |pad, imprint| {
-        let other = lab::PADS[usize::from(pad == lab::PADS[0])];
+        let other = case.sample.rig.other_pad(pad).ok_or_else(|| anyhow::anyhow!("there is no other finger"))?;
         let (Some(there), Some(mask)) = (&imprints[other], &truth[other]) else { anyhow::bail!("there is no other") };
         let from = Side { sample: &case.sample, pad: other, imprint: there };
         Ok(propose::carried_across("other", (from, mask), Side { sample: &case.sample, pad, imprint })?.mask)
