@@ -16,7 +16,7 @@ use touch2touch::io::dataset::RIG_JSON;
 use touch2touch::io::images;
 use touch2touch::io::simulated::{Layout, pair_paths, write_pair, write_tools};
 
-use super::window::{SIZE, Studio, median, resident_mib};
+use super::window::{SIZE, Studio, median, own_ms, resident_mib};
 
 /// Moves of the pointer in a stroke.
 const MOVES: usize = 60;
@@ -60,7 +60,7 @@ fn canvas(studio: &Studio) -> Option<Rect> {
 /// Prints what a stroke costs by size of imprint and brush; returns it for the file.
 pub(super) fn strokes() -> std::io::Result<serde_json::Value> {
     println!("\nStrokes of {MOVES} moves, {} x {} points; ms of processor per frame", SIZE[0], SIZE[1]);
-    println!("{:>12} {:>7} {:>9} {:>9} {:>9} {:>9}", "imprint", "brush", "move", "worst", "window", "end");
+    println!("{:>12} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9}", "imprint", "brush", "own", "worst", "all", "window", "end");
     let folder = tempfile::tempdir()?;
     large_pair(folder.path())?;
     let mut rows = Vec::new();
@@ -83,24 +83,28 @@ pub(super) fn strokes() -> std::io::Result<serde_json::Value> {
         };
         studio.frame(&[Event::PointerMoved(at(0))]);
         studio.frame(&[button(at(0), true)]);
-        let (mut own, mut window) = (Vec::new(), Vec::new());
+        let (mut own, mut drawn, mut window) = (Vec::new(), Vec::new(), Vec::new());
         for i in 1..=MOVES {
+            studio.harness.input_mut().events.push(Event::PointerMoved(at(i)));
+            let start = own_ms();
+            studio.harness.step();
+            own.push(own_ms() - start);
             let [all, shown] = studio.frame(&[Event::PointerMoved(at(i))]);
-            own.push(all - shown);
+            drawn.push(all - shown);
             window.push(shown);
         }
-        let drawn = studio.harness.state().state().document.stroke.is_some();
-        if !drawn {
+        if studio.harness.state().state().document.stroke.is_none() {
             return Err(std::io::Error::other("nothing was painted"));
         }
         let [all, shown] = studio.frame(&[button(at(MOVES), false)]);
         let worst = own.iter().copied().fold(0.0, f64::max);
-        let (middle, shown_ms, end) = (median(&mut own), median(&mut window), all - shown);
+        let (middle, drawn_ms, shown_ms, end) =
+            (median(&mut own), median(&mut drawn), median(&mut window), all - shown);
         let name = format!("{} x {}", size[0], size[1]);
-        println!("{name:>12} {radius_px:>7.0} {middle:>9.2} {worst:>9.2} {shown_ms:>9.2} {end:>9.2}");
+        println!("{name:>12} {radius_px:>7.0} {middle:>9.2} {worst:>9.2} {drawn_ms:>9.2} {shown_ms:>9.2} {end:>9.2}");
         rows.push(json!({
-            "size": size, "radius_px": radius_px, "move_median_ms": middle, "move_worst_ms": worst,
-            "window_median_ms": shown_ms, "end_ms": end,
+            "size": size, "radius_px": radius_px, "own_median_ms": middle, "own_worst_ms": worst,
+            "all_median_ms": drawn_ms, "window_median_ms": shown_ms, "end_ms": end,
         }));
     }
     Ok(rows.into())

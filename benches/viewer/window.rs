@@ -214,6 +214,13 @@ fn processor_ms() -> f64 {
     if sum > 0.0 { sum / 1e6 } else { std::time::UNIX_EPOCH.elapsed().map_or(0.0, |t| t.as_secs_f64() * 1e3) }
 }
 
+/// Processor time of this thread so far, milliseconds: what the studio itself does, without the device where that is the
+/// processor as well; zero where the system does not say.
+pub(super) fn own_ms() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    text.split_whitespace().next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0) / 1e6
+}
+
 /// Resident memory now and at its highest, MiB; zero where the system does not say.
 pub(super) fn resident_mib() -> [f64; 2] {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
