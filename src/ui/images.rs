@@ -403,7 +403,7 @@ fn depth_pane(
     });
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
     output.paint(texture, if stale { Color32::from_gray(130) } else { Color32::WHITE });
-    if pane != Pane::Error {
+    if pane != Pane::Error && !paint::is_bared(ui) {
         influence::overlay(cx, ui, &output, source, finger);
         paint::mask(cx, ui, memory, &output, source, finger);
     }

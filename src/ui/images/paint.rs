@@ -11,6 +11,11 @@ use crate::ui::theme::{CONTACT, GHOST, IGNORED, PROPOSED};
 use crate::ui::widget::image_canvas::CanvasOutput;
 use crate::ui::widget::texture::{dashes, mask_image, outline};
 
+/// Whether a held key takes everything off the imprint, so that the data itself is seen.
+pub(super) fn is_bared(ui: &Ui) -> bool {
+    ui.input(|i| i.key_down(Key::X)) && !ui.ctx().egui_wants_keyboard_input()
+}
+
 /// The mask in force as a veil with an outline, or the outline alone.
 pub(super) fn mask(
     cx: &mut Cx<'_>,
@@ -21,7 +26,7 @@ pub(super) fn mask(
     finger: PadId,
 ) {
     let settings = &cx.state.settings;
-    if !settings.mask_visible || ui.input(|i| i.key_down(Key::X)) && !ui.ctx().egui_wants_keyboard_input() {
+    if !settings.mask_visible {
         return;
     }
     let Ok(in_force) = cx.state.mask_in_force(source, finger) else { return };
