@@ -106,7 +106,7 @@ fn every_form_comes_back_the_same_into_an_empty_folder_of_labels() {
             }
             let found = import(&dataset, &from(folder));
             assert_eq!((found.new, found.total(), found.is_whole()), (8, 8, true), "{format:?}: {found:?}");
-            assert_eq!(found.format, format.key());
+            assert_eq!(found.format, *format);
             let after = all(&dataset);
             assert!(after.keys().eq(before.keys()), "{format:?}");
             for (of, hand) in &after {

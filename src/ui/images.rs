@@ -444,7 +444,7 @@ fn depth_pane(
         });
     }
     captions(cx, &output, pane, finger);
-    if pane != Pane::Error && cx.state.selection.lens {
+    if pane != Pane::Error && cx.state.selection.lens && !paint::is_bared(ui) {
         lens::show(cx, memory, &output, texture, (source, finger, paintable));
     }
     histogram

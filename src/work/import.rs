@@ -41,7 +41,7 @@ pub struct Import {
     /// From where.
     pub from: PathBuf,
     /// In which form.
-    pub format: &'static str,
+    pub format: Format,
     /// Masks where there was none.
     pub new: usize,
     /// Masks of which pixels change.
@@ -131,7 +131,7 @@ fn go(dataset: &Dataset, setup: &ImportSetup, write: bool, cx: &JobCx) -> Result
     };
     let mut found = Import {
         from: setup.from.clone(),
-        format: listing.format.key(),
+        format: listing.format,
         complete: true,
         labels: folder,
         ..Import::default()

@@ -55,7 +55,7 @@ fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
     };
     match cx.state.look(key) {
         Lookup::Ready(plan) | Lookup::Stale(plan) => {
-            line(format!("Form of the masks: {}", plan.format), cx.p.text);
+            line(format!("Form of the masks: {}", plan.format.name()), cx.p.text);
             plan.lines().into_iter().for_each(|text| line(text, cx.p.text));
             if plan.total() == 0 {
                 line("Nothing would change.".into(), cx.p.caution);
