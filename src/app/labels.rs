@@ -174,6 +174,11 @@ impl State {
         named.map(str::to_owned).or_else(system_person).unwrap_or_default()
     }
 
+    /// The same; `None` where nobody knows.
+    pub(in crate::app) fn known_person(&self) -> Option<String> {
+        Some(self.person()).filter(|name| !name.is_empty())
+    }
+
     /// The imprint whose mask the clean-ups work on: the one chosen, else the one that is there.
     pub fn worked_on(&self, finger: PadId) -> ImprintSource {
         let chosen = self.selection.imprint;
@@ -550,7 +555,7 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
 /// Writes the labels of a pair of the open data set.
 fn save_pair(state: &mut State, name: &str, mut deed: Deed, effects: &mut Vec<Effect>) {
     let repeat = state.document.repeats.get(name).map(|repeating| repeating.person.clone());
-    deed.person = repeat.clone().or_else(|| Some(state.person()).filter(|person| !person.is_empty()));
+    deed.person = repeat.clone().or_else(|| state.known_person());
     let Some(open) = &state.library.open else { return };
     let revision = state.document.next_revision();
     let Some(labels) = state.document.labels.get(name) else { return };

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::error::{Remark, TaskError};
 use super::imprint::measured;
 use super::job::JobCx;
-use super::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Review};
+use super::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels};
 use crate::domain::dataset::{PairId, Split};
 use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::label::Provenance;
@@ -224,7 +224,7 @@ impl Job<'_> {
         let mut stored = self.labels.load(name)?;
         let sample = self.dataset.load(pair).map_err(|err| TaskError::from_error(WHAT, &err))?;
         let imprints = measured(&sample);
-        let judged = !matches!(stored.review, Review::Todo | Review::InProgress) && !self.setup.over_hand;
+        let judged = stored.review.is_judged() && !self.setup.over_hand;
         // Counted only once the whole pair is saved.
         let (mut here, mut how) = (Import::default(), Vec::new());
         for (&pad, listed) in masks {

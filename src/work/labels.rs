@@ -110,6 +110,11 @@ pub enum Review {
 }
 
 impl Review {
+    /// Whether somebody has judged the pair, so that nothing changes its masks unasked.
+    pub fn is_judged(self) -> bool {
+        !matches!(self, Self::Todo | Self::InProgress)
+    }
+
     /// The name on screen.
     pub fn name(self) -> &'static str {
         match self {

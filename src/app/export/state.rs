@@ -114,8 +114,8 @@ impl State {
     /// What is imported as the form says, while it is open.
     pub fn import_setup(&self) -> Option<ImportSetup> {
         let form = self.export.importing.as_ref()?;
-        let person = Some(self.person()).filter(|name| !name.is_empty());
-        Some(ImportSetup { from: form.from.clone(), format: None, over_hand: form.over_hand, person })
+        let (from, over_hand, person) = (form.from.clone(), form.over_hand, self.known_person());
+        Some(ImportSetup { from, format: None, over_hand, person })
     }
 }
 

@@ -38,7 +38,7 @@ impl State {
             generator: generator.map(|bundle| (bundle.clone(), self.settings.generate.config(bundle))),
             shift: self.settings.shift,
             over_hand: mask.over_hand,
-            person: Some(self.person()).filter(|name| !name.is_empty()),
+            person: self.known_person(),
         }
     }
 
@@ -76,8 +76,8 @@ pub(in crate::app) fn imported(state: &mut State, import: &Import) {
     reread(state, &import.changed);
     let level = if import.is_whole() { Level::Info } else { Level::Warning };
     state.log.push(level, import.text(), None, None);
-    if let Some(entry) = state.log.entries.back_mut().filter(|_| import.total() > 0) {
-        entry.place = Some(import.labels.clone());
+    if import.total() > 0 {
+        state.log.place_last(import.labels.clone());
     }
 }
 

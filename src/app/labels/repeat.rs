@@ -46,11 +46,7 @@ pub(in crate::app) fn begin_repeat(state: &mut State, pair: PairId) {
 pub(in crate::app) fn end_repeats(state: &mut State) {
     let shown = state.pair_name().to_owned();
     let doc = &mut state.document;
-    let over = |name: &&String| {
-        !matches!(doc.review(name), Review::Todo | Review::InProgress)
-            && !doc.unsaved.contains(*name)
-            && **name != shown
-    };
+    let over = |name: &&String| doc.review(name).is_judged() && !doc.unsaved.contains(*name) && **name != shown;
     let ended: Vec<String> = doc.repeats.keys().filter(over).cloned().collect();
     if ended.is_empty() {
         return;

@@ -133,6 +133,11 @@ impl Log {
     /// Adds a notice of something that was written to a place.
     pub fn saved(&mut self, text: impl Into<String>, place: PathBuf) {
         self.info(text);
+        self.place_last(place);
+    }
+
+    /// Says of the last line which place it is about.
+    pub fn place_last(&mut self, place: PathBuf) {
         if let Some(entry) = self.entries.back_mut() {
             entry.place = Some(place);
         }

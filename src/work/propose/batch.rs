@@ -9,7 +9,7 @@ use super::super::bundles::BundleInfo;
 use super::super::error::{Remark, TaskError};
 use super::super::imprint::{imprints_of, measured};
 use super::super::job::JobCx;
-use super::super::labels::{Deed, ImprintOf, ImprintSource, Labels, MaskPlace, Review};
+use super::super::labels::{Deed, ImprintOf, ImprintSource, Labels, MaskPlace};
 use super::super::models::Models;
 use super::super::predict::Generating;
 use super::super::tool::load_tool;
@@ -147,7 +147,7 @@ impl Job<'_> {
     ) -> Result<(), TaskError> {
         let Self { dataset, all, setup, models, cx } = self;
         let mut stored = all.load(name)?;
-        if !matches!(stored.review, Review::Todo | Review::InProgress) {
+        if stored.review.is_judged() {
             batch.judged += 1;
             return Ok(());
         }
