@@ -558,8 +558,8 @@ fn save_pair(state: &mut State, name: &str, mut deed: Deed, effects: &mut Vec<Ef
     deed.person = repeat.clone().or_else(|| state.known_person());
     let Some(open) = &state.library.open else { return };
     let revision = state.document.next_revision();
-    let Some(labels) = state.document.labels.get(name) else { return };
-    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels: labels.clone(), deed, repeat };
+    let Some(labels) = state.document.finished(name) else { return };
+    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels, deed, repeat };
     effects.push(Effect::SaveLabels(open.source.clone(), Box::new(save)));
     state.document.unsaved.insert(name.to_owned());
     state.document.asked.insert(name.to_owned(), revision);

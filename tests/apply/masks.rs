@@ -115,6 +115,24 @@ fn escape_gives_a_stroke_up() {
 }
 
 #[test]
+fn a_note_typed_during_a_stroke_is_written_without_the_stroke() {
+    let mut bench = bench();
+    let name = "tool_a/data_0".to_owned();
+    begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
+    bench.send(LabelsCommand::SetNote(name.clone(), "odd edge".into()));
+    bench.settle();
+    let stored = |bench: &Bench| bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    assert_eq!(stored(&bench).note, "odd edge");
+    assert!(stored(&bench).masks.is_empty(), "it may still be given up");
+    assert!(bench.state.document.own_labels()[&name].masks.is_empty());
+    assert!(bench.state.document.stroke.is_some(), "it goes on");
+    bench.send(LabelsCommand::EndStroke);
+    bench.settle();
+    assert_eq!(*stored(&bench).measured(lab::RIGHT).unwrap().mask, mask(&bench, lab::RIGHT));
+    assert_eq!(stored(&bench).note, "odd edge");
+}
+
+#[test]
 fn undo_and_redo_follow_what_is_on_screen() {
     let mut bench = bench();
     let automatic = [mask(&bench, lab::RIGHT), {

@@ -647,9 +647,15 @@ fn carry_out(bench: &mut Bench, commands: Vec<(Command, u8)>) -> Result<(), Test
     Ok(())
 }
 
+/// So many cases where `PROPTEST_CASES` says nothing, and as many times more as it says more than the usual 256.
+fn cases(few: u32) -> ProptestConfig {
+    let usual = ProptestConfig::default();
+    ProptestConfig { cases: (usual.cases * few).div_ceil(256), ..usual }
+}
+
 proptest! {
     // Each case runs its jobs for real.
-    #![proptest_config(ProptestConfig { cases: 48, ..ProptestConfig::default() })]
+    #![proptest_config(cases(48))]
 
     #[test]
     fn undoing_everything_brings_the_document_back(
@@ -679,7 +685,7 @@ proptest! {
 
 proptest! {
     // A simulated grasp registers for real: these take seconds.
-    #![proptest_config(ProptestConfig { cases: 6, ..ProptestConfig::default() })]
+    #![proptest_config(cases(6))]
 
     #[test]
     fn no_order_of_commands_panics(commands in session(command(), 40)) {

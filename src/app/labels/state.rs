@@ -146,8 +146,17 @@ pub struct Repeating {
 impl Document {
     /// Labels of the pairs looked at so far, without those that are drawn a second time.
     pub fn own_labels(&self) -> BTreeMap<String, PairLabels> {
-        let own = self.labels.iter().filter(|(name, _)| !self.repeats.contains_key(*name));
-        own.map(|(name, labels)| (name.clone(), labels.clone())).collect()
+        let own = self.labels.keys().filter(|name| !self.repeats.contains_key(*name));
+        own.filter_map(|name| Some((name.clone(), self.finished(name)?))).collect()
+    }
+
+    /// What is known about a pair, without the stroke that is still being drawn: it may be given up.
+    pub(in crate::app) fn finished(&self, name: &str) -> Option<PairLabels> {
+        let mut labels = self.labels.get(name)?.clone();
+        if let Some(stroke) = self.stroke.as_ref().filter(|stroke| stroke.pair == name) {
+            labels.put(&stroke.place, stroke.before.clone());
+        }
+        Some(labels)
     }
 
     /// Forgets the masks and poses of a pair: they are read again when it is looked at.
