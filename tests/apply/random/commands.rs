@@ -1,0 +1,590 @@
+//! Commands at random: as they come from a window, and as they come from nowhere.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::{DVec3, Mat4};
+use proptest::prelude::*;
+use proptest::sample::select;
+use proptest::strategy::Union;
+use strum::IntoEnumIterator;
+use touch2touch::app::action::{Action, Key, Shortcut};
+use touch2touch::app::adapt::AdaptPairs;
+use touch2touch::app::command::{
+    AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
+    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
+    TrainCommand, UiRequest, ViewCommand, WorkbenchCommand,
+};
+use touch2touch::app::dial::DialPairs;
+use touch2touch::app::evaluate::ScoreChoice;
+use touch2touch::app::export::{FigureForm, Output};
+use touch2touch::app::inspect::BasinColor;
+use touch2touch::app::keys::{
+    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode,
+    TouchKey,
+};
+use touch2touch::app::labels::{Review, StrokeIn3d};
+use touch2touch::app::library::{Place, Sort};
+use touch2touch::app::results::ambiguity::AmbiguityKey;
+use touch2touch::app::results::{Computed, Preview};
+use touch2touch::app::services::{Followed, Services as _};
+use touch2touch::app::settings::{
+    ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
+    SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
+};
+use touch2touch::app::tasks::Ticket;
+use touch2touch::app::train::TrainForm;
+use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};
+use touch2touch::domain::align::basin::Plane;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::diffusion::GenerateConfig;
+use touch2touch::domain::evaluation::Figure;
+use touch2touch::domain::frames::PlanarPose;
+use touch2touch::domain::grid::DepthMap;
+use touch2touch::domain::hand::{HandAxis, HandPose};
+use touch2touch::domain::label::{CleanKind, CleanUp, Layers, Paint, Sight};
+use touch2touch::domain::pose::Rejection;
+use touch2touch::domain::rig::{PadId, lab};
+use touch2touch::infer::engine::EngineChoice;
+use touch2touch::io::dataset::ToolUnit;
+use touch2touch::io::exchange::Format;
+use touch2touch::io::statistics::ShiftStatistics;
+use touch2touch::work::error::TaskError;
+use touch2touch::work::evaluate::{Evaluation, Setup};
+use touch2touch::work::export::{ExportChoice, Which};
+use touch2touch::work::figure::FigurePane;
+use touch2touch::work::import::Import;
+use touch2touch::work::job::{PreviewPicture, Progress};
+use touch2touch::work::propose::Batch;
+use touch2touch::work::queue::QueueBy;
+use touch2touch::work::subject::Subject;
+use touch2touch::work::sweep::{Dial, Setting};
+use touch2touch::work::tool::UnitSet;
+use touch2touch::work::train::TrainChoice;
+
+use super::super::answered::{adapted, swept, trained};
+use super::super::double::Double;
+
+fn position() -> impl Strategy<Value = [f32; 2]> {
+    prop_oneof![
+        8 => [-3.0f32..27.0, -3.0f32..19.0],
+        1 => Just([f32::NAN, 1.0]),
+        1 => Just([1e30, -1e30]),
+    ]
+}
+
+fn finger() -> impl Strategy<Value = PadId> {
+    prop_oneof![Just(lab::RIGHT), Just(lab::LEFT)]
+}
+
+fn any_of<T: IntoEnumIterator + Clone + std::fmt::Debug + 'static>() -> impl Strategy<Value = T> {
+    select(T::iter().collect::<Vec<_>>())
+}
+
+fn source() -> impl Strategy<Value = ImprintSource> {
+    select(vec![ImprintSource::Measured, ImprintSource::Predicted])
+}
+
+fn pair() -> impl Strategy<Value = PairId> {
+    prop_oneof![6 => 0u32..13, 1 => Just(u32::MAX)].prop_map(PairId)
+}
+
+fn touch() -> impl Strategy<Value = TouchKey> {
+    (pair(), finger()).prop_map(|(pair, finger)| PairKey { dataset: DatasetSeq(1), pair }.finger(finger))
+}
+
+fn recipe() -> impl Strategy<Value = PredictionKey> {
+    let recipe = |(touch, seed)| {
+        let config = GenerateConfig { steps: 20, seed, ..GenerateConfig::default() };
+        PredictionKey::new(touch, "gen".into(), EngineChoice::Auto, &config)
+    };
+    (touch(), 40u64..50).prop_map(recipe)
+}
+
+/// Numbers as they come from sliders, and as they come from nowhere.
+fn number() -> impl Strategy<Value = f32> {
+    prop_oneof![6 => -2.0f32..40.0, 1 => Just(f32::NAN), 1 => Just(f32::INFINITY), 1 => Just(-1e30)]
+}
+
+fn point() -> impl Strategy<Value = DVec3> {
+    [number(), number(), number()].prop_map(|p| DVec3::from(p.map(f64::from)))
+}
+
+fn section() -> impl Strategy<Value = Section> {
+    (any_of::<SectionAxis>(), number(), any::<bool>()).prop_map(|(axis, at, flipped)| Section {
+        axis,
+        at_m: f64::from(at),
+        flipped,
+    })
+}
+
+fn scene() -> impl Strategy<Value = SceneLook> {
+    (any_of::<SceneLayer>(), [number(), number(), number()], any::<bool>()).prop_map(|(layer, [a, b, c], on)| {
+        let look = LayerLook { shown: on, color: None, opacity: a, size: LayerSize::Mm(b) };
+        SceneLook { distance_m: c, eye_dome: on, ..SceneLook::default() }.with(layer, look)
+    })
+}
+
+fn subject() -> impl Strategy<Value = Subject> {
+    let texts = [
+        "measured",
+        "prediction",
+        "prediction:seed=7",
+        "prediction:bundle=gen,steps=3,shift=raw",
+        "prediction:bundle=missing",
+        "mean:seeds=2",
+        "stored",
+    ];
+    select(texts.map(|text| text.parse().expect("a subject")).to_vec())
+}
+
+fn versus() -> impl Strategy<Value = Versus> {
+    (subject(), subject(), any_of::<VersusMode>()).prop_map(|(a, b, mode)| Versus { a, b, mode })
+}
+
+fn planar() -> impl Strategy<Value = PlanarPose> {
+    point().prop_map(|p| PlanarPose { theta_rad: p.x, y_m: p.y * 1e-3, z_m: p.z * 1e-3 })
+}
+
+fn place() -> impl Strategy<Value = Place> {
+    select(vec![Place::Demo, Place::Path("missing".into()), Place::Path("elsewhere".into())])
+}
+
+fn shift() -> impl Strategy<Value = ShiftMode> {
+    any_of::<ShiftMode>()
+}
+
+fn error() -> impl Strategy<Value = TaskError> {
+    select(vec![TaskError::new("Something", "it did not work"), TaskError::cancelled("Something")])
+}
+
+fn ticket() -> impl Strategy<Value = Ticket> {
+    (0u64..12).prop_map(Ticket)
+}
+
+fn generate() -> impl Strategy<Value = GenerateSettings> {
+    (0u32..30, any::<u64>(), number(), any::<bool>(), any::<bool>()).prop_map(
+        |(steps, seed, eta, seed_locked, both)| GenerateSettings {
+            steps,
+            seed,
+            eta,
+            seed_locked,
+            both_fingers: both,
+            ..GenerateSettings::default()
+        },
+    )
+}
+
+fn mask() -> impl Strategy<Value = MaskSettings> {
+    (any_of::<MaskTool>(), any_of::<MaskSource>(), number(), number()).prop_map(|(tool, source, radius_px, percent)| {
+        let choice = MaskChoice { source, top_percent: percent, ..MaskChoice::default() };
+        MaskSettings { tool, radius_px, choice, ..MaskSettings::default() }
+    })
+}
+
+fn registration() -> impl Strategy<Value = RegistrationChoice> {
+    let rejection = prop_oneof![
+        Just(Rejection::Own),
+        (1e-4..0.02).prop_map(|m| Rejection::gate(m).unwrap()),
+        (0.0..0.8).prop_map(|share| Rejection::trim(share).unwrap()),
+    ];
+    (any_of::<Registration>(), rejection)
+        .prop_map(|(by, rejection)| RegistrationChoice::new(by, rejection).unwrap_or_else(|_| by.into()))
+}
+
+fn setting() -> impl Strategy<Value = Setting> {
+    let settings = any_of::<Dial>().prop_map(|dial| {
+        let (first, last, count) = dial.usual();
+        dial.spread(first, last, count).unwrap()
+    });
+    (settings, any::<usize>()).prop_map(|(settings, at)| settings[at % settings.len()])
+}
+
+fn shortcut() -> impl Strategy<Value = Shortcut> {
+    (any_of::<Key>(), any::<[bool; 3]>()).prop_map(|(key, [ctrl, shift, alt])| Shortcut { ctrl, shift, alt, key })
+}
+
+fn form() -> impl Strategy<Value = FigureForm> {
+    let panes = proptest::collection::vec(any_of::<FigurePane>(), 0..9);
+    (proptest::option::of(any::<usize>()), panes, any::<u8>(), number())
+        .prop_map(|(first, panes, scale, error_m)| FigureForm { first, panes, scale, error_m, ..FigureForm::default() })
+}
+
+fn mask_choice() -> impl Strategy<Value = ExportChoice> {
+    let flags = (any_of::<Which>(), any::<[bool; 3]>(), any::<u64>(), any_of::<Format>());
+    flags.prop_map(|(which, [test_in_train, by_tool, hand_checked], seed, format)| ExportChoice {
+        which,
+        test_in_train,
+        by_tool,
+        hand_checked,
+        seed,
+        format,
+    })
+}
+
+fn output() -> impl Strategy<Value = Output> {
+    let picture = (any_of::<Pane>(), proptest::option::of(any::<u8>()), number());
+    prop_oneof![
+        Just(Output::Figure),
+        Just(Output::Case),
+        Just(Output::Masks),
+        source().prop_map(Output::Pair),
+        picture.prop_map(|(pane, scale, error_m)| Output::Picture { pane, scale, error_m }),
+    ]
+}
+
+fn statistics() -> ShiftStatistics {
+    let text = r#"{"format": "", "version": 1, "bundle": "gen", "bundle_hash": "gen", "dataset": "Double", "seed": 0,
+        "steps": 20, "sampler": "ddim", "eta": 0.0, "engine": "double", "scale": "assumed", "made": "", "touches": 2,
+        "predicted_pixels": 9, "measured_pixels": 9, "left_out": [0, 0], "extremes_m": [[0.0, 1.0], [0.0, 1.0]],
+        "stats": {"pred_mean": 0.1, "pred_std": 0.1, "gt_mean": 0.1, "gt_std": 0.1}}"#;
+    serde_json::from_str(text).expect("the statistics are whole")
+}
+
+fn evaluation() -> Evaluation {
+    Evaluation {
+        dataset: "Double".into(),
+        rows: Vec::new(),
+        groups: Vec::new(),
+        conventions: "",
+        notes: Vec::new(),
+        findings: Vec::new(),
+        skipped: Vec::new(),
+        complete: true,
+        setup: Setup::default(),
+        runtime: String::new(),
+        scores: Default::default(),
+        seconds: 0.0,
+    }
+}
+
+/// A number of an opening that never was.
+const NEVER: DatasetSeq = DatasetSeq(u32::MAX);
+
+fn followed() -> Followed {
+    let source = Double::new(false, true).source;
+    Followed { source, pair: PairId(0), completed: false, sample: Err(TaskError::new("Load", "it is half written")) }
+}
+
+/// One way to draw each command of a room, with its weight. A command that is not drawn does not compile.
+macro_rules! draws {
+    ($( $name:ident: $command:ident { $( $weight:literal $variant:ident $(($($each:expr),+))?, )* } )*) => {
+        $( fn $name() -> impl Strategy<Value = Command> {
+            let all = |command: &$command| match command { $( $command::$variant { .. } => {} )* };
+            let ways = vec![ $( ($weight, draws!(one $command $variant $($($each),+)?)), )* ];
+            Union::new_weighted(ways).prop_map(move |command| {
+                all(&command);
+                command.into()
+            })
+        } )*
+    };
+    (one $command:ident $variant:ident) => { Just($command::$variant).boxed() };
+    (one $command:ident BeginStroke $a:expr, $b:expr, $c:expr, $d:expr) => {
+        ($a, $b, $c, $d)
+            .prop_map(|(finger, source, at_px, erase)| $command::BeginStroke { finger, source, at_px, erase })
+            .boxed()
+    };
+    (one $command:ident ReadToolAs $a:expr, $b:expr, $c:expr) => {
+        ($a, $b, $c).prop_map(|(tool, unit, replacing)| $command::ReadToolAs { tool, unit, replacing }).boxed()
+    };
+    (one $command:ident BindKey $a:expr, $b:expr, $c:expr) => {
+        ($a, $b, $c).prop_map(|(action, place, shortcut)| $command::BindKey { action, place, shortcut }).boxed()
+    };
+    (one $command:ident Go $a:expr, $b:expr) => { ($a, $b).prop_map(|(run, at)| $command::Go { run, at }).boxed() };
+    (one $command:ident $variant:ident $a:expr) => { $a.prop_map($command::$variant).boxed() };
+    (one $command:ident $variant:ident $a:expr, $b:expr) => {
+        ($a, $b).prop_map(|(a, b)| $command::$variant(a, b)).boxed()
+    };
+    (one $command:ident $variant:ident $a:expr, $b:expr, $c:expr) => {
+        ($a, $b, $c).prop_map(|(a, b, c)| $command::$variant(a, b, c)).boxed()
+    };
+    (one $command:ident $variant:ident $a:expr, $b:expr, $c:expr, $d:expr) => {
+        ($a, $b, $c, $d).prop_map(|(a, b, c, d)| $command::$variant(a, b, c, d)).boxed()
+    };
+}
+
+draws! {
+    library: LibraryCommand {
+        1 Open(place()),
+        1 Reload,
+        1 ForgetRecent(place()),
+        1 ReadToolAs(Just("tool_a".to_owned()), any_of::<ToolUnit>(), proptest::option::of(Just("in".to_owned()))),
+        1 SetFilter(select(vec![String::new(), "tool_a".into(), "is:todo".into(), "angle>5".into(), "nothing like it".into()])),
+        1 SetToolFilter(proptest::option::of(Just("tool_b".to_owned()))),
+        1 SetSort(any_of::<Sort>()),
+        1 SetScore((any::<bool>(), proptest::option::of(any_of::<Figure>())).prop_map(|(best_first, figure)| ScoreChoice {
+            figure,
+            best_first,
+            ..ScoreChoice::default()
+        })),
+        1 Brush(proptest::option::of(pair().prop_map(|pair| Arc::new([pair].into())))),
+        1 ShowRows((0usize..20, 0usize..40).prop_map(|(a, b)| a..b)),
+        4 Select(pair()),
+        1 Step(any::<i64>()),
+        1 First,
+        1 Last,
+        1 NextUnfinished,
+        1 NextWorst,
+        1 NextUncertain,
+        1 SetUncertainBy(any_of::<QueueBy>()),
+        1 DoneAndNext,
+    }
+    follow: FollowCommand {
+        1 Set(any::<bool>()),
+    }
+    view: ViewCommand {
+        3 SelectFinger(finger()),
+        1 SelectImprint(source()),
+        3 Propose(any::<bool>()),
+        2 ShowInfluence(any::<bool>()),
+        1 ShowLens(any::<bool>()),
+        2 ShowBothFingers(any::<bool>()),
+        1 HoverPixel(proptest::option::of((finger(), position()).prop_map(|(finger, at_px)| Hover { finger, at_px }))),
+        1 HoverPoint(proptest::option::of(point())),
+        2 ShowPanes(proptest::collection::btree_set(any_of::<Pane>(), 0..22)),
+        1 SetPalette(any::<bool>()),
+        1 SetShortcutSheet(any::<bool>()),
+        1 Ui(select(vec![UiRequest::Fit, UiRequest::Camera(CameraPreset::Top)])),
+    }
+    predict: PredictCommand {
+        3 Generate,
+        2 GenerateNewSeed,
+        1 Refit,
+        1 Choose(recipe()),
+    }
+    seeds: SeedsCommand {
+        1 Count(0usize..4),
+        1 Run(any::<bool>()),
+        1 EveryPair(any::<bool>()),
+    }
+    labels: LabelsCommand {
+        6 BeginStroke(finger(), source(), position(), any::<bool>()),
+        4 BeginIn3d((finger(), source(), position(), point(), any::<bool>()).prop_map(|(finger, source, at_px, size_at, erase)| {
+            let sight = Sight { clip_from_grasp: Mat4::IDENTITY, size_px: [64, 48], layers: Layers::All, cut: Vec::new() };
+            Box::new(StrokeIn3d { finger, source, sight, at_px, size_at, erase })
+        })),
+        6 StrokeTo(position()),
+        6 EndStroke,
+        1 CancelStroke,
+        2 Corner(position()),
+        4 CleanUp((any_of::<CleanKind>(), number()).prop_map(|(kind, size)| CleanUp { kind, size_mm: size.into() })),
+        2 AdoptAutomatic,
+        1 TakeOver,
+        3 AcceptProposal,
+        1 ProposeAll,
+        1 ResetMask,
+        3 Undo,
+        3 Redo,
+        2 SetReview(any_of::<Review>()),
+        1 SetNote(select(vec!["tool_a/data_0".to_owned(), "no such pair".into()]), select(vec![String::new(), " odd\n edge ".into(), "x".repeat(3000)])),
+        1 AcceptPose(source(), any::<bool>()),
+        1 Save,
+    }
+    inspect: InspectCommand {
+        1 Source(source()),
+        1 Start(proptest::option::of(planar())),
+        1 Run(0usize..4),
+        1 Go(0usize..4, 0usize..100),
+        1 By(any::<i64>()),
+        1 Begin,
+        1 End,
+        1 Play(any::<bool>()),
+        1 Pin,
+        1 Unpin(0usize..4),
+        1 Lines(any::<bool>()),
+        1 Plane(any_of::<Plane>()),
+        1 Color(any_of::<BasinColor>()),
+        1 StopBasin,
+    }
+    workbench: WorkbenchCommand {
+        1 SetLayer(any_of::<Layer>()),
+        1 SetAnimateWeakest(any::<bool>()),
+        1 SetBothClouds(any::<bool>()),
+        1 SetSection(proptest::option::of(section())),
+        3 SetTool(any_of::<SceneTool>()),
+        1 SetSixDof(any::<bool>()),
+        1 SetSide(source()),
+        1 Nudge(any_of::<HandAxis>(), number().prop_map(f64::from)),
+        1 SetHandPose(planar().prop_map(HandPose::from)),
+        1 StartIcp,
+        1 AcceptHand,
+        1 RevertHand,
+        1 Pick(proptest::option::of((source(), finger(), any::<[u16; 2]>())
+            .prop_map(|(source, finger, pixel)| Picked { source, finger, pixel }))),
+        1 Mark(source(), point()),
+        1 ClearMarks,
+    }
+    evaluate: EvaluateCommand {
+        1 Choose(Just(Arc::from("gen")), any::<bool>()),
+        1 Grasps(proptest::option::of(0usize..3)),
+        1 Published(any::<bool>()),
+        1 Start,
+        1 All,
+        1 Rank,
+        1 Export(Just(PathBuf::from("table"))),
+    }
+    dial: DialCommand {
+        1 Choose(any_of::<Dial>()),
+        1 Range([number(), number()].prop_map(|ends| ends.map(f64::from)), any::<usize>()),
+        1 Over(select(DialPairs::OFFERED.to_vec())),
+        1 Predictions(any::<bool>()),
+        2 Start,
+        2 Use(setting()),
+    }
+    export: ExportCommand {
+        1 Ask(any::<bool>()),
+        1 SetForm(form()),
+        1 AskMasks(any::<bool>()),
+        1 SetMasks(mask_choice()),
+        1 AskImport(select(vec![None, Some(PathBuf::from("no/such/folder"))])),
+        1 ImportOverHand(any::<bool>()),
+        1 Import,
+        1 Place(output()),
+        1 OwnPreferences,
+        1 WriteCase(Just(PathBuf::from("no/such/folder/a.t2tcase")), Just(String::new())),
+        1 Write(output(), Just(PathBuf::from("no/such/folder/picture.png"))),
+    }
+    adapt: AdaptCommand {
+        1 Choose(any_of::<AdaptPairs>()),
+        1 Tune(any::<bool>()),
+        1 Steps(any::<u32>()),
+        1 Start,
+        1 Use,
+    }
+    train: TrainCommand {
+        1 SetForm((any::<bool>(), any::<u32>(), any::<u8>(), any::<u64>()).prop_map(|(by_steps, n, held_out_percent, seed)| {
+            TrainForm { choice: TrainChoice { held_out_percent, seed, test_in_train: by_steps }, by_steps, minutes: n, steps: n }
+        })),
+        1 Start,
+        1 Use,
+    }
+    settings: SettingsCommand {
+        1 SetTheme(any_of::<Theme>()),
+        1 SetUiZoom(number()),
+        1 SetRange((number(), number(), any::<bool>())
+            .prop_map(|(min_m, max_m, locked)| ColorRange { min_m, max_m, locked })),
+        1 RangeFromShown,
+        1 SetColorMap(any_of::<ColorMap>()),
+        1 SetShift(shift()),
+        1 SetGenerate(generate()),
+        1 SetMask(mask()),
+        4 SetMaskTool(any_of::<MaskTool>()),
+        1 LastMaskTool,
+        3 SetPaint(any_of::<Paint>()),
+        2 SetMaskSource(any_of::<MaskSource>()),
+        1 SetBrushRadius(number()),
+        1 SetMaskVisible(any::<bool>()),
+        1 SetMaskOutline(any::<bool>()),
+        1 SetMaskOpacity(number()),
+        1 SetFootprintVisible(any::<bool>()),
+        1 SetGhosts(any::<bool>()),
+        1 SetPoseEngine(registration()),
+        1 SetRuntime(any_of::<EngineChoice>()),
+        1 SetPerson(select(vec![String::new(), " Anna ".into(), "x".repeat(200)])),
+        1 SetRepeats(number()),
+        1 SetCacheBudget(any::<u32>()),
+        1 SetCamerasLinked(any::<bool>()),
+        1 SetScene(scene()),
+        1 SetVersus(versus()),
+        1 SetWorkspace(any_of::<Workspace>()),
+        1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
+        1 BindKey(any_of::<Action>(), 0usize..4, proptest::option::of(shortcut())),
+        1 ResetKeys(proptest::option::of(any_of::<Action>())),
+        1 DismissHint,
+        1 Remember(Just(Last { pair: "nowhere".into(), finger: 7, ..Last::default() })),
+        1 ResetSettings,
+    }
+    tasks: TasksCommand {
+        2 Cancel(ticket()),
+        1 CancelAll,
+        1 Retry,
+        1 LogSeen(any::<u64>()),
+        1 Report(error()),
+        1 Notice(Just("Something".to_owned())),
+        1 Saved(Just("Something".to_owned()), Just(PathBuf::from("no/such/folder"))),
+        1 Reveal(Just(PathBuf::from("no/such/folder"))),
+    }
+    // Answers that nobody waits for, or that come too late.
+    answers: Answer {
+        1 Followed(Just(NEVER), Just(()).prop_map(|()| followed())),
+        1 Opened(ticket(), Just(NEVER), place(), Just(()).prop_map(|()| {
+            Double::new(false, true).open(&Place::Demo).expect("the double opens")
+        })),
+        1 UnitSet(ticket(), select(vec![DatasetSeq(1), NEVER]), Just(()).prop_map(|()| UnitSet {
+            tool: "tool_a".into(),
+            unit: ToolUnit::Millimeters,
+            file: "unit.txt".into(),
+            word: "mm".into(),
+            not_written: None,
+        })),
+        1 Bundles(Just(()).prop_map(|()| Double::new(false, true).find_bundles(&[]).0), Just(Vec::new())),
+        1 SettingsLoaded(mask().prop_map(|mask| Box::new(Settings { mask, ..Settings::default() })), Just(None)),
+        1 Demanded(touch().prop_map(|touch| vec![Request::Sample(touch.pair)])),
+        1 Computed(select(vec![DatasetSeq(1), NEVER]),
+            touch().prop_map(|touch| Computed::Ambiguity(AmbiguityKey(touch), Arc::new(None)))),
+        1 Generated(ticket(), Just(Vec::new())),
+        1 Previewed(ticket(), recipe().prop_map(|recipe| {
+            Arc::new(Preview { recipe, picture: PreviewPicture { step: 1, of: 2, depth: DepthMap::filled(2, 2, 0.0) } })
+        })),
+        1 Refitted(ticket(), Just(()).prop_map(|()| Box::new(statistics())), Just(None)),
+        1 Progressed(ticket(), Just(Progress { done: 3, total: 4, text: "step".into(), ..Progress::default() })),
+        1 Finished(ticket(), Just(None)),
+        1 Saved(ticket(), Just("Something".to_owned()), Just(PathBuf::from("no/such/folder"))),
+        1 Revealed,
+        1 TaskFailed(ticket(), error()),
+        1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Request::Sample(t.pair)), error()),
+        1 LabelsSaved(Just("tool_a/data_0".to_owned()), Just(Revision(u64::MAX)), Just(None)),
+        1 SettingsSaved,
+        1 JobFailed(error()),
+        1 Evaluated(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(evaluation()))),
+        1 Swept(ticket(), Just(()).prop_map(|()| Arc::new(swept()))),
+        1 ProposedAll(ticket(), select(vec!["tool_a/data_0", "elsewhere"]).prop_map(|name| {
+            Box::new(Batch { masks: 1, changed: vec![name.to_owned()], ..Batch::default() })
+        })),
+        1 Imported(ticket(), select(vec!["tool_a/data_0", "elsewhere"]).prop_map(|name| {
+            Box::new(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
+        })),
+        1 Adapted(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(adapted())), Just(None)),
+        1 Trained(ticket(), Just(()).prop_map(|()| Arc::new(trained())), Just(()).prop_map(|()| {
+            Box::new(Double::new(false, true).find_bundles(&[]).0.remove(1))
+        })),
+    }
+}
+
+/// Any command, of every room, with every answer.
+pub(super) fn command() -> impl Strategy<Value = Command> {
+    let ways = vec![
+        (6, library().boxed()),
+        (1, follow().boxed()),
+        (6, view().boxed()),
+        (4, predict().boxed()),
+        (2, seeds().boxed()),
+        (36, labels().boxed()),
+        (3, inspect().boxed()),
+        (4, workbench().boxed()),
+        (2, evaluate().boxed()),
+        (2, dial().boxed()),
+        (1, export().boxed()),
+        (1, adapt().boxed()),
+        (1, train().boxed()),
+        (8, settings().boxed()),
+        (2, tasks().boxed()),
+        (3, answers().boxed()),
+    ];
+    Union::new_weighted(ways).prop_map(|command: Command| {
+        // A room that is not among the ways above does not compile.
+        match command {
+            Command::Library(_) | Command::Follow(_) | Command::View(_) | Command::Predict(_) | Command::Seeds(_) => {}
+            Command::Labels(_)
+            | Command::Inspect(_)
+            | Command::Workbench(_)
+            | Command::Evaluate(_)
+            | Command::Dial(_)
+            | Command::Export(_)
+            | Command::Adapt(_)
+            | Command::Train(_) => {}
+            Command::Settings(_) | Command::Tasks(_) | Command::Answer(_) => {}
+        }
+        command
+    })
+}
