@@ -89,6 +89,7 @@ fn how(action: Action) -> How {
         A::FillHoles => Verb(&["label", "demo", "--pair", "a", "--clean", "fill_holes"]),
         A::LargestIsland => Verb(&["label", "demo", "--pair", "a", "--clean", "largest_island"]),
         A::ClearBorder => Verb(&["label", "demo", "--pair", "a", "--clean", "clear_border"]),
+        A::ClearMask => Verb(&["label", "demo", "--pair", "a", "--clean", "clear"]),
         A::DropSmall => Verb(&["label", "demo", "--pair", "a", "--clean", "drop_small=1"]),
         A::OpenMask => Verb(&["label", "demo", "--pair", "a", "--clean", "open=1"]),
         A::CloseMask => Verb(&["label", "demo", "--pair", "a", "--clean", "close=1"]),

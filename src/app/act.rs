@@ -176,6 +176,7 @@ impl Action {
             Self::GrowMask => clean_up(CleanKind::Grow),
             Self::ShrinkMask => clean_up(CleanKind::Shrink),
             Self::ClearBorder => clean_up(CleanKind::ClearBorder),
+            Self::ClearMask => clean_up(CleanKind::Clear),
             Self::AdoptAutomatic => when(editable, LabelsCommand::AdoptAutomatic),
             Self::TakeOver => when(editable, LabelsCommand::TakeOver),
             Self::ResetMask => {

@@ -148,6 +148,7 @@ actions! {
     GrowMask, Mask, "Grow the mask", "Adds what lies within the clean-up size", [];
     ShrinkMask, Mask, "Shrink the mask", "Removes what lies within the clean-up size of the outside", [];
     ClearBorder, Mask, "Clear the border", "Removes islands that touch the edge of the image", [];
+    ClearMask, Mask, "Clear the mask", "Leaves no contact in the mask, to draw it anew", [plain(K::Delete)];
     AdoptAutomatic, Mask, "Threshold to mask", "Makes the mask of the chosen automatic source the corrected one", [plain(K::T)];
     Propose, Mask, "Propose a mask", "Shows the mask of the chosen source over the one in force, to accept or to let through by brush; nothing changes before", [plain(K::G)];
     NextProposal, Mask, "Next proposal source", "Goes through what proposes masks: the automatic source, CAD distance, strokes, other masks", [shift(K::G)];
@@ -278,7 +279,8 @@ impl Action {
             Self::Propose | Self::NextProposal | Self::ProposeAll => "prelabel batch pre-label suggest auto cad",
             Self::Accept => "confirm take yes",
             Self::TakeOver => "copy mask across measured predicted",
-            Self::ResetMask => "clear delete mask",
+            Self::ResetMask => "delete mask automatic again",
+            Self::ClearMask => "delete erase empty nothing start over reset",
             Self::Undo => "revert back",
             Self::Influence => "leverage sensitivity heat map pose pixels important",
             Self::Ghosts => "ghost previous before undo compare",

@@ -53,7 +53,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             }
             note(cx, ui, memory);
             clean_ups(cx, ui);
-            look(cx, ui);
+            opacity(cx, ui);
             stats::show(cx, ui);
         });
     });
@@ -86,6 +86,16 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
     paints(cx, ui);
     in_3d(cx, ui);
     gate(cx, ui);
+    overlay(cx, ui);
+}
+
+/// A button for an action that turns something on or off.
+fn action_switch(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, on: bool) {
+    let possible = action.command(cx.state).is_some();
+    let button = ui.add_enabled(possible, egui::Button::selectable(on, text)).accessible_name(action.name());
+    if button.on_hover_text(cx.keys().help(action)).clicked() {
+        cx.act(action);
+    }
 }
 
 /// Drawing on the points of the 3D views, and what that reaches.
@@ -94,11 +104,7 @@ fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(caption("In 3D", cx.p));
         let on = cx.state.workbench.tool == SceneTool::Paint;
-        let possible = Action::PaintIn3d.command(cx.state).is_some();
-        let button = ui.add_enabled(possible, egui::Button::selectable(on, "draw"));
-        if button.accessible_name(Action::PaintIn3d.name()).on_hover_text(cx.keys().help(Action::PaintIn3d)).clicked() {
-            cx.act(Action::PaintIn3d);
-        }
+        action_switch(cx, ui, Action::PaintIn3d, "draw", on);
         let now = cx.state.settings.mask.layers;
         for (layers, text) in [(Layers::Front, "front-most"), (Layers::All, "all layers")] {
             let button = ui.add(egui::Button::selectable(now == layers, text));
@@ -329,10 +335,10 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 4.0;
         cx.action_button(ui, Action::AdoptAutomatic, "Take automatic");
         cx.action_button(ui, Action::TakeOver, "Other's mask");
-        cx.action_button(ui, Action::ResetMask, "Remove");
     });
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
+        cx.action_button(ui, Action::ResetMask, "Remove");
         let (name, shown) = (cx.state.pair_name(), cx.state.mask_places());
         let undo = cx.state.history.next_undo(name, &shown).map(|g| g.name.clone());
         let redo = cx.state.history.next_redo(name, &shown).map(|g| g.name.clone());
@@ -395,6 +401,7 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
             (Action::FillHoles, "Fill holes"),
             (Action::LargestIsland, "Largest"),
             (Action::ClearBorder, "No border"),
+            (Action::ClearMask, "Clear"),
             (Action::DropSmall, "Drop small"),
             (Action::OpenMask, "Open"),
             (Action::CloseMask, "Close"),
@@ -469,38 +476,29 @@ fn note(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     response.on_hover_text(tip);
 }
 
-fn look(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.add_space(2.0);
-    ui.label(section("Overlay", cx.p));
+/// What lies over the imprints.
+fn overlay(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let (settings, selection) = (&cx.state.settings, &cx.state.selection);
+    let switches = [
+        (Action::MaskVisible, "mask", settings.mask_visible),
+        (Action::MaskOutline, "outline", settings.mask_outline),
+        (Action::Ghosts, "before", settings.ghosts),
+        (Action::Influence, "influence", selection.influence),
+        (Action::Lens, "lens", selection.lens),
+        (Action::Footprint, "GelSlim window", settings.footprint_visible),
+    ];
     ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 6.0;
-        let settings = &cx.state.settings;
-        let mut visible = settings.mask_visible;
-        if ui.checkbox(&mut visible, "mask").on_hover_text(cx.keys().help(Action::MaskVisible)).changed() {
-            cx.push(SettingsCommand::SetMaskVisible(visible));
-        }
-        let mut outline = settings.mask_outline;
-        if ui.checkbox(&mut outline, "outline").on_hover_text(cx.keys().help(Action::MaskOutline)).changed() {
-            cx.push(SettingsCommand::SetMaskOutline(outline));
-        }
-        let mut ghosts = settings.ghosts;
-        if ui.checkbox(&mut ghosts, "before").on_hover_text(cx.keys().help(Action::Ghosts)).changed() {
-            cx.push(SettingsCommand::SetGhosts(ghosts));
-        }
-        let mut influence = cx.state.selection.influence;
-        if ui.checkbox(&mut influence, "influence").on_hover_text(cx.keys().help(Action::Influence)).changed() {
-            cx.push(ViewCommand::ShowInfluence(influence));
-        }
-        let mut lens = cx.state.selection.lens;
-        if ui.checkbox(&mut lens, "lens").on_hover_text(cx.keys().help(Action::Lens)).changed() {
-            cx.push(ViewCommand::ShowLens(lens));
-        }
-        let mut footprint = settings.footprint_visible;
-        if ui.checkbox(&mut footprint, "GelSlim window").on_hover_text(cx.keys().help(Action::Footprint)).changed() {
-            cx.push(SettingsCommand::SetFootprintVisible(footprint));
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        ui.label(caption("Show", cx.p));
+        for (action, text, on) in switches {
+            action_switch(cx, ui, action, text, on);
         }
     });
+}
+
+fn opacity(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
+        ui.label(caption("Opacity", cx.p));
         let mut opacity = cx.state.settings.mask_opacity;
         ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
         let response =

@@ -43,6 +43,8 @@ pub enum CleanKind {
     Shrink,
     /// Removes islands that touch the edge of the image.
     ClearBorder,
+    /// Leaves nothing: to begin anew.
+    Clear,
 }
 
 impl CleanKind {
@@ -63,12 +65,13 @@ impl CleanKind {
             Self::Grow => "Grow",
             Self::Shrink => "Shrink",
             Self::ClearBorder => "Clear border",
+            Self::Clear => "Clear",
         }
     }
 
     /// Whether it has a size.
     pub fn is_sized(self) -> bool {
-        !matches!(self, Self::FillHoles | Self::LargestIsland | Self::ClearBorder)
+        !matches!(self, Self::FillHoles | Self::LargestIsland | Self::ClearBorder | Self::Clear)
     }
 }
 
@@ -110,6 +113,7 @@ impl CleanUp {
             CleanKind::Grow => grow(mask, px),
             CleanKind::Shrink => shrink(mask, px),
             CleanKind::ClearBorder => clear_border(mask),
+            CleanKind::Clear => mask.map(|_| false),
         }
     }
 }
@@ -201,6 +205,7 @@ mod tests {
         assert!(smooth[(25, 20)] && !smooth[(42, 20)] && !smooth[(50, 5)]);
         let border = clean(CleanKind::ClearBorder, 0.0, &scene);
         assert!(!border[(58, 35)] && border[(25, 12)] && border[(50, 5)]);
+        assert_eq!(count(&clean(CleanKind::Clear, 0.0, &scene)), 0);
         assert!(count(&clean(CleanKind::Grow, 1.0, &scene)) > count(&scene));
         assert!(count(&clean(CleanKind::Shrink, 1.0, &scene)) < count(&scene));
     }

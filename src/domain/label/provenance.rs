@@ -138,8 +138,12 @@ impl Provenance {
             Self::TopPercent { percent } => format!("Top {percent:.1} %"),
             Self::Cad { within_m, at: CadPose::Truth } => format!("CAD within {}", text_mm((*within_m).into())),
             Self::Cad { within_m, at } => format!("CAD within {} at {}", text_mm((*within_m).into()), at.text()),
-            Self::Model { name, probability: None, .. } => format!("UNet {name}"),
-            Self::Model { name, probability: Some(least), .. } => format!("UNet {name}, probability {least}"),
+            Self::Model { name, probability, .. } => {
+                // Many models have it in their names.
+                let kind = if name.contains("UNet") { "" } else { "UNet " };
+                let least = probability.map_or(String::new(), |least| format!(", probability {least}"));
+                format!("{kind}{name}{least}")
+            }
             Self::Truth => "Simulator truth".into(),
             Self::Flat => "No contact: the imprint is flat".into(),
             Self::Depth { min_m, instead_of } => {

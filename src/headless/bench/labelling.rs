@@ -212,13 +212,14 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
 
 /// A scripted person for each way to begin: what is in force is taken over by a key where it is right, a proposal is shown
 /// and accepted by two, and where it was proposed for all pairs at once, by none.
-const WAYS: [(&str, Option<&str>, [usize; 2]); 6] = [
+const WAYS: [(&str, Option<&str>, [usize; 2]); 7] = [
     ("nothing", None, [0, 0]),
     ("threshold", Some("threshold"), [0, 1]),
     ("mask model", Some("mask model"), [0, 1]),
     ("CAD at the true pose", Some("CAD at the true pose"), [2, 0]),
     ("CAD at the true pose, for all at once", Some("CAD at the true pose"), [0, 0]),
     ("another grasp's mask, carried", Some("carried from another grasp"), [2, 0]),
+    ("another grasp's mask, carried, for all at once", Some("carried from another grasp"), [0, 0]),
 ];
 
 /// Who corrects the masks of each of [`WAYS`].

@@ -75,8 +75,8 @@ pub(in super::super) struct LabelArgs {
     /// The pair whose mask is carried; else the nearest one before of the same tool that somebody worked on.
     #[arg(long, value_name = "PAIR", requires = "propose")]
     pub(super) carry_from: Option<String>,
-    /// Clean the mask up: `fill_holes`, `largest_island`, `clear_border`, or with a size in millimeters `drop_small=MM`,
-    /// `open=MM`, `close=MM`, `smooth=MM`, `grow=MM`, `shrink=MM`. Several are done in turn.
+    /// Clean the mask up: `fill_holes`, `largest_island`, `clear_border`, `clear`, or with a size in millimeters
+    /// `drop_small=MM`, `open=MM`, `close=MM`, `smooth=MM`, `grow=MM`, `shrink=MM`. Several are done in turn.
     #[arg(long, value_name = "WHAT[=MM]", requires = "pair", conflicts_with = "remove_mask", value_parser = parse_clean_up)]
     pub(super) clean: Vec<CleanUp>,
     /// Draw on the mask: `{"tool": "lasso", "paint": "contact", "points": [[X, Y], ...]}` in image pixels; tools are

@@ -42,12 +42,14 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.action_button(ui, Action::Accept, "Accept");
             let tip = "Accepting replaces what was painted by hand as well; off, hand work stays";
             ui.checkbox(&mut new.over_hand, "over hand work").on_hover_text(tip);
+        } else {
+            for_all(cx, ui);
         }
     });
     if cx.state.proposes() {
         said(cx, ui);
+        for_all(cx, ui);
     }
-    for_all(cx, ui);
     if new != *settings {
         cx.push(SettingsCommand::SetMask(new));
     }

@@ -1,7 +1,8 @@
 //! What a mask takes a person: pre-labeled grasps corrected by a scripted one, for each way to begin.
 //!
 //! The person knows the true contact, and of all that hands can do next takes what mends most: a clean-up by key or button
-//! (at the size that is set, 1 mm), or a line around what is missing or too much, drawn with [`JITTER_PX`] of unsteadiness.
+//! (at the size that is set, 1 mm), a line around what is missing or too much, drawn with [`JITTER_PX`] of unsteadiness, or
+//! a key that clears the mask and a line around the whole contact.
 //! Times are those of the keystroke-level model (Card, Moran and Newell 1980) and of following an outline, besides what the
 //! program itself takes.
 
@@ -96,8 +97,8 @@ pub(super) struct Person {
 
 /// Something that hands can do next.
 struct Move {
-    /// A line around a region, or a clean-up.
-    does: Does,
+    /// What is done in turn.
+    does: Vec<Does>,
     actions: usize,
     seconds: f64,
 }
@@ -107,12 +108,21 @@ enum Does {
     Clean(CleanUp),
 }
 
-impl Does {
+impl Move {
+    /// This, and another one after it.
+    fn then(self, next: Move) -> Self {
+        let does = self.does.into_iter().chain(next.does).collect();
+        // It is decided once for both.
+        Self { does, actions: self.actions + next.actions, seconds: self.seconds + next.seconds - DECIDE_S }
+    }
+
     fn on(&self, hand: &mut HandMask, imprint: &DepthMap, rig: &Rig) {
-        match self {
-            Self::Draw(drawing) => hand.draw(drawing, Ground::new(imprint), Provenance::hand("script")),
-            Self::Clean(clean_up) => {
-                hand.clean(*clean_up, rig);
+        for does in &self.does {
+            match does {
+                Does::Draw(drawing) => hand.draw(drawing, Ground::new(imprint), Provenance::hand("script")),
+                Does::Clean(clean_up) => {
+                    hand.clean(*clean_up, rig);
+                }
             }
         }
     }
@@ -141,13 +151,13 @@ impl Person {
             }
             let Some((step, after)) = self.best(&hand, took.iou, truth, imprint) else { break };
             let start = Instant::now();
-            step.does.on(&mut hand, imprint, &self.rig);
+            step.on(&mut hand, imprint, &self.rig);
             let packed = serde_json::to_vec(&hand.pack()).map_or(0, |bytes| bytes.len());
             took.own_ms += start.elapsed().as_secs_f64() * 1e3;
             log::debug!("{:.3} -> {after:.3}, {packed} bytes", took.iou);
-            let draws = matches!(step.does, Does::Draw(_));
-            self.lasso |= draws;
-            took.strokes += usize::from(draws);
+            let strokes = step.does.iter().filter(|does| matches!(does, Does::Draw(_))).count();
+            self.lasso |= strokes > 0;
+            took.strokes += strokes;
             took.actions += step.actions;
             took.seconds += step.seconds;
             took.iou = after;
@@ -166,9 +176,10 @@ impl Person {
         const LEAST: f64 = 1e-3;
         let mut moves: Vec<Move> = CleanKind::iter().map(clean_up).collect();
         moves.extend(self.lines(&hand.mask, truth));
+        moves.extend(self.anew(truth));
         let tried = moves.into_iter().filter_map(|step| {
             let mut after = hand.clone();
-            step.does.on(&mut after, imprint, &self.rig);
+            step.on(&mut after, imprint, &self.rig);
             let after = iou(&after.mask, truth);
             (after > now + LEAST).then_some((step, after))
         });
@@ -194,18 +205,26 @@ impl Person {
                 // The whole contact anew, in one line.
                 regions.extend(largest(&harmless, &wrong));
             }
-            for region in regions {
-                let Some(line) = path(&region) else { continue };
-                let length: f64 =
-                    line.windows(2).map(|p| f64::from((p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1]))).sum();
-                let points = line.iter().map(|p| p.map(|v| v + JITTER_PX * self.normal())).collect();
-                let drawing = Drawing { tool: DrawTool::Lasso, points, paint, sight: None };
-                let key = usize::from(!self.lasso);
-                let seconds = DECIDE_S + POINT_S + 2.0 * BUTTON_S + length / TRACE_PX_PER_S + key as f64 * KEY_S;
-                found.push(Move { does: Does::Draw(drawing), actions: 1 + key, seconds });
-            }
+            found.extend(regions.iter().filter_map(|region| self.around(region, paint)));
         }
         found
+    }
+
+    /// The mask cleared, and a line around the largest part of the contact.
+    fn anew(&mut self, truth: &Mask) -> Option<Move> {
+        let whole = largest(truth, truth).into_iter().next()?;
+        Some(clean_up(CleanKind::Clear).then(self.around(&whole, Paint::Contact)?))
+    }
+
+    /// A line around a region; `None` for an empty one.
+    fn around(&mut self, region: &Mask, paint: Paint) -> Option<Move> {
+        let line = path(region)?;
+        let length: f64 = line.windows(2).map(|p| f64::from((p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1]))).sum();
+        let points = line.iter().map(|p| p.map(|v| v + JITTER_PX * self.normal())).collect();
+        let drawing = Drawing { tool: DrawTool::Lasso, points, paint, sight: None };
+        let key = usize::from(!self.lasso);
+        let seconds = DECIDE_S + POINT_S + 2.0 * BUTTON_S + length / TRACE_PX_PER_S + key as f64 * KEY_S;
+        Some(Move { does: vec![Does::Draw(drawing)], actions: 1 + key, seconds })
     }
 
     /// Nearly normal, of standard deviation 1: the sum of four uniform numbers.
@@ -232,11 +251,11 @@ impl Person {
     }
 }
 
-/// A clean-up at 1 mm: two of them have keys, the others are buttons.
+/// A clean-up at 1 mm: three of them have keys, the others are buttons.
 fn clean_up(kind: CleanKind) -> Move {
-    let by_key = matches!(kind, CleanKind::FillHoles | CleanKind::LargestIsland);
+    let by_key = matches!(kind, CleanKind::FillHoles | CleanKind::LargestIsland | CleanKind::Clear);
     let seconds = DECIDE_S + if by_key { KEY_S } else { POINT_S + 2.0 * BUTTON_S };
-    Move { does: Does::Clean(CleanUp::from(kind)), actions: 1, seconds }
+    Move { does: vec![Does::Clean(CleanUp::from(kind))], actions: 1, seconds }
 }
 
 /// The islands of a mask with the most pixels of another one in them, apart.
