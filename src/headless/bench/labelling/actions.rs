@@ -169,8 +169,8 @@ impl Person {
         self.took.push(took);
     }
 
-    /// What mends most, and the IoU after it; where several make the mask good enough, that of the fewest actions, then of the
-    /// least time.
+    /// What mends most for each action, and the IoU after it; where several make the mask good enough, that of the fewest
+    /// actions, then of the least time.
     fn best(&mut self, hand: &HandMask, now: f64, truth: &Mask, imprint: &DepthMap) -> Option<(Move, f64)> {
         /// A gain that nobody sees is none.
         const LEAST: f64 = 1e-3;
@@ -185,7 +185,7 @@ impl Person {
         });
         let worth = |(step, after): &(Move, f64)| match *after >= TARGET {
             true => [1.0, -(step.actions as f64), -step.seconds],
-            false => [0.0, *after, 0.0],
+            false => [0.0, (after - now) / step.actions as f64, 0.0],
         };
         tried.max_by(|a, b| worth(a).partial_cmp(&worth(b)).unwrap_or(std::cmp::Ordering::Equal))
     }
