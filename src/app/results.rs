@@ -274,6 +274,8 @@ results! {
     Cloud(cloud::CloudKey) in clouds, 128 * MIB;
     /// A pose.
     Pose(pose::PoseKey) in poses, 32 * MIB;
+    /// A pose without its proof: shown until that is there.
+    ProvisionalPose(pose::ProvisionalPoseKey) in provisional_poses, 4 * MIB;
     /// A registration with everything recorded.
     Run(run::RunKey) in runs, 32 * MIB;
     /// Reasons, residuals and distances of a recorded registration from the engine's own starts.

@@ -120,7 +120,7 @@ pub fn register(
     engine: impl Into<RegistrationChoice>,
     record: bool,
 ) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.into().method(), points, tool, Ask { starts: None, record })
+    register_with(&*engine.into().method(), points, tool, Ask { record, ..Ask::default() })
 }
 
 /// The same from one start, `grasp_from_object`, instead of the engine's own.
@@ -134,7 +134,7 @@ pub fn register_from(
     start: PlanarPose,
     record: bool,
 ) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.into().method(), points, tool, Ask { starts: Some(&[start]), record })
+    register_with(&*engine.into().method(), points, tool, Ask { starts: Some(&[start]), record, ..Ask::default() })
 }
 
 /// The same with a registration of other settings.

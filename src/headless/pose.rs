@@ -162,7 +162,7 @@ fn pose_cases(
             fan.write(stem, name, engine)?;
         }
         let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
-        let ask = Ask { starts, record: args.trace };
+        let ask = Ask { starts, record: args.trace, ..Ask::default() };
         let found = points.clone().and_then(|points| pose(&points, tool, &*registration(args, engine), ask, truth));
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);

@@ -358,7 +358,9 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
     let Some(changed) = cx.state.document.changed.as_ref().filter(|c| c.pair == cx.state.pair_name()) else { return };
     let deg = |rad: f64| units::text_deg(rad);
     let before = changed.before.as_ref().and_then(|key| cx.state.results.poses.get(key));
-    let (text, color) = match (cx.state.pose(changed.source), before) {
+    let provisional = cx.state.provisional_pose(changed.source);
+    let now = provisional.map_or(cx.state.pose(changed.source), |pose| Lookup::Ready(pose));
+    let (text, color) = match (now, before) {
         (Lookup::Ready(pose), Some(before)) => {
             let (from, to) = (before.angle_rad, pose.angle_rad);
             let mut text =
@@ -367,6 +369,9 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
             if let (Some(from), Some(to)) = (before.error_rad, pose.error_rad) {
                 text += &format!("; error {} to {}", deg(from), deg(to));
                 color = if to < from { cx.p.good } else { cx.p.caution };
+            }
+            if provisional.is_some() {
+                text += "; being proved…";
             }
             (text, color)
         }

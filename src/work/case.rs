@@ -231,7 +231,7 @@ fn results(
             let mask = contact.masks[pad].as_ref().map_or_else(String::new, |found| mask_hash(&found.mask));
             (sample.rig.pad_key(pad).into_owned(), [imprint_hash(imprint), mask])
         });
-        let ask = Ask { starts: None, record: true };
+        let ask = Ask { record: true, ..Ask::default() };
         // Without points or a tool there is no pose, and that is a result as well.
         let found = contact.points(sample).ok().zip(tool.as_ref()).and_then(|(points, tool)| {
             pose(&points, tool, &*recipe.engine.method(), ask, sample.grasp_from_object).ok()

@@ -5,8 +5,9 @@ use std::sync::{Arc, Condvar, Mutex};
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand};
-use touch2touch::app::keys::{ImprintSource, Registration};
+use touch2touch::app::keys::{ImprintSource, PoseKey, Registration, Request};
 use touch2touch::app::library::Place;
+use touch2touch::app::results::pose::ProvisionalPoseKey;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::settings::{ColorRange, MaskSource, MaskTool};
 use touch2touch::app::state::{Absent, Lookup, State};
@@ -61,6 +62,37 @@ fn the_pose_follows_the_mask() {
     assert!(bench.state.document.pair(&name).unwrap().accepted(MEASURED).is_some());
     bench.send(LabelsCommand::Undo);
     assert!(bench.state.document.pair(&name).unwrap().accepted(MEASURED).is_none());
+}
+
+#[test]
+fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
+    let mut bench = Bench::open_simulated();
+    bench.send(panes(&[Pane::SceneMeasured, Pane::Measured]));
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Cad));
+    bench.send(LibraryCommand::Select(SIMULATED));
+    bench.settle();
+    let key = |bench: &Bench| bench.state.pose_key(MEASURED).unwrap().unwrap();
+    let settled = key(&bench);
+    let both = |bench: &Bench, key: &PoseKey| {
+        let results = &bench.state.results;
+        let provisional = results.provisional_poses.get(&ProvisionalPoseKey(key.clone())).unwrap().clone();
+        (provisional, results.poses.get(key).unwrap().clone())
+    };
+    let (provisional, pose) = both(&bench, &settled);
+    assert!(Arc::ptr_eq(&provisional, &pose), "a good mask is registered once");
+    assert!(bench.state.provisional_pose(MEASURED).is_none());
+    // All that is deeper than a threshold: no cheap search settles it.
+    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+    bench.settle();
+    let (provisional, pose) = both(&bench, &key(&bench));
+    assert!(pose.report.certificate.is_some() && provisional.report.certificate.is_none());
+    // As it was between the two: the provisional one is shown and may not be accepted, the other one is wanted.
+    bench.state.results.poses.clear();
+    let shown = bench.state.pose(MEASURED);
+    assert!(matches!(shown, Lookup::Stale(_)) && shown.shown().unwrap().angle_rad == provisional.angle_rad);
+    assert!(bench.state.provisional_pose(MEASURED).is_some());
+    assert!(Action::AcceptMeasuredPose.command(&bench.state).is_none());
+    assert_eq!(bench.state.wanted().first(), Some(&Request::Pose(key(&bench))));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::super::keys::RegistrationChoice;
 use super::super::workbench::state::PoseOf;
 use super::cloud::CloudKey;
 use super::tool::ToolKey;
-use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
+use super::{Absent, Computed, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
 use crate::domain::align::Ask;
 use crate::domain::frames::PlanarPose;
 use crate::domain::rig::PerPad;
@@ -34,6 +34,13 @@ pub(crate) struct Registered {
 }
 
 impl PoseKey {
+    fn registering(&self, state: &State, ask: Ask<'static>) -> Option<Job<PoseResult>> {
+        let (Registered { clouds, tool, truth }, engine) = (self.find(state)?, self.engine);
+        Some(Job::new(Lane::Compute, "Pose", move |_| {
+            pose(&clouds.contact_points(), &tool.model, &*engine.method(), ask, truth)
+        }))
+    }
+
     /// What is registered; `None` if it is not there.
     pub(crate) fn find(&self, state: &State) -> Option<Registered> {
         let (pair, _) = self.cloud.place()?;
@@ -46,14 +53,16 @@ impl PoseKey {
     }
 }
 
+/// A pose without its proof, where the registration may ask for one: it is there at once, and the pose itself unless it
+/// needs one.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ProvisionalPoseKey(pub PoseKey);
+
 impl Computes for PoseKey {
     type Value = PoseResult;
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
-        let (Registered { clouds, tool, truth }, engine) = (self.find(state)?, self.engine);
-        Some(Job::new(Lane::Compute, "Pose", move |_| {
-            pose(&clouds.contact_points(), &tool.model, &*engine.method(), Ask::default(), truth)
-        }))
+        self.registering(state, Ask::default())
     }
 
     fn bytes(found: &PoseResult) -> usize {
@@ -63,6 +72,24 @@ impl Computes for PoseKey {
     fn arrived(&self, state: &mut State, _: &Arc<PoseResult>) {
         if let Some(at) = self.cloud.place().filter(|(_, side)| state.pose_key(*side) == Ok(Some(self.clone()))) {
             state.results.latest.entry(at).or_default().pose = Some(self.clone());
+        }
+    }
+}
+
+impl Computes for ProvisionalPoseKey {
+    type Value = PoseResult;
+
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
+        self.0.registering(state, Ask { provisional: true, ..Ask::default() })
+    }
+
+    fn bytes(found: &PoseResult) -> usize {
+        found.bytes()
+    }
+
+    fn arrived(&self, state: &mut State, found: &Arc<PoseResult>) {
+        if found.report.needs_no_proof() {
+            Computed::Pose(self.0.clone(), found.clone()).keep(state);
         }
     }
 }
@@ -88,8 +115,20 @@ impl State {
         if let failed @ Lookup::Failed(_) = self.tool() {
             return failed.without();
         }
-        let before = || self.results.poses.get(self.latest(source)?.pose.as_ref()?);
+        let before = || {
+            let before = || self.results.poses.get(self.latest(source)?.pose.as_ref()?);
+            self.provisional_pose(source).or_else(before)
+        };
         self.look_or(self.pose_key(source), before).value()
+    }
+
+    /// The pose of an imprint without its proof, while that is being made.
+    pub fn provisional_pose(&self, source: ImprintSource) -> Option<&Arc<PoseResult>> {
+        let key = self.pose_key(source).ok()??;
+        if self.results.poses.contains(&key) {
+            return None;
+        }
+        self.results.provisional_poses.get(&ProvisionalPoseKey(key))
     }
 
     /// The recipe of the pose from one finger or both; `Ok(None)` while something is not there yet.
@@ -120,6 +159,19 @@ impl State {
 impl Wanted<'_> {
     pub(crate) fn pose(&mut self, source: ImprintSource) {
         if let Ok(Some(key)) = self.state.pose_key(source) {
+            self.pose_in_steps(key);
+        }
+    }
+
+    /// Asks for a pose; where it may take a proof, for one without first.
+    fn pose_in_steps(&mut self, key: PoseKey) {
+        let results = &self.state.results;
+        let provisional = ProvisionalPoseKey(key.clone());
+        let tried =
+            results.provisional_poses.contains(&provisional) || self.state.failure(provisional.clone()).is_some();
+        if key.engine.by.may_prove() && !tried && !results.poses.contains(&key) {
+            self.ask(provisional);
+        } else {
             self.ask(key);
         }
     }
@@ -129,7 +181,7 @@ impl Wanted<'_> {
         let state = self.state;
         for of in PoseOf::all(&state.rig()) {
             match state.pose_key_of(source, of) {
-                Ok(Some(key)) if state.results.clouds.contains(&key.cloud) => self.ask(key),
+                Ok(Some(key)) if state.results.clouds.contains(&key.cloud) => self.pose_in_steps(key),
                 Ok(Some(key)) => self.ask(key.cloud),
                 _ => {}
             }

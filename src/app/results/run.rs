@@ -22,7 +22,7 @@ impl Computes for RunKey {
         let Registered { clouds, tool, truth } = self.pose.find(state)?;
         let (engine, start) = (self.pose.engine, self.start.map(PoseBits::get));
         Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
-            let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true };
+            let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true, ..Ask::default() };
             pose(&clouds.contact_points(), &tool.model, &*engine.method(), ask, truth)
         }))
     }

@@ -189,6 +189,11 @@ impl Registration {
         self != Self::LabIcp
     }
 
+    /// Whether it asks for a proof where nothing else settles the pose, so that it has a provisional answer before.
+    pub fn may_prove(self) -> bool {
+        matches!(self, Self::DistanceField | Self::Refined)
+    }
+
     /// Whether it can leave out a share of the contacts.
     pub fn can_trim(self) -> bool {
         self == Self::Refined || self.icp().is_some()

@@ -93,10 +93,14 @@ struct Follow {
     strokes: usize,
     /// Mask to surface points of both fingers; milliseconds.
     cloud: Spent,
-    /// Contact points to pose.
+    /// Contact points to the first pose, which is the pose itself where it needs no proof.
     registration: Spent,
-    /// Both: the pose and its angle error are there.
+    /// Both: a pose and its angle error are there.
     whole: Spent,
+    /// Strokes after which the pose needed a proof.
+    proofs: usize,
+    /// Mask to the pose with its proof, of those.
+    proved: Option<Spent>,
     /// Pose to the influence of every pixel, where that is shown.
     influence: Spent,
 }
@@ -403,7 +407,7 @@ fn follow(
     const STROKES_EACH: usize = 4;
     const RADIUS_PX: f32 = 4.0;
     let method = RegistrationChoice::default().method();
-    let (mut lifting, mut registering, mut whole, mut hanging) = (vec![], vec![], vec![], vec![]);
+    let (mut lifting, mut registering, mut whole, mut proved, mut hanging) = (vec![], vec![], vec![], vec![], vec![]);
     let mut size = None;
     for case in cases {
         let mut masks = masks_of(case)?;
@@ -424,9 +428,14 @@ fn follow(
             let lifted = clouds(&case.sample, &parts)?;
             let since = |begin: Instant| begin.elapsed().as_secs_f64() * 1e3;
             let cloud_ms = since(begin);
-            let found = pose(&lifted.contact_points(), &case.tool, &*method, Ask::default(), Some(case.truth));
+            let register = |ask| pose(&lifted.contact_points(), &case.tool, &*method, ask, Some(case.truth));
+            let found = register(Ask { provisional: true, ..Ask::default() });
             let all_ms = since(begin);
-            let Ok(found) = found else { continue };
+            let Ok(mut found) = found else { continue };
+            if !found.report.needs_no_proof() {
+                found = register(Ask::default())?;
+                proved.push(since(begin));
+            }
             lifting.push(cloud_ms);
             registering.push(all_ms - cloud_ms);
             whole.push(all_ms);
@@ -444,6 +453,8 @@ fn follow(
         cloud: Spent::of(&lifting),
         registration: Spent::of(&registering),
         whole: Spent::of(&whole),
+        proofs: proved.len(),
+        proved: (!proved.is_empty()).then(|| Spent::of(&proved)),
         influence: Spent::of(&hanging),
     }))
 }
@@ -493,16 +504,17 @@ fn text(report: &Report) -> String {
             stroke.largest_upload * 100.0
         ));
     }
-    for Follow { masks, size, strokes, cloud, registration, whole, influence } in &report.follows {
+    for Follow { masks, size, strokes, cloud, registration, whole, proofs, proved, influence } in &report.follows {
         let ms = |spent: &Spent| format!("{:.2} ms (worst {:.2})", spent.median_ms, spent.worst_ms);
         lines.push(format!(
             "after a stroke ({masks}, {strokes} strokes), {} x {}, both fingers: cloud {}, registration {}, the new pose \
-             after {}; influence of all pixels {}",
+             after {}; {proofs} poses needed a proof{}; influence of all pixels {}",
             size[0],
             size[1],
             ms(cloud),
             ms(registration),
             ms(whole),
+            proved.as_ref().map_or(String::new(), |proved| format!(", which was there after {}", ms(proved))),
             ms(influence)
         ));
     }

@@ -158,6 +158,9 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
             if found.is_empty() {
                 text += &format!(" · residual {}", units::text_mm(pose.rms_m));
             }
+            if state.provisional_pose(source).is_some() {
+                text += " · being proved…";
+            }
             let mut details = vec![format!("{}, {}", pose_details(pose), pose_time(pose))];
             details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
             (text, grade.color(cx.p), details)

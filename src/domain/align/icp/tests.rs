@@ -35,7 +35,7 @@ fn run(
     registration.run(&Scene::new(points), tool, ask)
 }
 
-const RECORD: Ask<'static> = Ask { starts: None, record: true };
+const RECORD: Ask<'static> = Ask { starts: None, record: true, provisional: false };
 
 #[test]
 fn every_member_finds_the_pose_and_tells_how() {
@@ -64,7 +64,8 @@ fn every_member_finds_the_pose_and_tells_how() {
         // Looking changes nothing; the same start alone leads to the same end.
         let plain = run(&*registration, &points, &tool, Ask::default()).unwrap();
         assert_eq!((plain.grasp_from_object, plain.trace.len(), plain.fits.len()), (pose, 0, 0), "{name}");
-        let alone = run(&*registration, &points, &tool, Ask { starts: Some(&[report.start]), record: false }).unwrap();
+        let alone =
+            run(&*registration, &points, &tool, Ask { starts: Some(&[report.start]), ..Ask::default() }).unwrap();
         assert_eq!((alone.runs.len(), alone.runs[0].start), (1, report.start), "{name}");
         assert!(angle_error(alone.grasp_from_object.theta_rad, pose.theta_rad) < 2e-3, "{name}");
     }
@@ -135,7 +136,7 @@ fn too_few_coincident_and_misplaced_contacts_are_errors() {
         let tiny: Vec<DVec3> = contacts.iter().map(|p| *p * 1e-6).collect();
         assert!(matches!(ask(&tiny), AlignError::Coincident { .. }), "{name}");
         for starts in [&[][..], &[PlanarPose { theta_rad: f64::NAN, ..PlanarPose::default() }]] {
-            let error = run(&*registration, &contacts, &tool, Ask { starts: Some(starts), record: false });
+            let error = run(&*registration, &contacts, &tool, Ask { starts: Some(starts), ..Ask::default() });
             assert_eq!(error, Err(AlignError::Config { what: "starts" }), "{name}");
         }
     }
@@ -154,7 +155,7 @@ fn open_directions_are_flagged_and_left_alone() {
     let points = on_both_sides(&filled(&[DVec2::new(half.x, 0.02)], 0.0, 900, truth, 1.5e-4, 5));
     let start = PlanarPose { theta_rad: 10f64.to_radians(), y_m: 0.0, z_m: 0.0 };
     for (name, registration) in all() {
-        let report = run(&*registration, &points, &rod, Ask { starts: Some(&[start]), record: false }).unwrap();
+        let report = run(&*registration, &points, &rod, Ask { starts: Some(&[start]), ..Ask::default() }).unwrap();
         let pose = report.grasp_from_object;
         assert!(pose.is_finite(), "{name}");
         assert!(angle_error(pose.theta_rad, truth.theta_rad).to_degrees() < 1.0, "{name}: {pose:?}");
