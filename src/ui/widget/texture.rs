@@ -222,30 +222,49 @@ pub fn mask_image(mask: &Mask, color: Color32) -> ColorImage {
 
 /// The sides of pixels between mask and background, as segments in pixel coordinates with (0, 0) at the *corner* of
 /// the top-left pixel. Runs along a row or column are one segment.
+///
+/// It is made anew at every move of a stroke: what is like the row above costs no more than comparing the two.
 pub fn outline(mask: &Mask) -> Vec<[[f32; 2]; 2]> {
     let [w, h] = mask.size();
-    let on = |x: isize, y: isize| x >= 0 && y >= 0 && mask.get(x as usize, y as usize).is_some_and(|v| *v);
+    let none = vec![false; w];
+    let row = |y: usize| if y < h { mask.row(y) } else { none.as_slice() };
     let mut segments = Vec::new();
-    let mut push_runs = |along: usize, across: usize, horizontal: bool| {
-        for line in 0..=across as isize {
+    // Where the sides along each column began that are still going on.
+    let mut begun: Vec<Option<usize>> = vec![None; w + 1];
+    let mut above = none.as_slice();
+    for y in 0..=h {
+        let here = row(y);
+        let differs = |x: &usize| above[*x] != here[*x];
+        if let Some(first) = (0..w).find(differs) {
+            let last = (first..w).rfind(differs).unwrap_or(first);
+            // Sides along the row, each as long as what differs.
             let mut start = None;
-            for i in 0..=along as isize {
-                let edge = i < along as isize
-                    && if horizontal { on(i, line - 1) != on(i, line) } else { on(line - 1, i) != on(line, i) };
-                match (edge, start) {
-                    (true, None) => start = Some(i),
+            for x in first..=last + 1 {
+                match (x <= last && differs(&x), start) {
+                    (true, None) => start = Some(x),
                     (false, Some(from)) => {
-                        let (a, b, l) = (from as f32, i as f32, line as f32);
-                        segments.push(if horizontal { [[a, l], [b, l]] } else { [[l, a], [l, b]] });
+                        segments.push([[from as f32, y as f32], [x as f32, y as f32]]);
                         start = None;
                     }
                     _ => {}
                 }
             }
+            // Sides along columns begin and end only there.
+            let on = |x: usize| here.get(x).is_some_and(|on| *on);
+            for (x, begun) in begun.iter_mut().enumerate().take(last + 2).skip(first) {
+                let edge = (x > 0 && on(x - 1)) != on(x);
+                match (edge, *begun) {
+                    (true, None) => *begun = Some(y),
+                    (false, Some(from)) => {
+                        segments.push([[x as f32, from as f32], [x as f32, y as f32]]);
+                        *begun = None;
+                    }
+                    _ => {}
+                }
+            }
         }
-    };
-    push_runs(w, h, true);
-    push_runs(h, w, false);
+        above = here;
+    }
     segments
 }
 
@@ -321,6 +340,27 @@ mod tests {
         assert!(sides.contains(&[[1.0, 1.0], [2.0, 1.0]]) && sides.contains(&[[2.0, 1.0], [2.0, 2.0]]));
         assert_eq!(outline(&Mask::filled(4, 2, true)).len(), 4);
         assert!(outline(&Mask::filled(0, 0, true)).is_empty());
+        // A ring that touches the edge, and every kind of corner: as many sides as pixels have neighbors of the other kind.
+        let ragged = Mask::from_fn(37, 23, |x, y| (x * 7 + y * 11) % 5 < 2 || (x > 20 && y > 3 && x + y != 31));
+        let mut sides: Vec<[[i32; 2]; 2]> = Vec::new();
+        for [[ax, ay], [bx, by]] in outline(&ragged) {
+            let (dx, dy) = ((bx - ax).signum() as i32, (by - ay).signum() as i32);
+            assert!(dx + dy == 1 && dx * dy == 0, "along a row or a column");
+            let length = (bx - ax + by - ay) as i32;
+            sides.extend((0..length).map(|i| {
+                let from = [ax as i32 + i * dx, ay as i32 + i * dy];
+                [from, [from[0] + dx, from[1] + dy]]
+            }));
+        }
+        sides.sort_unstable();
+        let on = |x: i32, y: i32| x >= 0 && y >= 0 && ragged.get(x as usize, y as usize).is_some_and(|on| *on);
+        let mut expected: Vec<[[i32; 2]; 2]> = Vec::new();
+        for (y, x) in (0..=23).flat_map(|y| (0..=37).map(move |x| (y, x))) {
+            expected.extend((on(x, y - 1) != on(x, y)).then_some([[x, y], [x + 1, y]]));
+            expected.extend((on(x - 1, y) != on(x, y)).then_some([[x, y], [x, y + 1]]));
+        }
+        expected.sort_unstable();
+        assert_eq!(sides, expected);
         let dashed = dashes(&outline(&Mask::filled(4, 2, true)));
         assert_eq!(dashed.len(), 6, "half of the twelve sides: {dashed:?}");
         assert!(dashed.contains(&[[0.0, 0.0], [1.0, 0.0]]) && !dashed.contains(&[[1.0, 0.0], [2.0, 0.0]]));
