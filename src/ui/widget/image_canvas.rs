@@ -208,11 +208,28 @@ impl CanvasOutput {
         self.painter.extend(egui::Shape::dashed_line(&path, Stroke::new(1.25, color), 6.0, 4.0));
     }
 
-    /// Paints segments given in pixel-corner coordinates (see [`super::texture::outline`]).
+    /// Paints segments along rows and columns, given in pixel-corner coordinates (see [`super::texture::outline`]), as
+    /// lines of whole pixels of the screen.
+    ///
+    /// One mesh of rectangles: an outline has thousands of sides, and is painted anew at every move of a stroke.
     pub fn segments(&self, segments: &[[[f32; 2]; 2]], color: Color32, width: f32) {
         let corner = |p: [f32; 2]| self.map.to_screen([p[0] - 0.5, p[1] - 0.5]);
+        let per_point = self.painter.pixels_per_point();
+        let wide = (width * per_point).round().max(1.0);
+        // The middle of a line of an odd number of pixels is the middle of a pixel.
+        let snap = |v: f32| ((v * per_point - 0.5 * wide).round()) / per_point;
+        let mut mesh = egui::Mesh::default();
         for [a, b] in segments {
-            self.painter.line_segment([corner(*a), corner(*b)], Stroke::new(width, color));
+            let around = Rect::from_two_pos(corner(*a), corner(*b));
+            let min = pos2(snap(around.min.x), snap(around.min.y));
+            let max = pos2(snap(around.max.x), snap(around.max.y)) + Vec2::splat(wide / per_point);
+            let line = Rect::from_min_max(min, max);
+            if line.intersects(self.painter.clip_rect()) {
+                mesh.add_colored_rect(line, color);
+            }
+        }
+        if !mesh.is_empty() {
+            self.painter.add(mesh);
         }
     }
 
