@@ -93,7 +93,8 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn action_switch(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, on: bool) {
     let possible = action.command(cx.state).is_some();
     let button = ui.add_enabled(possible, egui::Button::selectable(on, text)).accessible_name(action.name());
-    if button.on_hover_text(cx.keys().help(action)).clicked() {
+    let help = cx.keys().help(action);
+    if button.on_hover_text(&help).on_disabled_hover_text(help).clicked() {
         cx.act(action);
     }
 }
@@ -359,7 +360,7 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
     let deg = |rad: f64| units::text_deg(rad);
     let before = changed.before.as_ref().and_then(|key| cx.state.results.poses.get(key));
     let provisional = cx.state.provisional_pose(changed.source);
-    let now = provisional.map_or(cx.state.pose(changed.source), |pose| Lookup::Ready(pose));
+    let now = provisional.map_or_else(|| cx.state.pose(changed.source), |pose| Lookup::Ready(&**pose));
     let (text, color) = match (now, before) {
         (Lookup::Ready(pose), Some(before)) => {
             let (from, to) = (before.angle_rad, pose.angle_rad);

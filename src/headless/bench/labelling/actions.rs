@@ -185,7 +185,8 @@ impl Person {
         });
         let worth = |(step, after): &(Move, f64)| match *after >= TARGET {
             true => [1.0, -(step.actions as f64), -step.seconds],
-            false => [0.0, (after - now) / step.actions as f64, 0.0],
+            // As if each action mended the same share of what is still wrong.
+            false => [0.0, ((1.0 - now) / (1.0 - after)).ln() / step.actions as f64, 0.0],
         };
         tried.max_by(|a, b| worth(a).partial_cmp(&worth(b)).unwrap_or(std::cmp::Ordering::Equal))
     }
