@@ -30,7 +30,7 @@ use crate::app::library::Place;
 use crate::app::pane::Kind;
 use crate::app::runtime::Runtime;
 use crate::app::services::SharedServices;
-use crate::app::settings::{Last, Theme, Workspace};
+use crate::app::settings::{Last, MaskTool, Theme, Workspace};
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
 use crate::domain::rig::SensorKind;
@@ -536,14 +536,14 @@ impl eframe::App for StudioApp {
 }
 
 impl StudioApp {
-    /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more. `readout` is what the
-    /// status bar shows.
     /// Follows the pen no further; whether it was drawing.
     fn lift_pen(&mut self) -> bool {
         let memories = &mut self.panes.memories;
         memories.images.lift_pen() | memories.scene.lift_pen()
     }
 
+    /// Tells the model what is on screen now, and drops a cross-hair that no pane holds any more. `readout` is what the
+    /// status bar shows.
     fn after_panes(&mut self, ctx: &egui::Context, readout: Option<&String>, out: &mut Vec<Command>) {
         if self.panes.drawn != self.state.selection.panes {
             out.push(Command::View(ViewCommand::ShowPanes(self.panes.drawn.clone())));
@@ -555,8 +555,10 @@ impl StudioApp {
             // The status bar was drawn before the pane under the pointer: once more, with the number in it.
             ctx.request_repaint();
         }
-        // What is made of clicks goes on while no button is down.
-        let by_clicks = self.state.document.stroke.as_ref().is_some_and(|stroke| stroke.drawing.is_by_clicks());
+        // What is made of clicks goes on while no button is down. A whole click may lie between two frames: then the state
+        // does not know yet of the drawing that it began.
+        let by_tool = self.state.settings.mask.tool == MaskTool::Polygon;
+        let by_clicks = self.state.document.stroke.as_ref().map_or(by_tool, |stroke| stroke.drawing.is_by_clicks());
         if !by_clicks && !ctx.input(|i| i.pointer.any_down()) && self.lift_pen() {
             out.push(Command::Labels(LabelsCommand::EndStroke));
         }

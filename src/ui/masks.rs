@@ -81,12 +81,20 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
     match cx.state.settings.mask.tool {
         MaskTool::Brush | MaskTool::Eraser => radius(cx, ui),
         MaskTool::Wand => wand(cx, ui),
-        MaskTool::Lasso | MaskTool::Polygon | MaskTool::Rectangle | MaskTool::Pan => {}
+        MaskTool::Lasso => hint(cx, ui, "Around it in one line"),
+        MaskTool::Polygon => hint(cx, ui, "Corner by corner; the first closes it"),
+        MaskTool::Rectangle => hint(cx, ui, "From corner to corner"),
+        MaskTool::Pan => hint(cx, ui, "Moves the picture, draws nothing"),
     }
     paints(cx, ui);
     in_3d(cx, ui);
     gate(cx, ui);
     overlay(cx, ui);
+}
+
+/// What a tool without a number does, as high as a number: what lies below stays where it is from tool to tool.
+fn hint(cx: &Cx<'_>, ui: &mut Ui, text: &str) {
+    ui.horizontal(|ui| ui.label(caption(text, cx.p)));
 }
 
 /// A button for an action that turns something on or off.

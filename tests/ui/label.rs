@@ -1,6 +1,6 @@
 //! The labeling desk by mouse and keys.
 
-use eframe::egui::{Key, Modifiers, PointerButton, Pos2, Rect, pos2};
+use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, pos2};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{CameraPreset, LabelsCommand, LibraryCommand, SettingsCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
@@ -33,7 +33,7 @@ impl Rig {
     fn button(&mut self, at: Pos2, pressed: bool) {
         let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
         self.harness.hover_at(at);
-        self.harness.event(eframe::egui::Event::PointerButton { pos: at, button, pressed, modifiers });
+        self.harness.event(Event::PointerButton { pos: at, button, pressed, modifiers });
         self.harness.step();
     }
 
@@ -119,6 +119,44 @@ fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
 }
 
 #[test]
+fn a_polygon_grows_by_quick_clicks_whatever_was_drawn_before() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    let right = rig.harness.get_by_label("Measured imprint right").rect();
+    let corners = [[0.6, 0.2], [0.9, 0.2], [0.9, 0.8]].map(|[x, y]| inside(right, x, y));
+    let quick = |rig: &mut Rig, at: Pos2| {
+        rig.harness.event(Event::PointerMoved(at));
+        rig.harness.step();
+        for pressed in [true, false] {
+            let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+            rig.harness.input_mut().events.push(Event::PointerButton { pos: at, button, pressed, modifiers });
+        }
+        rig.harness.step();
+        rig.harness.step();
+    };
+    let points = |rig: &Rig| rig.harness.state().state().document.stroke.as_ref().map(|s| s.drawing.points.len());
+    let key = |rig: &mut Rig, key| {
+        rig.harness.key_press(key);
+        rig.harness.step();
+    };
+    for before in [None, Some(Key::E), Some(Key::Escape), Some(Key::D)] {
+        if let Some(before) = before {
+            key(&mut rig, before);
+            if before == Key::E {
+                quick(&mut rig, corners[0]);
+            }
+            rig.settle();
+        }
+        key(&mut rig, Key::P);
+        for (at, expected) in corners.into_iter().zip([2, 3, 4]) {
+            quick(&mut rig, at);
+            assert_eq!(points(&rig), Some(expected), "{before:?}");
+        }
+    }
+}
+
+#[test]
 fn masks_are_drawn_on_the_points_of_the_3d_view() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(SettingsCommand::DismissHint);
@@ -165,7 +203,7 @@ fn masks_are_drawn_on_the_points_of_the_3d_view() {
     rig.settle();
     assert_eq!(rig.mask(lab::RIGHT), empty, "one undo takes it back");
     // With Shift the pointer turns the view and draws nothing.
-    let press = |pressed| eframe::egui::Event::PointerButton {
+    let press = |pressed| Event::PointerButton {
         pos: from,
         button: PointerButton::Primary,
         pressed,

@@ -436,13 +436,13 @@ draws! {
         1 SetForm(form()),
         1 AskMasks(any::<bool>()),
         1 SetMasks(mask_choice()),
-        1 AskImport(select(vec![None, Some(PathBuf::from("no/such/folder"))])),
+        1 AskImport(select(vec![None, Some(PathBuf::from("/dev/null/folder"))])),
         1 ImportOverHand(any::<bool>()),
         1 Import,
         1 Place(output()),
         1 OwnPreferences,
-        1 WriteCase(Just(PathBuf::from("no/such/folder/a.t2tcase")), Just(String::new())),
-        1 Write(output(), Just(PathBuf::from("no/such/folder/picture.png"))),
+        1 WriteCase(Just(PathBuf::from("/dev/null/folder/a.t2tcase")), Just(String::new())),
+        1 Write(output(), Just(PathBuf::from("/dev/null/folder/picture.png"))),
     }
     adapt: AdaptCommand {
         1 Choose(any_of::<AdaptPairs>()),
@@ -501,8 +501,8 @@ draws! {
         1 LogSeen(any::<u64>()),
         1 Report(error()),
         1 Notice(Just("Something".to_owned())),
-        1 Saved(Just("Something".to_owned()), Just(PathBuf::from("no/such/folder"))),
-        1 Reveal(Just(PathBuf::from("no/such/folder"))),
+        1 Saved(Just("Something".to_owned()), Just(PathBuf::from("/dev/null/folder"))),
+        1 Reveal(Just(PathBuf::from("/dev/null/folder"))),
     }
     // Answers that nobody waits for, or that come too late.
     answers: Answer {
@@ -529,7 +529,7 @@ draws! {
         1 Refitted(ticket(), Just(()).prop_map(|()| Box::new(statistics())), Just(None)),
         1 Progressed(ticket(), Just(Progress { done: 3, total: 4, text: "step".into(), ..Progress::default() })),
         1 Finished(ticket(), Just(None)),
-        1 Saved(ticket(), Just("Something".to_owned()), Just(PathBuf::from("no/such/folder"))),
+        1 Saved(ticket(), Just("Something".to_owned()), Just(PathBuf::from("/dev/null/folder"))),
         1 Revealed,
         1 TaskFailed(ticket(), error()),
         1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Request::Sample(t.pair)), error()),
