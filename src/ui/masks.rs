@@ -3,7 +3,7 @@
 mod proposal;
 mod stats;
 
-use eframe::egui::{self, RichText, ScrollArea, Ui, vec2};
+use eframe::egui::{self, Align, Layout, RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::browser::review_color;
@@ -357,7 +357,6 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
                 response.on_hover_text(format!("{text} {what}"));
             }
         }
-        save_state(cx, ui);
     });
     effect(cx, ui);
 }
@@ -442,7 +441,10 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(2.0);
-    ui.label(section("Review", cx.p));
+    ui.horizontal(|ui| {
+        ui.label(section("Review", cx.p));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| save_state(cx, ui));
+    });
     let current = cx.state.document.review(cx.state.pair_name());
     let editable = cx.state.document.is_editable(cx.state.pair_name());
     ui.horizontal_wrapped(|ui| {
