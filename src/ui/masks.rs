@@ -134,7 +134,7 @@ fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
         for (paint, text, tip, color) in [
             (Paint::Contact, "contact", "The tools add contact; the right button removes it".to_owned(), CONTACT),
             (Paint::Ignore, "ignore", cx.keys().help(Action::PaintIgnore), IGNORED),
-            (Paint::LetThrough, "let proposal through", cx.keys().help(Action::LetThrough), PROPOSED),
+            (Paint::LetThrough, "proposal", cx.keys().help(Action::LetThrough), PROPOSED),
         ] {
             if paint == Paint::LetThrough && now != paint && !cx.state.proposes() {
                 continue;
@@ -371,12 +371,16 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
     let (text, color) = match (now, before) {
         (Lookup::Ready(pose), Some(before)) => {
             let (from, to) = (before.angle_rad, pose.angle_rad);
-            let mut text =
-                format!("{}: angle {:+.2}°, {} to {}", changed.name, (to - from).to_degrees(), deg(from), deg(to));
+            let mut text = format!("{}: angle {:+.2}° to {}", changed.name, (to - from).to_degrees(), deg(to));
             let mut color = cx.p.text;
             if let (Some(from), Some(to)) = (before.error_rad, pose.error_rad) {
-                text += &format!("; error {} to {}", deg(from), deg(to));
-                color = if to < from { cx.p.good } else { cx.p.caution };
+                let [before, now] = [from, to].map(deg);
+                text += &format!("; error {before} to {now}");
+                color = match before == now {
+                    true => cx.p.text,
+                    false if to < from => cx.p.good,
+                    false => cx.p.caution,
+                };
             }
             if provisional.is_some() {
                 text += "; being proved…";
