@@ -344,7 +344,7 @@ mod tests {
         let ragged = Mask::from_fn(37, 23, |x, y| (x * 7 + y * 11) % 5 < 2 || (x > 20 && y > 3 && x + y != 31));
         let mut sides: Vec<[[i32; 2]; 2]> = Vec::new();
         for [[ax, ay], [bx, by]] in outline(&ragged) {
-            let (dx, dy) = ((bx - ax).signum() as i32, (by - ay).signum() as i32);
+            let (dx, dy) = (((bx - ax) as i32).signum(), ((by - ay) as i32).signum());
             assert!(dx + dy == 1 && dx * dy == 0, "along a row or a column");
             let length = (bx - ax + by - ay) as i32;
             sides.extend((0..length).map(|i| {
