@@ -53,8 +53,24 @@ impl Cx<'_> {
 
     /// A button for an action: its tooltip has the shortcut, and it is grayed out when it can do nothing.
     pub(super) fn action_button(&mut self, ui: &mut Ui, action: Action, text: &str) -> Response {
+        self.acting(ui, action, egui::Button::new(text), action.name())
+    }
+
+    /// The same for an action that turns something on or off.
+    pub(super) fn action_switch(&mut self, ui: &mut Ui, action: Action, text: &str, on: bool) -> Response {
+        self.acting(ui, action, egui::Button::selectable(on, text), action.name())
+    }
+
+    /// The same for a button of any look, under a name for screen readers.
+    pub(super) fn acting(
+        &mut self,
+        ui: &mut Ui,
+        action: Action,
+        button: egui::Button<'_>,
+        name: impl Into<String>,
+    ) -> Response {
         let command = action.command(self.state);
-        let response = ui.add_enabled(command.is_some(), egui::Button::new(text)).accessible_name(action.name());
+        let response = ui.add_enabled(command.is_some(), button).accessible_name(name);
         let help = self.keys().help(action);
         let response = response.on_hover_text(&help).on_disabled_hover_text(help);
         if response.clicked()

@@ -97,23 +97,13 @@ fn hint(cx: &Cx<'_>, ui: &mut Ui, text: &str) {
     ui.horizontal(|ui| ui.label(caption(text, cx.p)));
 }
 
-/// A button for an action that turns something on or off.
-fn action_switch(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, on: bool) {
-    let possible = action.command(cx.state).is_some();
-    let button = ui.add_enabled(possible, egui::Button::selectable(on, text)).accessible_name(action.name());
-    let help = cx.keys().help(action);
-    if button.on_hover_text(&help).on_disabled_hover_text(help).clicked() {
-        cx.act(action);
-    }
-}
-
 /// Drawing on the points of the 3D views, and what that reaches.
 fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(caption("In 3D", cx.p));
         let on = cx.state.workbench.tool == SceneTool::Paint;
-        action_switch(cx, ui, Action::PaintIn3d, "draw", on);
+        cx.action_switch(ui, Action::PaintIn3d, "draw", on);
         let now = cx.state.settings.mask.layers;
         for (layers, text) in [(Layers::Front, "front-most"), (Layers::All, "all layers")] {
             let button = ui.add(egui::Button::selectable(now == layers, text));
@@ -511,7 +501,7 @@ fn overlay(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
         ui.label(caption("Show", cx.p));
         for (action, text, on) in switches {
-            action_switch(cx, ui, action, text, on);
+            cx.action_switch(ui, action, text, on);
         }
     });
 }

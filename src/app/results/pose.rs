@@ -34,6 +34,7 @@ pub(crate) struct Registered {
 }
 
 impl PoseKey {
+    /// The job that registers it.
     fn registering(&self, state: &State, ask: Ask<'static>) -> Option<Job<PoseResult>> {
         let (Registered { clouds, tool, truth }, engine) = (self.find(state)?, self.engine);
         Some(Job::new(Lane::Compute, "Pose", move |_| {
@@ -53,11 +54,6 @@ impl PoseKey {
     }
 }
 
-/// A pose without its proof, where the registration may ask for one: it is there at once, and the pose itself unless it
-/// needs one.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ProvisionalPoseKey(pub PoseKey);
-
 impl Computes for PoseKey {
     type Value = PoseResult;
 
@@ -75,6 +71,11 @@ impl Computes for PoseKey {
         }
     }
 }
+
+/// A pose without its proof, where the registration may ask for one: it is there at once, and the pose itself unless it
+/// needs one.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ProvisionalPoseKey(pub PoseKey);
 
 impl Computes for ProvisionalPoseKey {
     type Value = PoseResult;
@@ -116,8 +117,8 @@ impl State {
             return failed.without();
         }
         let before = || {
-            let before = || self.results.poses.get(self.latest(source)?.pose.as_ref()?);
-            self.provisional_pose(source).or_else(before)
+            let latest = || self.results.poses.get(self.latest(source)?.pose.as_ref()?);
+            self.provisional_pose(source).or_else(latest)
         };
         self.look_or(self.pose_key(source), before).value()
     }
@@ -157,14 +158,9 @@ impl State {
 }
 
 impl Wanted<'_> {
+    /// The pose; where it may take a proof, one without first.
     pub(crate) fn pose(&mut self, source: ImprintSource) {
-        if let Ok(Some(key)) = self.state.pose_key(source) {
-            self.pose_in_steps(key);
-        }
-    }
-
-    /// Asks for a pose; where it may take a proof, for one without first.
-    fn pose_in_steps(&mut self, key: PoseKey) {
+        let Ok(Some(key)) = self.state.pose_key(source) else { return };
         let results = &self.state.results;
         let provisional = ProvisionalPoseKey(key.clone());
         let tried =
@@ -176,12 +172,12 @@ impl Wanted<'_> {
         }
     }
 
-    /// The poses of all rows of the table, and the clouds of single fingers that they are made of.
+    /// The poses of single fingers in the table, and the clouds that they are made of: the joint one is asked for anyway.
     pub(crate) fn pose_table(&mut self, source: ImprintSource) {
         let state = self.state;
-        for of in PoseOf::all(&state.rig()) {
-            match state.pose_key_of(source, of) {
-                Ok(Some(key)) if state.results.clouds.contains(&key.cloud) => self.pose_in_steps(key),
+        for finger in state.rig().pads() {
+            match state.pose_key_of(source, PoseOf::Finger(finger)) {
+                Ok(Some(key)) if state.results.clouds.contains(&key.cloud) => self.ask(key),
                 Ok(Some(key)) => self.ask(key.cloud),
                 _ => {}
             }

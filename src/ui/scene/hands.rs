@@ -112,15 +112,9 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
 }
 
 fn small_button(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, source: ImprintSource, on: bool) {
-    let command = action.command(cx.state);
     let button = Button::selectable(on, RichText::new(text).size(SMALL)).frame_when_inactive(true);
-    let response = ui.add_enabled(command.is_some(), button.min_size(vec2(0.0, 20.0)));
-    let response = response.accessible_name(format!("{}, {}", action.name(), source.name().to_lowercase()));
-    if response.on_hover_text(cx.keys().help(action)).on_disabled_hover_text(cx.keys().help(action)).clicked()
-        && let Some(command) = command
-    {
-        cx.push(command);
-    }
+    let name = format!("{}, {}", action.name(), source.name().to_lowercase());
+    cx.acting(ui, action, button.min_size(vec2(0.0, 20.0)), name);
 }
 
 /// The three numbers out of the plane.
