@@ -29,6 +29,7 @@ mod ledger;
 mod log;
 mod masks;
 mod metrics;
+mod outdated;
 mod palette;
 mod pane;
 mod pen;

@@ -52,3 +52,4 @@ pub mod train;
 pub mod training_data;
 pub mod tuning;
 mod usable;
+pub mod verdict;

@@ -7,6 +7,7 @@ mod generating;
 mod inspect;
 mod masks;
 mod random;
+mod shown;
 mod whole;
 
 use std::collections::BTreeSet;
@@ -107,7 +108,7 @@ fn a_late_result_lands_under_its_own_key() {
     bench.send(LibraryCommand::Step(1));
     bench.settle();
     assert!(bench.state.chosen(RIGHT).is_none(), "the pair now shown has no prediction");
-    assert!(bench.state.results.chosen.contains_key(&first.finger(RIGHT)));
+    assert!(bench.state.shown(first.finger(RIGHT)).is_some());
     bench.send(LibraryCommand::Step(-1));
     bench.settle();
     assert!(bench.state.imprint(ImprintSource::Predicted, RIGHT).ready().is_some());

@@ -121,7 +121,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::Generated(ticket, predictions) => {
             tasks::forget(state, ticket);
             for (key, prediction) in predictions {
-                state.keep_prediction(key, prediction);
+                state.keep_prediction(key, prediction, true);
             }
         }
         // One that comes after its result, or after Cancel, is too late.

@@ -20,7 +20,7 @@ pub enum PredictCommand {
     GenerateNewSeed,
     /// Computes shift statistics of the open data set with the generator and its settings, then uses them.
     Refit,
-    /// Shows another prediction of the same touch.
+    /// Shows another prediction of the same touch, until the settings ask for another one.
     Choose(PredictionKey),
 }
 
@@ -31,7 +31,7 @@ pub(super) fn step(state: &mut State, command: PredictCommand, effects: &mut Vec
         PredictCommand::Refit => refit::start(state, effects),
         PredictCommand::Choose(recipe) => {
             if state.results.predictions.contains(&recipe) {
-                state.results.chosen.insert(recipe.touch, recipe);
+                state.pick(recipe);
             }
         }
     }
@@ -75,9 +75,11 @@ fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
     let mut recipes: Vec<PredictionKey> = Vec::new();
     for finger in fingers {
         let Some(recipe) = state.recipe(pair.finger(*finger)) else { continue };
+        state.unpick(recipe.touch);
         if state.results.predictions.contains(&recipe) {
-            state.results.chosen.insert(recipe.touch, recipe);
-        } else if state.tasks.generating(&recipe).is_none_or(|(_, task)| task.cancelling) {
+            continue;
+        }
+        if state.tasks.generating(&recipe).is_none_or(|(_, task)| task.cancelling) {
             recipes.push(recipe);
         }
     }

@@ -40,6 +40,7 @@ pub mod proposal;
 pub mod run;
 pub mod sample;
 pub mod scores;
+pub mod shown;
 pub mod thumbnail;
 pub mod tool;
 pub mod train_plan;
@@ -145,8 +146,8 @@ macro_rules! results {
             pub previews: BTreeMap<TouchKey, Arc<Preview>>,
             /// Touches whose predictions from before were looked for on the disk.
             pub looked_up: BTreeSet<TouchKey>,
-            /// The prediction shown for each touch: the last one generated, or the one chosen.
-            pub chosen: BTreeMap<TouchKey, prediction::PredictionKey>,
+            /// What is shown of them where the settings do not say it.
+            pub shown: shown::Shown,
             /// All predictions made for each touch, oldest first.
             pub made: BTreeMap<TouchKey, Vec<prediction::PredictionKey>>,
             /// What was shown last of each pair and imprint.
@@ -160,7 +161,7 @@ macro_rules! results {
                     noted: BTreeSet::new(),
                     previews: BTreeMap::new(),
                     looked_up: BTreeSet::new(),
-                    chosen: BTreeMap::new(),
+                    shown: shown::Shown::default(),
                     made: BTreeMap::new(),
                     latest: BTreeMap::new(),
                 }

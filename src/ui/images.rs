@@ -494,7 +494,7 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     let state = cx.state;
     let right = match pane {
         Pane::Predicted => state.chosen(finger).map_or(String::new(), |recipe| {
-            format!("seed {} · {} steps · {}", recipe.seed, recipe.steps, state.settings.shift.label().to_lowercase())
+            format!("{} · {}", state.made_with(recipe), state.settings.shift.label().to_lowercase())
         }),
         Pane::Error => state
             .comparison(finger)

@@ -5,7 +5,7 @@ use eframe::egui::{Align, Color32, Layout, RichText, ScrollArea, Sense, Ui};
 use super::cx::{Cx, side_color};
 use super::images;
 use super::scene;
-use super::theme::{SMALL, caption, section, value};
+use super::theme::{SMALL, caption, grade_color, section, value};
 use super::widget::line::Line;
 use super::widget::texture::Memo;
 use crate::app::action::Action;
@@ -17,6 +17,7 @@ use crate::domain::postprocess::{Severity, Stage, Stats};
 use crate::domain::sample::Scale;
 use crate::domain::units;
 use crate::work::compare::Comparison;
+use crate::work::verdict::Verdict;
 use strum::IntoEnumIterator as _;
 
 /// Figures that only this pane shows.
@@ -78,8 +79,12 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.label(source.name());
             match cx.state.pose(source) {
                 Lookup::Ready(pose) | Lookup::Stale(pose) => {
-                    let (text, color) = scene::angle_text(cx.p, pose);
-                    ui.label(RichText::new(text).color(color));
+                    let verdict = Verdict::of(pose, cx.state.truth());
+                    let text = RichText::new(scene::angle_text(pose)).color(grade_color(cx.p, verdict.grade));
+                    let label = ui.label(text);
+                    if !verdict.findings.is_empty() {
+                        label.on_hover_text(verdict.text());
+                    }
                 }
                 Lookup::Waiting => {
                     ui.label(caption("…", cx.p));
@@ -159,6 +164,15 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     );
     let fingers = cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f));
     for finger in fingers {
+        if let Some(recipe) = cx.state.chosen(finger) {
+            let outdated = cx.state.outdated(finger).is_some();
+            let color = if outdated { cx.p.caution } else { cx.p.weak };
+            let text = RichText::new(cx.state.made_with(recipe)).size(SMALL).color(color);
+            let label = ui.add(eframe::egui::Label::new(text).wrap());
+            if outdated {
+                label.on_hover_text("The settings in force would make another prediction");
+            }
+        }
         match cx.state.comparison(finger) {
             Lookup::Ready(c) | Lookup::Stale(c) => {
                 let number = |v: Option<f64>, decimals: usize, unit: &str| match v {

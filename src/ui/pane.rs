@@ -51,7 +51,9 @@ fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
     if ui.rect_contains_pointer(ui.max_rect()) {
         panes.hovered = Some(pane);
     }
+    let place = ui.max_rect();
     draw(cx, ui, &mut panes.memories, pane);
+    super::outdated::show(cx, ui, pane, place);
 }
 
 /// The help mark of a pane, if it has mouse controls of its own.

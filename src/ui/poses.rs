@@ -4,8 +4,7 @@
 use eframe::egui::{Align2, Color32, FontId, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 
 use super::cx::{Cx, side_color};
-use super::scene::error_color;
-use super::theme::{SMALL, caption};
+use super::theme::{SMALL, caption, grade_color};
 use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
@@ -13,6 +12,7 @@ use crate::app::workbench::PoseOf;
 use crate::domain::frames::PlanarPose;
 use crate::domain::hand::PoseDifference;
 use crate::domain::units;
+use crate::work::verdict::Verdict;
 
 /// Height of a row: two lines of small type.
 const ROW: f32 = 32.0;
@@ -62,7 +62,7 @@ fn cells(cx: &Cx<'_>, of: PoseOf) -> [([String; 2], Color32); 3] {
     let against = |source: ImprintSource| match (pose(source), cx.state.truth()) {
         (Lookup::Ready(found), Some(truth)) => {
             let difference = PoseDifference::between(found.grasp_from_object, truth);
-            (text(difference), error_color(p, difference.angle_rad))
+            (text(difference), grade_color(p, Verdict::of(found, Some(truth)).grade))
         }
         (Lookup::Failed(_), _) => (["failed".to_owned(), String::new()], p.wrong),
         (Lookup::Waiting, _) => (["…".to_owned(), String::new()], p.weak),

@@ -11,6 +11,8 @@ use eframe::egui::{
     TextStyle, Theme, vec2,
 };
 
+use crate::work::verdict::Grade;
+
 /// The grid that every distance is a multiple of, points.
 pub const UNIT: f32 = 4.0;
 /// Small type: captions, ticks, units.
@@ -237,6 +239,16 @@ fn restyle(style: &mut egui::Style, p: &Palette, dark: bool) {
 /// The frame around the controls of a pane.
 pub fn pane_frame(palette: &Palette) -> egui::Frame {
     egui::Frame::new().fill(palette.panel).inner_margin(Margin::same(8))
+}
+
+/// The color of a grade.
+pub fn grade_color(p: &Palette, grade: Grade) -> Color32 {
+    match grade {
+        Grade::Open => p.strong,
+        Grade::Good => p.good,
+        Grade::Caution => p.caution,
+        Grade::Wrong => p.wrong,
+    }
 }
 
 /// `a` with a share `t` of `b`.

@@ -14,7 +14,7 @@ use super::compare::{of_pad, tile_of};
 use super::error::TaskError;
 use super::imprint::{color, imprint_of};
 use super::job::JobCx;
-use super::prediction::Prediction;
+use super::prediction::{Prediction, made_with};
 use crate::domain::colormap::{ColorMap, Range};
 use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
@@ -260,9 +260,7 @@ pub struct FigureFile {
 
 /// The line below a figure: what made its predictions.
 pub fn note(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> String {
-    let steps = if config.steps == 1 { "step" } else { "steps" };
-    let sampler: &'static str = config.sampler.into();
-    format!("{bundle}, {} {steps}, {sampler}, seed {}, {}", config.steps, config.seed, shift.label().to_lowercase())
+    format!("{} · {}", made_with(bundle, config), shift.label().to_lowercase())
 }
 
 /// Draws pairs of a data set. `predict` answers with the predictions of a pair's fingers; it is asked only where a column

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::domain::diffusion::{GenerateConfig, Sampler};
 use crate::domain::fit::Fitted;
 use crate::domain::postprocess::{ColorChain, DepthChain, RawPrediction, ShiftMode};
 
@@ -28,4 +29,22 @@ pub struct Prediction {
     pub seconds: f64,
     /// Whether it was made earlier and only read now.
     pub kept: bool,
+}
+
+/// How a prediction was made, as it stands beside each picture, 3D view and file of it: `model · 2 steps · seed 42`, with the
+/// sampler, its noise and the guidance where they are not the usual ones.
+pub fn made_with(model: &str, config: &GenerateConfig) -> String {
+    let GenerateConfig { steps, eta, seed, sampler, guidance, .. } = *config;
+    let plural = if steps == 1 { "" } else { "s" };
+    let mut text = format!("{model} · {steps} step{plural} · seed {seed}");
+    if sampler != Sampler::default() {
+        text += &format!(" · {}", <&str>::from(sampler));
+    }
+    if eta != 0.0 {
+        text += &format!(" · eta {eta}");
+    }
+    if guidance != 1.0 {
+        text += &format!(" · guidance {guidance}");
+    }
+    text
 }

@@ -297,7 +297,7 @@ impl State {
         let of = |pair: &PairId| {
             let touches = setup.fingers.iter().map(|finger| open.key(*pair).finger(*finger));
             let recipes = touches.filter_map(|touch| {
-                let recipe = self.results.chosen.get(&touch).cloned().or_else(|| self.recipe(touch))?;
+                let recipe = self.shown(touch).cloned().or_else(|| self.recipe(touch))?;
                 let bundle = self.library.bundle(&recipe.bundle)?.clone();
                 Some((recipe, bundle))
             });

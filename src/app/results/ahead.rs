@@ -23,8 +23,9 @@ impl Computes for AheadKey {
 
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
         let Job { lane, what, body } = self.0.job(state, services)?;
-        // Once for a pair: the other finger follows at once.
-        let first = state.rig().pads().all(|pad| state.chosen(pad).is_none());
+        // Once for a pair and settings: the other finger follows at once.
+        let beside = |pad| PredictionKey { touch: self.0.touch.pair.finger(pad), ..self.0.clone() };
+        let first = !state.rig().pads().any(|pad| state.results.predictions.contains(&beside(pad)));
         let patience = if first { services.patience() } else { Duration::ZERO };
         let told = what.clone();
         Some(Job::new(lane, what, move |cx| {
@@ -41,7 +42,7 @@ impl Computes for AheadKey {
     }
 
     fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
-        state.keep_prediction(self.0.clone(), made.clone());
+        state.keep_prediction(self.0.clone(), made.clone(), true);
     }
 }
 
@@ -67,10 +68,12 @@ impl State {
             return None;
         }
         let touch = self.touch_key(finger).filter(|touch| self.results.looked_up.contains(touch))?;
-        if self.results.chosen.contains_key(&touch) || !self.can_start(finger) {
+        let key = AheadKey(self.recipe(touch)?);
+        // What a person picked under these settings is meant.
+        let there = self.results.predictions.contains(&key.0) || self.picked(touch).is_some();
+        if there || !self.can_start(finger) {
             return None;
         }
-        let key = AheadKey(self.recipe(touch)?);
         let cheap = self.cost_of(&key.0).is_none_or(|seconds| seconds < CHEAP_S);
         (cheap && self.failure(key.clone()).is_none()).then_some(key)
     }

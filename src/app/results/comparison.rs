@@ -24,7 +24,7 @@ impl State {
 impl Wanted<'_> {
     pub(crate) fn comparison(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
-        let Some(recipe) = state.results.chosen.get(&touch) else { return };
+        let Some(recipe) = state.shown(touch) else { return };
         let there = |source| state.imprint(source, finger).ready().is_some();
         if there(ImprintSource::Measured) && there(ImprintSource::Predicted) {
             self.ask(VersusKey::measured(recipe.clone(), state.settings.shift));

@@ -169,7 +169,7 @@ impl State {
         match source {
             ImprintSource::Measured => Ok(ImprintKey::Measured(touch)),
             ImprintSource::Predicted => {
-                let recipe = self.results.chosen.get(&touch).ok_or(Absent::NoPrediction)?;
+                let recipe = self.shown(touch).ok_or(Absent::NoPrediction)?;
                 if self.is_color(recipe) {
                     return Err(Absent::PredictsColor);
                 }
@@ -207,7 +207,7 @@ impl State {
 impl Wanted<'_> {
     pub(crate) fn imprint(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
-        let Some(recipe) = state.results.chosen.get(&touch).cloned() else { return };
+        let Some(recipe) = state.shown(touch).cloned() else { return };
         // The sample says how large the bubble image is.
         if state.touch(finger).ready().is_none() {
             return;

@@ -43,7 +43,7 @@ impl State {
 impl Wanted<'_> {
     pub(crate) fn ledger(&mut self, touch: TouchKey) {
         let state = self.state;
-        let Some(recipe) = state.results.chosen.get(&touch) else { return };
+        let Some(recipe) = state.shown(touch) else { return };
         let there = state.results.samples.contains(&touch.pair) && state.results.predictions.contains(recipe);
         if there && !state.is_color(recipe) {
             self.ask(LedgerKey(recipe.clone(), state.settings.shift));

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::super::keys::{Bits, Sampler, Spacing};
 use super::super::services::{DataSource, Services};
 use super::preview::Onlooker;
-use super::{Computes, Job, Lane, SharedServices, State, TouchKey, Wanted};
+use super::{Computes, Job, Lane, Results, SharedServices, State, TouchKey, Wanted};
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::ensemble::seeds;
 use crate::domain::grid::RgbGrid;
@@ -96,15 +96,21 @@ impl Computes for PredictionKey {
     }
 
     fn arrived(&self, state: &mut State, _: &Arc<Prediction>) {
-        let results = &mut state.results;
-        let made = results.made.entry(self.touch).or_default();
-        made.retain(|recipe| recipe != self);
-        made.push(self.clone());
-        results.chosen.insert(self.touch, self.clone());
+        state.results.list_made(self, true);
+    }
+}
+
+impl Results {
+    /// Lists a prediction that was kept; with `in_front` it is shown where the settings name none that is there.
+    pub(super) fn list_made(&mut self, recipe: &PredictionKey, in_front: bool) {
+        let made = self.made.entry(recipe.touch).or_default();
+        made.retain(|other| other != recipe);
+        made.push(recipe.clone());
+        self.shown.made(recipe, in_front);
         // Old predictions may have left the cache to make room.
-        let kept = &results.predictions;
-        results.made.values_mut().for_each(|list| list.retain(|recipe| kept.contains(recipe)));
-        results.chosen.retain(|_, recipe| kept.contains(recipe));
+        let kept = &self.predictions;
+        self.made.values_mut().for_each(|list| list.retain(|recipe| kept.contains(recipe)));
+        self.shown.retain(kept);
     }
 }
 
@@ -120,11 +126,8 @@ impl Computes for SeedKey {
     }
 
     fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
-        let touch = self.0.touch;
-        let shown = state.results.chosen.get(&touch).cloned();
-        state.keep_prediction(self.0.clone(), made.clone());
         // A seed among several does not push away what is looked at.
-        state.choose_again(shown);
+        state.keep_prediction(self.0.clone(), made.clone(), false);
     }
 }
 
@@ -150,38 +153,15 @@ impl Computes for StoredKey {
         }))
     }
 
-    /// What fits the settings is shown if nothing is yet, else the last used.
+    /// Where the settings name none of them, the one used last is shown, unless something is already.
     fn arrived(&self, state: &mut State, found: &Arc<Keyed>) {
         state.results.looked_up.insert(self.0);
-        let shown = state.results.chosen.get(&self.0).cloned();
-        let fitting = state.recipe(self.0).filter(|recipe| found.iter().any(|(key, _)| key == recipe));
+        let nothing = state.shown(self.0).is_none();
         for (key, made) in found.iter() {
             if !state.results.predictions.contains(key) {
-                state.keep_prediction(key.clone(), made.clone());
+                state.keep_prediction(key.clone(), made.clone(), nothing);
             }
         }
-        state.choose_again(shown.or(fitting));
-    }
-}
-
-impl State {
-    /// Keeps a prediction of the open data set, and shows it.
-    pub(crate) fn keep_prediction(&mut self, recipe: PredictionKey, made: Arc<Prediction>) {
-        if self.library.open.as_ref().is_some_and(|open| open.seq == recipe.touch.pair.dataset) {
-            super::Computed::Prediction(recipe, made).keep(self);
-        }
-    }
-
-    /// Shows what was shown before, if it is still there.
-    fn choose_again(&mut self, recipe: Option<PredictionKey>) {
-        if let Some(recipe) = recipe.filter(|recipe| self.results.predictions.contains(recipe)) {
-            self.results.chosen.insert(recipe.touch, recipe);
-        }
-    }
-
-    /// The prediction shown for one finger, if one was made.
-    pub fn chosen(&self, finger: PadId) -> Option<&PredictionKey> {
-        self.results.chosen.get(&self.touch_key(finger)?)
     }
 }
 
@@ -200,10 +180,10 @@ impl Wanted<'_> {
         let made = state.rig().pads().filter(|pad| *pad != finger).find_map(|pad| state.chosen(pad));
         let (Some(touch), Some(made)) = (state.touch_key(finger), made) else { return };
         let looked_up = state.results.looked_up.contains(&touch);
-        if !state.settings.generate.both_fingers || !looked_up || state.chosen(finger).is_some() {
+        let recipe = PredictionKey { touch, ..made.clone() };
+        if !state.settings.generate.both_fingers || !looked_up || state.results.predictions.contains(&recipe) {
             return;
         }
-        let recipe = PredictionKey { touch, ..made.clone() };
         let under_way = state.tasks.generating(&recipe).is_some();
         if state.library.bundle(&recipe.bundle).is_some() && state.can_start(finger) && !under_way {
             self.ask(recipe);

@@ -17,8 +17,9 @@ use crate::gpu::guides;
 use crate::gpu::view::Camera;
 use crate::ui::cx::Cx;
 use crate::ui::scene_view::SceneOutput;
-use crate::ui::theme::Palette;
+use crate::ui::theme::{Palette, SMALL, grade_color};
 use crate::work::pose::PoseResult;
+use crate::work::verdict::Grade;
 
 /// Scale bar, names of the axes, legend, buttons.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput) {
@@ -27,8 +28,18 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: Imprin
     if cx.state.settings.scene.layer(SceneLayer::Guides).shown {
         axes_and_scale(cx.p, &ui.painter_at(rect), &camera, output, rect);
     }
+    if source == ImprintSource::Predicted {
+        made_with(cx, &ui.painter_at(rect), rect);
+    }
     legend::show(cx, ui, memory, source, rect);
     super::steps::show_legend(cx, ui, memory, source, rect);
+}
+
+/// Model, steps and seed of the prediction that the cloud was made of, at the upper right corner.
+fn made_with(cx: &Cx<'_>, painter: &egui::Painter, rect: Rect) {
+    let Some(recipe) = cx.state.rig().pads().find_map(|finger| cx.state.chosen(finger)) else { return };
+    let at = rect.right_top() + egui::vec2(-6.0, 4.0);
+    painter.text(at, Align2::RIGHT_TOP, cx.state.made_with(recipe), FontId::proportional(SMALL), cx.p.weak);
 }
 
 /// Angle and figures of the step shown, where that is not the registered pose.
@@ -94,25 +105,20 @@ pub(super) fn lower_first(absent: Absent) -> String {
     chars.next().map_or(String::new(), |c| c.to_lowercase().chain(chars).collect())
 }
 
-/// `11.9° (true 12.3°, error 0.4°)`, green, amber or red by the usual limits of 5 and 10 degrees.
-pub(in crate::ui) fn angle_text(p: &Palette, pose: &PoseResult) -> (String, Color32) {
+/// `11.9° (true 12.3°, error 0.4°)`.
+pub(in crate::ui) fn angle_text(pose: &PoseResult) -> String {
     let angle = units::text_deg(pose.angle_rad);
     match (pose.truth_rad, pose.error_rad) {
         (Some(truth), Some(error)) => {
-            let text = format!("{angle} (true {}, error {})", units::text_deg(truth), units::text_deg(error));
-            (text, error_color(p, error))
+            format!("{angle} (true {}, error {})", units::text_deg(truth), units::text_deg(error))
         }
-        _ => (angle, p.strong),
+        _ => angle,
     }
 }
 
 /// The color of an angle error.
 pub(in crate::ui) fn error_color(p: &Palette, error_rad: f64) -> Color32 {
-    match error_rad.to_degrees() {
-        e if e <= 5.0 => p.good,
-        e if e <= 10.0 => p.caution,
-        _ => p.wrong,
-    }
+    grade_color(p, Grade::of_angle_error(error_rad))
 }
 
 /// How long a registration took. On a line of its own: no other text wraps elsewhere because a machine was busy.

@@ -10,71 +10,14 @@ use crate::app::keys::ImprintSource;
 use crate::app::settings::MaskSource;
 use crate::app::state::{Absent, Lookup, State};
 use crate::domain::align::MIN_POINTS;
-use crate::domain::hand::PoseDifference;
 use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::images;
-use crate::ui::theme::{Palette, SMALL};
-use crate::work::pose::PoseResult;
+use crate::ui::theme::{SMALL, grade_color};
+use crate::work::verdict::Verdict;
 
 /// Height of the line, points.
 const HEIGHT: f32 = 22.0;
-/// Limits of a good and of a usable angle, radians: the paper's.
-const ANGLE_RAD: [f64; 2] = [5.0 / 180.0 * std::f64::consts::PI, 10.0 / 180.0 * std::f64::consts::PI];
-/// Limits of a good and of a usable place, meters: a tenth and a half of what the gripper leaves open.
-const PLACE_M: [f64; 2] = [1e-3, 5e-3];
-
-/// How much a pose can be relied on; a later one is worse.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Grade {
-    /// Nothing is known against it, and nothing for it: there is no truth.
-    Open,
-    Good,
-    Caution,
-    Wrong,
-}
-
-impl Grade {
-    /// By two limits.
-    fn of(value: f64, [good, usable]: [f64; 2]) -> Self {
-        match value {
-            v if v <= good => Self::Good,
-            v if v <= usable => Self::Caution,
-            _ => Self::Wrong,
-        }
-    }
-
-    fn color(self, p: &Palette) -> Color32 {
-        match self {
-            Self::Open => p.strong,
-            Self::Good => p.good,
-            Self::Caution => p.caution,
-            Self::Wrong => p.wrong,
-        }
-    }
-}
-
-/// What speaks for or against a pose, the worst first.
-pub(super) fn findings(state: &State, pose: &PoseResult) -> Vec<(Grade, String)> {
-    let mut found = Vec::new();
-    if let Some(truth) = state.truth() {
-        let off = PoseDifference::between(pose.grasp_from_object, truth);
-        let grade = Grade::of(off.angle_rad, ANGLE_RAD).max(Grade::of(off.position_m, PLACE_M));
-        found.push((grade, format!("off by {}, {}", units::text_deg(off.angle_rad), units::text_mm(off.position_m))));
-    }
-    if !pose.report.within_prior {
-        found.push((Grade::Wrong, "the gripper cannot hold it so (±22.5°, ±5 mm)".into()));
-    }
-    if pose.report.is_degenerate() {
-        found.push((Grade::Caution, "not determined by the contact".into()));
-    }
-    if pose.report.refused().is_some() {
-        found.push((Grade::Caution, "a cheaper place was refused: the gripper cannot hold it so".into()));
-    }
-    found.sort_by_key(|(grade, _)| std::cmp::Reverse(*grade));
-    found
-}
-
 /// Whether there is no pose because the mask has too few contact points.
 fn lacks_contact(state: &State, source: ImprintSource) -> bool {
     match state.pose(source) {
@@ -149,21 +92,17 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
     }
     let (text, color, mut details) = match state.pose(source) {
         Lookup::Ready(pose) | Lookup::Stale(pose) => {
-            let found = findings(state, pose);
-            let grade = found.first().map_or(Grade::Open, |(grade, _)| *grade);
-            let mut text = units::text_deg(pose.angle_rad);
-            for (_, why) in &found {
-                text += &format!(" · {why}");
-            }
-            if found.is_empty() {
-                text += &format!(" · residual {}", units::text_mm(pose.rms_m));
-            }
+            let verdict = Verdict::of(pose, state.truth());
+            let mut text = match verdict.findings.is_empty() {
+                false => format!("{} · {}", units::text_deg(pose.angle_rad), verdict.text()),
+                true => format!("{} · residual {}", units::text_deg(pose.angle_rad), units::text_mm(pose.rms_m)),
+            };
             if state.provisional_pose(source).is_some() {
                 text += " · being proved…";
             }
             let mut details = vec![format!("{}, {}", pose_details(pose), pose_time(pose))];
             details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
-            (text, grade.color(cx.p), details)
+            (text, grade_color(cx.p, verdict.grade), details)
         }
         Lookup::Waiting => ("Pose: computing…".to_owned(), cx.p.weak, Vec::new()),
         Lookup::Failed(err) => (format!("No pose: {}", err.why), cx.p.wrong, vec![err.to_string()]),
@@ -180,17 +119,4 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
         details.push(difference("Measured and predicted", "apart", apart));
     }
     (text, color, details)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_value_is_graded_by_its_limits_and_what_is_no_number_is_wrong() {
-        let at = |deg: f64| Grade::of(deg.to_radians(), ANGLE_RAD);
-        assert_eq!([at(0.0), at(4.9), at(9.0), at(11.0)], [Grade::Good, Grade::Good, Grade::Caution, Grade::Wrong]);
-        assert_eq!(at(f64::NAN), Grade::Wrong);
-        assert!(Grade::Wrong > Grade::Caution && Grade::Good > Grade::Open);
-    }
 }

@@ -1,0 +1,206 @@
+//! A prediction on screen is that of the settings in force, or says that it is not.
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::keys::{ImprintSource, Preset, Sampler};
+use touch2touch::app::settings::GenerateSettings;
+use touch2touch::app::state::State;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::domain::rig::{PadId, lab};
+use touch2touch::infer::engine::EngineChoice;
+
+use super::double::Bench;
+use super::panes;
+
+const RIGHT: PadId = lab::RIGHT;
+
+/// Something that a person does to settings and predictions.
+#[derive(Clone, Debug)]
+enum Move {
+    Steps(u32),
+    Seed(u64),
+    Eta(f32),
+    Model(u8),
+    Preset(Preset),
+    Runtime(EngineChoice),
+    ByItself(bool),
+    Select(u32),
+    Both(bool),
+    Generate,
+    NewSeed,
+    Pick(usize),
+}
+
+fn moves() -> impl Strategy<Value = Move> {
+    prop_oneof![
+        (1u32..4).prop_map(Move::Steps),
+        (40u64..43).prop_map(Move::Seed),
+        prop_oneof![Just(0.0f32), Just(0.5)].prop_map(Move::Eta),
+        (0u8..2).prop_map(Move::Model),
+        prop_oneof![Just(Preset::Default), Just(Preset::Fast)].prop_map(Move::Preset),
+        prop_oneof![Just(EngineChoice::Auto), Just(EngineChoice::Rten)].prop_map(Move::Runtime),
+        any::<bool>().prop_map(Move::ByItself),
+        (0u32..4).prop_map(Move::Select),
+        any::<bool>().prop_map(Move::Both),
+        Just(Move::Generate),
+        Just(Move::NewSeed),
+        (0usize..4).prop_map(Move::Pick),
+    ]
+}
+
+fn with(state: &State, change: impl FnOnce(&mut GenerateSettings)) -> Command {
+    let mut new = state.settings.generate.clone();
+    change(&mut new);
+    SettingsCommand::SetGenerate(new).into()
+}
+
+impl Move {
+    fn command(&self, state: &State) -> Option<Command> {
+        Some(match self.clone() {
+            Self::Steps(n) => with(state, |g| (g.preset, g.steps) = (None, n)),
+            Self::Seed(n) => with(state, |g| g.seed = n),
+            Self::Eta(eta) => with(state, |g| (g.preset, g.eta) = (None, eta)),
+            Self::Model(n) => with(state, |g| g.bundle = Some(["gen", "fitted"][usize::from(n)].into())),
+            Self::Preset(preset) => with(state, |g| g.preset = Some(preset)),
+            Self::Runtime(runtime) => SettingsCommand::SetRuntime(runtime).into(),
+            Self::ByItself(on) => with(state, |g| g.by_itself = on),
+            Self::Select(pair) => LibraryCommand::Select(PairId(pair)).into(),
+            Self::Both(on) => ViewCommand::ShowBothFingers(on).into(),
+            Self::Generate => PredictCommand::Generate.into(),
+            Self::NewSeed => PredictCommand::GenerateNewSeed.into(),
+            Self::Pick(at) => {
+                let made = state.results.made.get(&state.touch_key(RIGHT)?)?;
+                PredictCommand::Choose(made.get(at % made.len())?.clone()).into()
+            }
+        })
+    }
+}
+
+/// What must hold of what is on screen, when nothing runs.
+fn holds(state: &State, after: &str) {
+    for finger in state.fingers() {
+        let touch = state.touch_key(finger).expect("a pair is on screen");
+        let named = state.recipe(touch).expect("there is a generator");
+        let Some(shown) = state.chosen(finger) else {
+            assert!(!state.settings.generate.by_itself, "nothing is shown after {after}");
+            continue;
+        };
+        assert_eq!(shown.touch, touch, "of another pair after {after}");
+        match state.outdated(finger) {
+            None => assert_eq!(shown, &named, "it is not what the settings make, and nothing says so, after {after}"),
+            Some(outdated) => {
+                assert_ne!(shown, &named, "{outdated:?} after {after}");
+                assert!(outdated.picked || !state.settings.generate.by_itself, "{outdated:?} after {after}");
+                let model = &state.library.bundle(&shown.bundle).expect("it is there").name;
+                let (steps, seed) = (format!(" {} step", shown.steps), format!("seed {}", shown.seed));
+                for word in [model.as_str(), &steps, &seed] {
+                    assert!(outdated.made_with.contains(word), "{word:?} is not in {:?}", outdated.made_with);
+                }
+            }
+        }
+        // What is derived from it is of the same prediction.
+        let imprint = state.imprint_key(ImprintSource::Predicted, finger).expect("it was made");
+        assert!(format!("{imprint:?}").contains(&format!("{shown:?}")), "after {after}");
+    }
+}
+
+fn bench() -> Bench {
+    let mut bench = Bench::open();
+    // A second generator beside the first: what it predicts is another recipe.
+    let mut fitted = bench.state.library.bundles[0].clone();
+    (fitted.id, fitted.name) = ("fitted".into(), "fitted".into());
+    bench.state.library.bundles.push(fitted);
+    bench.send(panes(&[Pane::Predicted, Pane::Error, Pane::Generate]));
+    bench.send(LibraryCommand::Select(PairId(1)));
+    bench.settle();
+    bench
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn after_any_settings_what_is_shown_is_theirs_or_says_that_it_is_not(list in prop::collection::vec(moves(), 1..14)) {
+        let mut bench = bench();
+        for (at, one) in list.iter().enumerate() {
+            let Some(command) = one.command(&bench.state) else { continue };
+            bench.send(command);
+            bench.settle();
+            holds(&bench.state, &format!("{:?}", &list[..=at]));
+        }
+    }
+}
+
+#[test]
+fn another_model_is_predicted_with_at_once_on_this_pair_and_on_those_seen_before() {
+    let mut bench = bench();
+    bench.send(with(&bench.state, |g| g.by_itself = true));
+    for pair in [2, 3, 1] {
+        bench.send(LibraryCommand::Select(PairId(pair)));
+        bench.settle();
+    }
+    let model = |bench: &Bench| bench.state.chosen(RIGHT).expect("a prediction").bundle.clone();
+    assert_eq!((&*model(&bench), bench.services.generated()), ("gen", 3));
+    bench.send(Move::Model(1).command(&bench.state).unwrap());
+    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.coming && !outdated.picked));
+    bench.settle();
+    assert_eq!((&*model(&bench), bench.state.outdated(RIGHT)), ("fitted", None));
+    // The next pair was predicted with the first model before.
+    bench.send(LibraryCommand::Step(1));
+    bench.settle();
+    assert_eq!((&*model(&bench), bench.state.outdated(RIGHT)), ("fitted", None));
+    // Back: both are there, and nothing is made again.
+    let made = bench.services.generated();
+    bench.send(Move::Model(0).command(&bench.state).unwrap());
+    bench.settle();
+    assert_eq!((&*model(&bench), bench.services.generated()), ("gen", made));
+}
+
+#[test]
+fn a_start_with_another_model_selected_does_not_open_on_the_picture_of_the_first() {
+    let mut first = bench();
+    first.send(PredictCommand::Generate);
+    first.settle();
+    let kept: Vec<_> =
+        first.state.results.predictions.iter().map(|(key, made)| (key.clone(), (**made).clone())).collect();
+    let mut again = bench();
+    again.send(Move::Model(1).command(&again.state).unwrap());
+    *again.services.kept.lock().unwrap() = kept;
+    again.send(LibraryCommand::Select(PairId(0)));
+    again.send(LibraryCommand::Select(PairId(1)));
+    again.state.results.looked_up.clear();
+    again.settle();
+    // Nothing is predicted by itself here: the picture from before is shown, and says whose it is.
+    let outdated = again.state.outdated(RIGHT).expect("it is of another model");
+    assert!(outdated.made_with.starts_with("gen ") && !outdated.coming && !outdated.picked, "{outdated:?}");
+    again.send(with(&again.state, |g| g.by_itself = true));
+    again.settle();
+    assert_eq!(again.state.outdated(RIGHT), None);
+    assert_eq!(&*again.state.chosen(RIGHT).unwrap().bundle, "fitted");
+}
+
+#[test]
+fn what_a_person_picks_stays_until_the_settings_change_and_comes_back_with_them() {
+    let mut bench = bench();
+    for seed in [42, 41] {
+        bench.send(Move::Seed(seed).command(&bench.state).unwrap());
+        bench.send(with(&bench.state, |g| g.seed_locked = true));
+        bench.send(PredictCommand::Generate);
+        bench.settle();
+    }
+    let touch = bench.state.touch_key(RIGHT).unwrap();
+    let first = Arc::new(bench.state.results.made[&touch][0].clone());
+    bench.send(PredictCommand::Choose((*first).clone()));
+    assert_eq!(bench.state.chosen(RIGHT), Some(&*first));
+    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.picked));
+    bench.send(Move::Steps(3).command(&bench.state).unwrap());
+    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| !outdated.picked));
+    bench.send(with(&bench.state, |g| g.preset = Some(Preset::Default)));
+    assert_eq!(bench.state.chosen(RIGHT), Some(&*first));
+    // Generating asks for what the settings say.
+    bench.send(PredictCommand::Generate);
+    assert_eq!((bench.state.chosen(RIGHT).unwrap().seed, bench.state.outdated(RIGHT)), (41, None));
+    assert_eq!(bench.state.settings.generate.sampler, Sampler::default());
+}
