@@ -10,6 +10,8 @@ mod adapt;
 #[cfg(feature = "onnx")]
 mod agreement;
 mod apply;
+#[cfg(feature = "onnx")]
+mod case;
 mod cli;
 #[cfg(feature = "onnx")]
 mod cli_generate;

@@ -103,7 +103,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         }
         Answer::Bundles(bundles, problems) => {
             library::found(state, bundles, problems);
-            export::predict_case(state, effects);
+            export::case_models(state, effects);
         }
         Answer::SettingsLoaded(settings, problem) => {
             state.settings = settings.validated();

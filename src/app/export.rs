@@ -6,10 +6,13 @@ pub mod state;
 pub use state::{CaseView, ExportState, FigureForm, ImportForm, MOST_PAIRS, Output, PairExport, SCALES};
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::effect::Effect;
+use super::keys::{ImprintSource, PredictionKey};
 use super::settings::state::GenerateSettings;
 use super::state::State;
+use super::tasks::state::Level;
 use super::view::state::UiRequest;
 use super::{library, predict, settings};
 use crate::io::case_file;
@@ -81,7 +84,8 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
 pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
     state.export.predict = false;
     let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-    let Some((pair, case)) = source.case() else { return own_preferences(state, effects) };
+    state.library.lacking = None;
+    let Some((pair, case, held)) = source.case() else { return own_preferences(state, effects) };
     let now = state.settings.clone();
     // Of several cases in a row the first took over from the person.
     state.own.get_or_insert_with(|| Box::new(now.clone()));
@@ -110,15 +114,17 @@ pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
             guidance: config.guidance as f32,
             ..state.settings.generate.clone()
         };
-        state.export.predict = true;
     }
+    state.export.predict = true;
     state.settings = state.settings.clone().validated();
     settings::save(state, effects);
     library::select(state, pair, effects);
     effects.push(Effect::Ui(UiRequest::ShowView(view.map_or_else(String::new, |view| view.camera))));
     let text = "with the preferences that it was saved with; yours come back with the next data set";
     state.log.info(format!("A case of {}, {text}", case.dataset));
-    predict_case(state, effects);
+    // With the answer it is known which of the case's models are here.
+    let folders = state.settings.bundle_folders.iter().chain(&held.models).cloned();
+    effects.push(Effect::FindBundles(folders.collect()));
 }
 
 /// Gives the person's own preferences back, where a case has brought others.
@@ -129,13 +135,43 @@ fn own_preferences(state: &mut State, effects: &mut Vec<Effect>) {
     effects.push(Effect::Ui(UiRequest::ShowView(String::new())));
 }
 
-/// Predicts what an opened case showed, as soon as there is a generator.
-pub(super) fn predict_case(state: &mut State, effects: &mut Vec<Effect>) {
-    if state.export.predict && state.can_generate().is_ok() {
-        state.export.predict = false;
-        predict::same_seed(state, effects);
+/// Predicts what an opened case showed, now that it is known which models are here; where its generator is not, shows the
+/// imprints that it holds.
+pub(super) fn case_models(state: &mut State, effects: &mut Vec<Effect>) {
+    let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
+    let Some((pair, case, held)) = source.case().filter(|_| std::mem::take(&mut state.export.predict)) else { return };
+    if let Some(model) = &case.recipe.mask_model
+        && state.library.bundle(&model.id).is_none()
+    {
+        let text =
+            format!("The mask model {} of the case is not on this machine: its masks are made another way", model.name);
+        state.log.push(Level::Warning, text, None, Some(CASE_HINT.into()));
+    }
+    let Some((model, config)) = &case.recipe.generator else { return };
+    if let Some(bundle) = state.library.bundle(&model.id) {
+        state.settings.generate.bundle = Some(bundle.name.clone());
+        return predict::same_seed(state, effects);
+    }
+    let text = format!(
+        "The generator {} of the case is not on this machine: its predicted imprints are shown as the case holds them, \
+         and cannot be made again here",
+        model.name
+    );
+    state.log.push(Level::Warning, text, None, Some(CASE_HINT.into()));
+    let id: Arc<str> = model.id.as_str().into();
+    state.library.lacking = Some((id.clone(), model.name.clone()));
+    let Some(open) = &state.library.open else { return };
+    let (pair, runtime) = (open.key(pair), case.recipe.runtime);
+    let imprints = held.imprints.iter().filter(|((source, _), _)| *source == ImprintSource::Predicted);
+    for ((_, finger), imprint) in imprints {
+        let recipe = PredictionKey::new(pair.finger(*finger), id.clone(), runtime, config);
+        state.hold(recipe, case.recipe.shift, Arc::new(imprint.clone()), &model.name);
     }
 }
+
+/// What helps where a case names a model that is not here.
+const CASE_HINT: &str =
+    "Put the model's folder into one that the preferences name, or have the case saved again with it.";
 
 fn import(state: &mut State, effects: &mut Vec<Effect>) {
     let (Some(setup), Some(open)) = (state.import_setup(), &state.library.open) else { return };

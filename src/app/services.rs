@@ -26,7 +26,7 @@ use crate::io::dataset::{Dataset, ToolUnit};
 use crate::io::statistics::ShiftStatistics;
 use crate::work::adapt::{self, AdaptSetup, Adapted};
 use crate::work::bundles::{self, BundleInfo};
-use crate::work::case::{self, Case, CaseSetup};
+use crate::work::case::{self, Case, CaseSetup, Held};
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{ExportChoice, HandMasks, Plan};
@@ -58,8 +58,8 @@ pub trait DataSource: Send + Sync {
         let why = "this kind of source cannot be read outside the studio";
         self.as_dataset().ok_or_else(|| TaskError::new(what, why))
     }
-    /// The case that it is, with its pair, if it was opened from one.
-    fn case(&self) -> Option<(PairId, &Case)> {
+    /// The case that it is, with its pair and what it brings besides, if it was opened from one.
+    fn case(&self) -> Option<(PairId, &Case, &Held)> {
         None
     }
     /// The sensors that its touches were felt with.

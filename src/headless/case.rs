@@ -10,7 +10,6 @@ use super::contact_mask::{MaskArgs, labels_of};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use crate::domain::pose::RegistrationChoice;
-use crate::work::bundles;
 use crate::work::case::{CaseSetup, check, make, open};
 use crate::work::labels::Labels;
 use crate::work::models::Models;
@@ -111,7 +110,7 @@ fn run_check(args: &CheckArgs) -> VerbResult {
     let output = Output::new(args.common, "checking", 1);
     let opened = open(&args.file, folder.path())?;
     // Nothing that was kept from before: what is checked is made now.
-    let report = check(&opened, &bundles::find(&[]), &Models::new(None), &output.job())?;
+    let report = check(&opened, &opened.bundles(), &Models::new(None), &output.job())?;
     let same = report.same;
     output.finish(&report, || match same {
         true => format!("{}: all {} results are the same, bit for bit", report.pair, report.compared),

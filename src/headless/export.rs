@@ -16,6 +16,7 @@ use crate::domain::align::Ask;
 use crate::domain::findings::Finding;
 use crate::domain::pose::RegistrationChoice;
 use crate::work::cloud::clouds;
+use crate::work::figure::note;
 use crate::work::job::JobCx;
 use crate::work::labels::{ImprintSource, Labels};
 use crate::work::mask::MaskInputs;
@@ -115,9 +116,17 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
         found => found?,
     };
     let mask = contact.made_of();
+    let prediction = match args.imprint {
+        ImprintSource::Measured => None,
+        ImprintSource::Predicted => {
+            let (config, shift) = (predictor.config()?, predictor.shift());
+            Some(note(&predictor.bundle()?.name, &config, shift))
+        }
+    };
     let parts = PairParts {
         name: &entry.name,
         source: args.imprint,
+        prediction: prediction.as_deref(),
         rig: &sample.rig,
         clouds: &clouds,
         mask: &mask,

@@ -46,6 +46,27 @@ pub struct CaseContent {
     pub manifest: Vec<u8>,
     /// The files, by their path below the data folder, with `/`.
     pub files: BTreeMap<String, Vec<u8>>,
+    /// What it brings besides the data, by its path in the case: results and models ([`BESIDE`]).
+    pub beside: BTreeMap<String, Vec<u8>>,
+}
+
+/// Results of a case: below this folder of it.
+pub const RESULTS: &str = "results/";
+/// Models of a case: below this folder of it.
+pub const MODELS: &str = "models/";
+/// The folders of a case besides that of the data.
+const BESIDE: [&str; 2] = [RESULTS, MODELS];
+
+impl CaseContent {
+    /// All files but the manifest.
+    fn all(&self) -> impl Iterator<Item = (&String, &Vec<u8>)> {
+        self.files.iter().chain(&self.beside)
+    }
+}
+
+/// Whether a path in a case is that of a result or a model.
+fn is_beside(name: &str) -> bool {
+    BESIDE.iter().any(|folder| name.strip_prefix(folder).is_some_and(is_plain))
 }
 
 /// Whether a path below the data folder is one on every system: relative, without dots and drives.
@@ -69,15 +90,17 @@ pub fn is_case(path: &Path) -> bool {
 /// If a file has a name that could not be unpacked everywhere, there is more than can be read back, or the disk refuses.
 pub fn write(file: &Path, content: &CaseContent) -> Result<(), CaseFileError> {
     let damaged = |reason: String| CaseFileError::Damaged { file: file.to_owned(), reason };
-    let all: u64 = content.files.values().map(|bytes| bytes.len() as u64).sum();
-    let largest = content.files.values().map(|bytes| bytes.len() as u64).max().unwrap_or(0);
-    if content.files.len() > MAX_FILES || largest > MAX_FILE || all > MAX_ALL {
-        return Err(damaged(format!("its {} files of {all} bytes are too much for a case", content.files.len())));
+    let all: u64 = content.all().map(|(_, bytes)| bytes.len() as u64).sum();
+    let largest = content.all().map(|(_, bytes)| bytes.len() as u64).max().unwrap_or(0);
+    let count = content.all().count();
+    if count > MAX_FILES || largest > MAX_FILE || all > MAX_ALL {
+        return Err(damaged(format!("its {count} files of {all} bytes are too much for a case")));
     }
     if content.manifest.len() as u64 > MAX_MANIFEST {
         return Err(damaged(format!("its manifest of {} bytes is too large", content.manifest.len())));
     }
-    if let Some(name) = content.files.keys().find(|name| !is_plain(name)) {
+    let odd = content.beside.keys().find(|name| !is_beside(name));
+    if let Some(name) = content.files.keys().find(|name| !is_plain(name)).or(odd) {
         return Err(damaged(format!("{:?} is no name that every system can unpack", files::clip(name))));
     }
     atomic::write(file, |out| {
@@ -88,6 +111,10 @@ pub fn write(file: &Path, content: &CaseContent) -> Result<(), CaseFileError> {
         zip.write_all(&content.manifest)?;
         for (name, bytes) in &content.files {
             zip.start_file(format!("data/{name}"), options)?;
+            zip.write_all(bytes)?;
+        }
+        for (name, bytes) in &content.beside {
+            zip.start_file(name.as_str(), options)?;
             zip.write_all(bytes)?;
         }
         zip.finish()?;
@@ -126,10 +153,12 @@ pub fn read(file: &Path) -> Result<CaseContent, CaseFileError> {
             }
             continue;
         }
-        let Some(path) = name.strip_prefix("data/").filter(|path| is_plain(path)) else {
-            return Err(damaged(format!("{name:?} is no file of a case")));
+        let twice = match name.strip_prefix("data/").filter(|path| is_plain(path)) {
+            Some(path) => content.files.insert(path.to_owned(), bytes),
+            None if is_beside(&name) => content.beside.insert(name.clone(), bytes),
+            None => return Err(damaged(format!("{name:?} is no file of a case"))),
         };
-        if content.files.insert(path.to_owned(), bytes).is_some() {
+        if twice.is_some() {
             return Err(damaged(format!("{name:?} is in it twice")));
         }
     }
@@ -142,13 +171,30 @@ pub fn read(file: &Path) -> Result<CaseContent, CaseFileError> {
 /// # Errors
 /// Whatever the disk says.
 pub fn unpack(content: &CaseContent, folder: &Path) -> Result<(), CaseFileError> {
+    std::fs::create_dir_all(folder).map_err(|source| CaseFileError::Io { file: folder.to_owned(), source })?;
+    write_all(&content.files, folder)
+}
+
+/// Writes the models of a case below a folder, which is made if there are any, each in a folder of its own.
+///
+/// # Errors
+/// Whatever the disk says.
+pub fn unpack_models(content: &CaseContent, folder: &Path) -> Result<(), CaseFileError> {
+    let models = content.beside.iter().filter_map(|(name, bytes)| Some((name.strip_prefix(MODELS)?, bytes)));
+    write_all(models, folder)
+}
+
+fn write_all<N: AsRef<Path>, B: AsRef<[u8]>>(
+    files: impl IntoIterator<Item = (N, B)>,
+    folder: &Path,
+) -> Result<(), CaseFileError> {
     let io = |file: &Path| {
         let file = file.to_owned();
         move |source| CaseFileError::Io { file, source }
     };
-    std::fs::create_dir_all(folder).map_err(io(folder))?;
-    for (name, bytes) in &content.files {
+    for (name, bytes) in files {
         let file = folder.join(name);
+        let bytes = bytes.as_ref();
         let parent = file.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent).map_err(io(parent))?;
         atomic::write_bytes(&file, bytes).map_err(io(&file))?;
@@ -165,6 +211,7 @@ mod tests {
         CaseContent {
             manifest: b"{}".to_vec(),
             files: files.into_iter().map(|(name, bytes)| (name.to_owned(), bytes)).collect(),
+            beside: [("results/a.npy".to_owned(), vec![7]), ("models/m/manifest.json".to_owned(), vec![8])].into(),
         }
     }
 
@@ -191,6 +238,8 @@ mod tests {
         assert_eq!(back, content());
         unpack(&back, &folder.path().join("out")).unwrap();
         assert_eq!(std::fs::read(folder.path().join("out/train/a/data_0.pt")).unwrap(), [1, 2, 3]);
+        unpack_models(&back, &folder.path().join("models")).unwrap();
+        assert_eq!(std::fs::read(folder.path().join("models/m/manifest.json")).unwrap(), [8]);
         assert!(is_case(&a) && is_case(Path::new("X.T2TCASE")) && !is_case(Path::new("t2tcase")));
     }
 
@@ -201,6 +250,7 @@ mod tests {
             (vec![("case.json", b"{}".as_slice()), ("data//etc/x", b"1")], "no file of a case"),
             (vec![("case.json", b"{}".as_slice()), ("data/c:x", b"1")], "no file of a case"),
             (vec![("case.json", b"{}".as_slice()), ("other", b"1")], "no file of a case"),
+            (vec![("case.json", b"{}".as_slice()), ("models/../x", b"1")], "no file of a case"),
             (vec![("data/x", b"1".as_slice())], "no case.json"),
         ] {
             let (_folder, file) = zipped(&entries);

@@ -7,7 +7,7 @@ use super::theme::SMALL;
 use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::pane::{Kind, Pane};
-use crate::app::results::shown::Outdated;
+use crate::app::results::shown::{Outdated, Why};
 
 /// Height of the line, points.
 const HEIGHT: f32 = 22.0;
@@ -31,21 +31,22 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, rect: Rect) {
         return;
     }
     let Some(outdated) = cx.state.fingers().into_iter().find_map(|finger| cx.state.outdated(finger)) else { return };
-    let Outdated { made_with, picked, coming } = outdated;
-    if !picked {
+    let Outdated { made_with, why } = outdated;
+    if !why.is_meant() {
         ui.painter().rect_filled(rect, 0.0, cx.p.canvas.gamma_multiply(0.45));
     }
-    let text = match (picked, coming) {
-        (_, true) => format!("Predicting anew. Shown: {made_with}"),
-        (true, false) => format!("Picked: {made_with}"),
-        (false, false) => format!("Made with {made_with}"),
+    let text = match why {
+        Why::OnItsWay => format!("Predicting anew. Shown: {made_with}"),
+        Why::Picked => format!("Picked: {made_with}"),
+        Why::Held => format!("As the case holds it: {made_with}. The model is not here"),
+        Why::NotMade => format!("Made with {made_with}"),
     };
     let line = Rect::from_min_size(pos2(rect.left(), rect.bottom() - HEIGHT), vec2(rect.width(), HEIGHT));
     ui.painter().rect_filled(line, 0.0, cx.p.frame);
-    let button = !coming && cx.state.can_generate().is_ok() && rect.width() > 2.0 * BUTTON;
+    let button = why != Why::OnItsWay && cx.state.can_generate().is_ok() && rect.width() > 2.0 * BUTTON;
     let room = if button { line.with_max_x(line.right() - BUTTON - 8.0) } else { line };
     let painter = ui.painter_at(room);
-    let color = if picked { cx.p.text } else { cx.p.caution };
+    let color = if why == Why::Picked { cx.p.text } else { cx.p.caution };
     painter.text(room.left_center() + vec2(8.0, 0.0), Align2::LEFT_CENTER, &text, FontId::proportional(SMALL), color);
     let response = ui.interact(room, ui.scope_id().with((pane, "outdated")), Sense::hover());
     response.on_hover_text(format!("{text}. The settings in force would make another prediction"));

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::bundles::{BundleInfo, BundleKind, FoundBundles};
+use super::bundles::{self, BundleInfo, BundleKind, FoundBundles};
 use super::error::TaskError;
 use super::imprint::{imprints_of, measured};
 use super::job::JobCx;
@@ -28,17 +28,21 @@ use crate::domain::postprocess::ShiftMode;
 use crate::domain::rig::PadId;
 use crate::domain::sample::Sample;
 use crate::domain::units::{angle_error, mm};
+use crate::infer::bundle::Origin;
 use crate::infer::engine::EngineChoice;
 use crate::io::case_file::{self, CaseContent};
 use crate::io::dataset::{BuiltIn, Dataset, UNIT_FILE};
 use crate::io::digest::sha256;
-use crate::io::files;
+use crate::io::{files, npz};
 
 const WHAT: &str = "Case";
 const FORMAT: &str = "touch2touch-case";
-const VERSION: u32 = 1;
+/// Version 1 held no results and no models.
+const VERSION: u32 = 2;
 /// Largest file that is taken into a case, bytes.
 const MAX_FILE: u64 = 64 << 20;
+/// A model is taken into a case up to this size, bytes; a larger one is named only.
+const MAX_MODEL: u64 = 40 << 20;
 
 /// A model bundle, as a case names it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -120,6 +124,9 @@ pub struct Case {
     labels: CaseLabels,
     /// Hashes of the files in it.
     files: BTreeMap<String, String>,
+    /// Hashes of the results and models in it.
+    #[serde(default)]
+    beside: BTreeMap<String, String>,
     /// The results.
     pub results: Vec<CaseResult>,
     /// How the studio showed it: preferences and camera, as it keeps them.
@@ -138,6 +145,17 @@ pub struct OpenedCase {
     pub pair: PairId,
     /// What a person said about it.
     pub labels: PairLabels,
+    /// What it brings besides.
+    pub held: Held,
+}
+
+/// What a case brings besides the data.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Held {
+    /// The imprints that its results were had from, meters.
+    pub imprints: BTreeMap<(ImprintSource, PadId), DepthMap>,
+    /// The folder of its models; `None` where it brings none.
+    pub models: Option<PathBuf>,
 }
 
 /// What differs between a case and what this program makes of it.
@@ -151,6 +169,18 @@ pub struct CaseReport {
     pub compared: usize,
     /// What differs, in words, with by how much where that is known.
     pub differences: Vec<String>,
+}
+
+/// The name of an imprint in a case.
+fn imprint_name(source: ImprintSource, finger: &str) -> String {
+    format!("{}{}_{finger}_imprint.npy", case_file::RESULTS, source.key())
+}
+
+/// A result with what it was had from.
+struct Made {
+    result: CaseResult,
+    /// Imprints, and masks as 0 and 1, by their names in a case.
+    arrays: BTreeMap<String, Vec<u8>>,
 }
 
 fn hash<T>(grid: &Grid<T>, bytes: impl Fn(&T) -> [u8; 4]) -> String {
@@ -211,7 +241,7 @@ fn results(
     [generator, mask_model]: [Option<&BundleInfo>; 2],
     models: &Models,
     cx: &JobCx,
-) -> Result<Vec<CaseResult>, TaskError> {
+) -> Result<Vec<Made>, TaskError> {
     let tool = dataset.index.get(pair).and_then(|entry| entry.tool.as_deref());
     let tool = tool.and_then(|name| load_tool(dataset, name).ok()).map(|(tool, _)| tool);
     let mut out = Vec::new();
@@ -227,6 +257,15 @@ fn results(
         let by = Masking { choice: recipe.mask, model: mask_model, engine: recipe.runtime };
         let inputs = MaskInputs { sample, tool: tool.as_ref(), labels: Some(labels), of: Some(&of) };
         let contact = models.contact(by, imprints, inputs)?;
+        let mut arrays = BTreeMap::new();
+        for (pad, imprint) in contact.imprints.entries() {
+            let finger = sample.rig.pad_key(pad);
+            arrays.insert(imprint_name(of.source(), &finger), npz::npy_bytes(imprint));
+            if let Some(found) = &contact.masks[pad] {
+                let name = format!("{}{}_{finger}_mask.npy", case_file::RESULTS, of.source().key());
+                arrays.insert(name, npz::npy_bytes(&found.mask.map(|on| f32::from(u8::from(*on)))));
+            }
+        }
         let hashes = contact.imprints.entries().map(|(pad, imprint)| {
             let mask = contact.masks[pad].as_ref().map_or_else(String::new, |found| mask_hash(&found.mask));
             (sample.rig.pad_key(pad).into_owned(), [imprint_hash(imprint), mask])
@@ -236,13 +275,14 @@ fn results(
         let found = contact.points(sample).ok().zip(tool.as_ref()).and_then(|(points, tool)| {
             pose(&points, tool, &*recipe.engine.method(), ask, sample.grasp_from_object).ok()
         });
-        out.push(CaseResult {
+        let result = CaseResult {
             imprint: of.source(),
             fingers: hashes.collect(),
             pose: found.as_ref().map(|found| found.grasp_from_object),
             rms_m: found.as_ref().map(|found| found.rms_m),
             trace: found.map_or_else(Vec::new, |f| f.report.trace.iter().map(|step| step.grasp_from_object).collect()),
-        });
+        };
+        out.push(Made { result, arrays });
     }
     Ok(out)
 }
@@ -295,7 +335,14 @@ pub fn make(dataset: &Dataset, setup: &CaseSetup, models: &Models, file: &Path, 
         runtime: setup.runtime,
     };
     let bundles = [setup.generator.as_ref().map(|(bundle, _)| bundle), setup.mask.1.as_ref()];
-    let found = results(dataset, (setup.pair, &sample), &recipe, &setup.labels, bundles, models, cx)?;
+    for bundle in bundles.into_iter().flatten().filter(|bundle| !Origin::ships(&bundle.id)) {
+        content.beside.append(&mut packed(bundle)?);
+    }
+    let mut found = Vec::new();
+    for made in results(dataset, (setup.pair, &sample), &recipe, &setup.labels, bundles, models, cx)? {
+        found.push(made.result);
+        content.beside.extend(made.arrays);
+    }
     let case = Case {
         format: FORMAT.into(),
         version: VERSION,
@@ -305,13 +352,30 @@ pub fn make(dataset: &Dataset, setup: &CaseSetup, models: &Models, file: &Path, 
         pair: entry.name.clone(),
         recipe,
         labels: CaseLabels::of(&setup.labels),
-        files: content.files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect(),
+        files: hashes(&content.files),
+        beside: hashes(&content.beside),
         results: found,
         view: setup.view.clone(),
     };
     content.manifest = serde_json::to_vec_pretty(&case).map_err(|err| fail(&err))?;
     case_file::write(file, &content).map_err(|err| fail(&err))?;
     Ok(case)
+}
+
+fn hashes(files: &BTreeMap<String, Vec<u8>>) -> BTreeMap<String, String> {
+    files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect()
+}
+
+/// The files of a model that does not ship, by their names in a case; none of one that is too large for it.
+fn packed(bundle: &BundleInfo) -> Result<BTreeMap<String, Vec<u8>>, TaskError> {
+    let opened = bundle.open(WHAT)?;
+    if opened.bytes() > MAX_MODEL {
+        return Ok(BTreeMap::new());
+    }
+    let content = opened.content(MAX_MODEL);
+    let content = content.map_err(|err| TaskError::new(WHAT, format!("{err} ({})", bundle.origin)))?;
+    let folder = format!("{}{:.16}", case_file::MODELS, bundle.id);
+    Ok(content.into_iter().map(|(name, bytes)| (format!("{folder}/{name}"), bytes)).collect())
 }
 
 fn built_in_name(dataset: &Dataset) -> Option<String> {
@@ -348,23 +412,22 @@ pub fn open(file: &Path, folder: &Path) -> Result<OpenedCase, TaskError> {
     let fail = |why: String| TaskError::new(format!("Open {}", file.display()), why);
     let content = case_file::read(file).map_err(|err| fail(err.to_string()))?;
     let case: Case = serde_json::from_slice(&content.manifest).map_err(|err| fail(format!("its manifest: {err}")))?;
-    if case.format != FORMAT || case.version != VERSION {
+    if case.format != FORMAT || !(1..=VERSION).contains(&case.version) {
         return Err(fail(format!(
-            "it is {:?} of version {}, not a case of version {VERSION}",
+            "it is {:?} of version {}, not a case of version 1 to {VERSION}",
             case.format, case.version
         )));
     }
-    let hashes: BTreeMap<String, String> =
-        content.files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect();
-    if hashes != case.files {
+    if hashes(&content.files) != case.files || hashes(&content.beside) != case.beside {
         return Err(fail("its files are not those that its manifest names".into()));
     }
+    let own = folder.join(&sha256(&content.manifest)[..16]);
     let mut dataset = match &case.built_in {
         Some(name) => Dataset::built_in(
             BuiltIn::named(name).ok_or_else(|| fail(format!("this program has no data set {name:?}")))?,
         ),
         None => {
-            let own = folder.join(&sha256(&content.manifest)[..16]);
+            let own = own.join("data");
             case_file::unpack(&content, &own).map_err(|err| fail(err.to_string()))?;
             Dataset::open(&own).map_err(|err| fail(err.to_string()))?
         }
@@ -374,10 +437,29 @@ pub fn open(file: &Path, folder: &Path) -> Result<OpenedCase, TaskError> {
     let labels = case.labels.labels()?;
     // Its labels are kept apart from those of the data set that it was made from.
     dataset.title = format!("{}, case {}", case.dataset, &sha256(&content.manifest)[..8]);
-    Ok(OpenedCase { case, dataset, pair: PairId(pair as u32), labels })
+    let mut held = Held::default();
+    let sources = case.results.iter().map(|result| result.imprint);
+    for (source, pad) in sources.flat_map(|source| dataset.rig.pads().map(move |pad| (source, pad))) {
+        let name = imprint_name(source, &dataset.rig.pad_key(pad));
+        if let Some(bytes) = content.beside.get(&name) {
+            let imprint = npz::image_of_npy(bytes).map_err(|why| fail(format!("{name}: {why}")))?;
+            held.imprints.insert((source, pad), imprint);
+        }
+    }
+    if content.beside.keys().any(|name| name.starts_with(case_file::MODELS)) {
+        let models = own.join("models");
+        case_file::unpack_models(&content, &models).map_err(|err| fail(err.to_string()))?;
+        held.models = Some(models);
+    }
+    Ok(OpenedCase { case, dataset, pair: PairId(pair as u32), labels, held })
 }
 
 impl OpenedCase {
+    /// The bundles of this machine, and those that the case brings.
+    pub fn bundles(&self) -> FoundBundles {
+        bundles::find(self.held.models.as_slice())
+    }
+
     /// Keeps what a person said where this data set's labels lie, unless something is there already.
     ///
     /// # Errors
@@ -396,7 +478,7 @@ impl OpenedCase {
 /// # Errors
 /// If the pair cannot be read, a model of the case is not there, or one cannot be run.
 pub fn check(opened: &OpenedCase, found: &FoundBundles, models: &Models, cx: &JobCx) -> Result<CaseReport, TaskError> {
-    let OpenedCase { case, dataset, pair, labels } = opened;
+    let OpenedCase { case, dataset, pair, labels, .. } = opened;
     let sample = dataset.load(*pair).map_err(|err| TaskError::from_error(WHAT, &err).with_hint(err.hint()))?;
     let model = |kind: BundleKind, named: Option<&CaseModel>| {
         let Some(named) = named else { return Ok(None) };
@@ -411,6 +493,7 @@ pub fn check(opened: &OpenedCase, found: &FoundBundles, models: &Models, cx: &Jo
     let mask_model = model(BundleKind::Mask, case.recipe.mask_model.as_ref())?;
     let bundles = [generator.as_ref(), mask_model.as_ref()];
     let now = results(dataset, (*pair, &sample), &case.recipe, labels, bundles, models, cx)?;
+    let now: Vec<CaseResult> = now.into_iter().map(|made| made.result).collect();
     let mut report = CaseReport { pair: case.pair.clone(), ..CaseReport::default() };
     compare(&case.results, &now, &mut report);
     report.same = report.differences.is_empty();
@@ -424,6 +507,10 @@ fn compare(then: &[CaseResult], now: &[CaseResult], report: &mut CaseReport) {
     }
     for (then, now) in then.iter().filter_map(|t| Some((t, now.iter().find(|n| n.imprint == t.imprint)?))) {
         let of = format!("{} imprint", then.imprint.key());
+        for finger in now.fingers.keys().filter(|finger| !then.fingers.contains_key(*finger)) {
+            report.compared += 1;
+            report.differences.push(format!("{of}, {finger} finger: the case does not have it"));
+        }
         for (finger, hashes) in &then.fingers {
             for (i, what) in ["the imprint itself", "the contact mask"].into_iter().enumerate() {
                 report.compared += 1;
@@ -533,10 +620,23 @@ mod tests {
             report.differences.len() == 2 && text.contains("1.000e-3 mm") && text.contains("left finger"),
             "{text}"
         );
+        // A finger that is only in one of them is a difference, whichever it is.
+        for (then, now) in [(0, 1), (1, 0)] {
+            let mut fewer = made.results.clone();
+            fewer[0].fingers.remove("right").unwrap();
+            let lists = [&made.results, &fewer];
+            let mut report = CaseReport::default();
+            compare(lists[then], lists[now], &mut report);
+            assert!(report.differences.iter().any(|text| text.contains("right finger")), "{report:?}");
+        }
+        let mut report = CaseReport::default();
+        let empty = CaseResult { fingers: BTreeMap::new(), ..made.results[0].clone() };
+        compare(&[empty], &made.results, &mut report);
+        assert_eq!(report.differences.len(), 2, "{report:?}");
         // What is no case, or was tampered with, is refused.
         let content = case_file::read(&file).unwrap();
         for (from, to, word) in [
-            ("\"version\": 1", "\"version\": 9", "version"),
+            ("\"version\": 2", "\"version\": 9", "version"),
             ("\"built_in\": \"demo\"", "\"built_in\": \"odd\"", "no data set"),
             ("\"pair\": \"", "\"pair\": \"no ", "no pair"),
         ] {
@@ -547,6 +647,11 @@ mod tests {
             let err = open(&file, folder.path()).unwrap_err().to_string();
             assert!(err.contains(word), "{err}");
         }
+        let mut changed = content.clone();
+        changed.beside.values_mut().for_each(|bytes| bytes.push(0));
+        assert!(!changed.beside.is_empty());
+        case_file::write(&file, &changed).unwrap();
+        assert!(open(&file, folder.path()).unwrap_err().why.contains("its files"));
         let mut extra = content.clone();
         extra.files.insert("x.stl".into(), vec![1]);
         case_file::write(&file, &extra).unwrap();

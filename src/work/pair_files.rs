@@ -56,6 +56,8 @@ pub struct PairParts<'a> {
     pub name: &'a str,
     /// Which imprint it is about.
     pub source: ImprintSource,
+    /// How it was predicted, as [`super::figure::note`] says it; `None` of a measured one.
+    pub prediction: Option<&'a str>,
     /// Its sensors.
     pub rig: &'a Rig,
     /// The surface points of that imprint.
@@ -79,6 +81,9 @@ type Matrix = [[f64; 4]; 4];
 struct PoseFile<'a> {
     pair: &'a str,
     imprint: &'static str,
+    /// How the imprint was predicted; none of a measured one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    prediction: Option<&'a str>,
     tool: Option<&'a str>,
     engine: String,
     mask: &'a str,
@@ -170,9 +175,10 @@ fn comments(parts: &PairParts<'_>) -> Vec<String> {
         (Some(_), Some((tool, _))) => format!("signed, to {tool} as registered by {}", parts.engine),
         _ => "NaN, without a pose".to_owned(),
     };
+    let predicted = parts.prediction.map_or_else(String::new, |how| format!(" ({})", how.replace('·', ",")));
     vec![
         "written by touch2touch".into(),
-        format!("pair {}, {} imprint, contact mask: {}", parts.name, parts.source.key(), parts.mask),
+        format!("pair {}, {} imprint{predicted}, contact mask: {}", parts.name, parts.source.key(), parts.mask),
         "unit meters; grasp frame: x closing axis, +z where the tool points, y lateral".into(),
         format!("finger: {}; pixel of its imprint", fingers.join(", ")),
         format!("distance_to_model: meters, {distance}"),
@@ -209,6 +215,7 @@ fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<Str
     serde_json::to_string_pretty(&PoseFile {
         pair: parts.name,
         imprint: parts.source.key(),
+        prediction: parts.prediction,
         tool: parts.tool.map(|(name, _)| name),
         engine: parts.engine.to_string(),
         mask: parts.mask,
@@ -250,6 +257,7 @@ mod tests {
         let parts = PairParts {
             name: "a/b",
             source: ImprintSource::Measured,
+            prediction: None,
             rig: &sample.rig,
             clouds: &clouds,
             mask: "threshold",

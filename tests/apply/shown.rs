@@ -5,6 +5,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, Preset, Sampler};
+use touch2touch::app::results::shown::Why;
 use touch2touch::app::settings::GenerateSettings;
 use touch2touch::app::state::State;
 use touch2touch::domain::dataset::PairId;
@@ -92,7 +93,10 @@ fn holds(state: &State, after: &str) {
             None => assert_eq!(shown, &named, "it is not what the settings make, and nothing says so, after {after}"),
             Some(outdated) => {
                 assert_ne!(shown, &named, "{outdated:?} after {after}");
-                assert!(outdated.picked || !state.settings.generate.by_itself, "{outdated:?} after {after}");
+                assert!(
+                    outdated.why == Why::Picked || !state.settings.generate.by_itself,
+                    "{outdated:?} after {after}"
+                );
                 let model = &state.library.bundle(&shown.bundle).expect("it is there").name;
                 let (steps, seed) = (format!(" {} step", shown.steps), format!("seed {}", shown.seed));
                 for word in [model.as_str(), &steps, &seed] {
@@ -144,7 +148,7 @@ fn another_model_is_predicted_with_at_once_on_this_pair_and_on_those_seen_before
     let model = |bench: &Bench| bench.state.chosen(RIGHT).expect("a prediction").bundle.clone();
     assert_eq!((&*model(&bench), bench.services.generated()), ("gen", 3));
     bench.send(Move::Model(1).command(&bench.state).unwrap());
-    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.coming && !outdated.picked));
+    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.why == Why::OnItsWay));
     bench.settle();
     assert_eq!((&*model(&bench), bench.state.outdated(RIGHT)), ("fitted", None));
     // The next pair was predicted with the first model before.
@@ -174,7 +178,7 @@ fn a_start_with_another_model_selected_does_not_open_on_the_picture_of_the_first
     again.settle();
     // Nothing is predicted by itself here: the picture from before is shown, and says whose it is.
     let outdated = again.state.outdated(RIGHT).expect("it is of another model");
-    assert!(outdated.made_with.starts_with("gen ") && !outdated.coming && !outdated.picked, "{outdated:?}");
+    assert!(outdated.made_with.starts_with("gen ") && outdated.why == Why::NotMade, "{outdated:?}");
     again.send(with(&again.state, |g| g.by_itself = true));
     again.settle();
     assert_eq!(again.state.outdated(RIGHT), None);
@@ -194,9 +198,9 @@ fn what_a_person_picks_stays_until_the_settings_change_and_comes_back_with_them(
     let first = Arc::new(bench.state.results.made[&touch][0].clone());
     bench.send(PredictCommand::Choose((*first).clone()));
     assert_eq!(bench.state.chosen(RIGHT), Some(&*first));
-    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.picked));
+    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.why == Why::Picked));
     bench.send(Move::Steps(3).command(&bench.state).unwrap());
-    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| !outdated.picked));
+    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.why == Why::NotMade));
     bench.send(with(&bench.state, |g| g.preset = Some(Preset::Default)));
     assert_eq!(bench.state.chosen(RIGHT), Some(&*first));
     // Generating asks for what the settings say.

@@ -183,6 +183,7 @@ pub struct CaseView {
 pub struct PairExport {
     name: String,
     source: ImprintSource,
+    prediction: Option<String>,
     rig: Arc<Rig>,
     clouds: Arc<Clouds>,
     mask: String,
@@ -203,6 +204,7 @@ impl PairExport {
         let parts = PairParts {
             name: &self.name,
             source: self.source,
+            prediction: self.prediction.as_deref(),
             rig: &self.rig,
             clouds: &self.clouds,
             mask: &self.mask,
@@ -323,9 +325,15 @@ impl State {
     pub fn pair_export(&self, source: ImprintSource) -> Option<PairExport> {
         let cloud = self.cloud_key(source).ok()??;
         let pose = self.pose_key(source).ok().flatten().and_then(|key| self.results.poses.get(&key)).cloned();
+        let recipe = self.rig().pads().find_map(|pad| self.chosen(pad)).filter(|_| source == ImprintSource::Predicted);
+        let prediction = recipe.map(|recipe| {
+            let shift = self.settings.shift.label().to_lowercase();
+            format!("{} · {shift}", self.made_with(recipe))
+        });
         Some(PairExport {
             name: self.pair_name().to_owned(),
             source,
+            prediction,
             rig: self.rig(),
             clouds: self.results.clouds.get(&cloud)?.clone(),
             mask: self.masks_made_of(&cloud),

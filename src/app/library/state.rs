@@ -143,6 +143,8 @@ pub struct Library {
     pub bundles: Vec<BundleInfo>,
     /// What is wrong with bundles that were refused.
     pub bundle_problems: Vec<TaskError>,
+    /// The generator that the open case was made with, by identity and name, where this machine does not have it.
+    pub lacking: Option<(Arc<str>, String)>,
 }
 
 impl Library {
@@ -166,12 +168,15 @@ impl Library {
         self.bundles.iter().find(|b| &*b.id == id)
     }
 
-    /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind.
+    /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind; nothing in
+    /// place of what the open case names and this machine lacks.
     pub fn bundle_named(&self, kind: BundleKind, name: Option<&str>, rig: &Rig) -> Option<&BundleInfo> {
         let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind && b.fits(rig));
         // What was made for one's own data is used where it is chosen.
         let first = of_kind.clone().find(|bundle| !bundle.is_own()).or_else(|| of_kind.clone().next());
+        let lacking = self.lacking.as_ref().filter(|_| kind == BundleKind::Generator).map(|(_, lacking)| &**lacking);
         match name {
+            Some(name) if lacking == Some(name) => None,
             Some(name) => of_kind.find(|b| b.name == name).or(first),
             None => first,
         }

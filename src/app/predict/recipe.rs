@@ -39,8 +39,10 @@ impl State {
             BundleKind::Classifier => (None, Absent::NoClassifier),
         };
         let rig = self.rig();
+        let lacking = self.library.lacking.as_ref().is_some_and(|(_, lacking)| Some(&**lacking) == name);
+        let absent = if lacking && kind == BundleKind::Generator { Absent::NoSuchGenerator } else { absent };
         let others = self.library.bundles.iter().any(|bundle| bundle.kind == kind && !bundle.fits(&rig));
-        let absent = if others { Absent::OtherSensors } else { absent };
+        let absent = if others && !lacking { Absent::OtherSensors } else { absent };
         self.library.bundle_named(kind, name, &rig).ok_or(absent)
     }
 

@@ -3,10 +3,15 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use strum::IntoEnumIterator as _;
+
 use super::super::state::State;
+use super::imprint::MetersKey;
 use super::prediction::PredictionKey;
 use super::{Cache, Computes as _};
-use crate::app::keys::TouchKey;
+use crate::app::keys::{ShiftMode, TouchKey};
+use crate::domain::grid::DepthMap;
+use crate::domain::postprocess::RawPrediction;
 use crate::domain::rig::PadId;
 use crate::work::prediction::Prediction;
 
@@ -40,10 +45,28 @@ impl Shown {
 pub struct Outdated {
     /// How it was made: `model · 2 steps · seed 42`.
     pub made_with: String,
-    /// Whether a person picked it, so that it is meant.
-    pub picked: bool,
-    /// Whether what the settings ask for is on its way.
-    pub coming: bool,
+    /// Why it is shown all the same.
+    pub why: Why,
+}
+
+/// Why a prediction is shown that the settings in force would not make.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Why {
+    /// A person picked it under these settings.
+    Picked,
+    /// The open case holds it, and its model is not here.
+    Held,
+    /// What the settings ask for is on its way.
+    OnItsWay,
+    /// What the settings ask for was not made.
+    NotMade,
+}
+
+impl Why {
+    /// Whether it is meant to be shown.
+    pub fn is_meant(self) -> bool {
+        matches!(self, Self::Picked | Self::Held)
+    }
 }
 
 impl State {
@@ -89,17 +112,55 @@ impl State {
         if named.as_ref() == Some(shown) {
             return None;
         }
-        let picked = self.picked(touch).is_some();
-        let generating = named.is_some_and(|named| self.tasks.generating(&named).is_some());
-        let coming = generating || self.ahead(finger).is_some();
-        Some(Outdated { made_with: self.made_with(shown), picked, coming })
+        let generating = || named.as_ref().is_some_and(|named| self.tasks.generating(named).is_some());
+        let why = if self.lacks(&shown.bundle) {
+            Why::Held
+        } else if self.picked(touch).is_some() {
+            Why::Picked
+        } else if generating() || self.ahead(finger).is_some() {
+            Why::OnItsWay
+        } else {
+            Why::NotMade
+        };
+        Some(Outdated { made_with: self.made_with(shown), why })
     }
 
     /// How a prediction was made, in the words that stand beside it wherever it is shown: `model · 2 steps · seed 42`.
     pub fn made_with(&self, recipe: &PredictionKey) -> String {
-        let bundle = self.library.bundle(&recipe.bundle);
-        let model = bundle.map_or("a model that is not there any more", |bundle| &bundle.name);
+        let bundle = self.library.bundle(&recipe.bundle).map(|bundle| &*bundle.name);
+        let lacking = self.library.lacking.as_ref().filter(|(id, _)| *id == recipe.bundle).map(|(_, name)| &**name);
+        let model = bundle.or(lacking).unwrap_or("a model that is not there any more");
         crate::work::prediction::made_with(model, &recipe.config())
+    }
+
+    /// Whether the open case was made with this generator, and it is not here.
+    fn lacks(&self, bundle: &str) -> bool {
+        self.library.lacking.as_ref().is_some_and(|(id, _)| **id == *bundle)
+    }
+
+    /// Keeps an imprint in place of the prediction that it was made of, which cannot be made here.
+    pub(in crate::app) fn hold(
+        &mut self,
+        recipe: PredictionKey,
+        shift: ShiftMode,
+        imprint: Arc<DepthMap>,
+        model: &str,
+    ) {
+        let why = format!("only this imprint is in the case; the model {model} that would make it anew is not here");
+        let chains = ShiftMode::iter().map(|mode| (mode, Err(why.clone()))).collect();
+        let made = Prediction {
+            raw: RawPrediction { channels: vec![(*imprint).clone()] },
+            chains: Arc::new(chains),
+            fit: None,
+            color: None,
+            bundle: recipe.bundle.clone(),
+            engine: "the case".into(),
+            seconds: 0.0,
+            kept: true,
+        };
+        self.keep_prediction(recipe.clone(), Arc::new(made), true);
+        let bytes = MetersKey::bytes(&imprint);
+        self.results.imprints.insert(MetersKey(recipe, shift), imprint, bytes);
     }
 
     /// Keeps a prediction of the open data set; with `in_front` it is shown where the settings name none that is there.

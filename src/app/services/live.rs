@@ -31,7 +31,7 @@ use crate::io::statistics::ShiftStatistics;
 use crate::io::{atomic, files, folders, names};
 use crate::work::adapt::{self, AdaptSetup, Adapted};
 use crate::work::bundles::{self, BundleInfo};
-use crate::work::case::{self, Case, CaseSetup};
+use crate::work::case::{self, Case, CaseSetup, Held};
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
@@ -95,7 +95,7 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
             let cache = folders::program_cache().unwrap_or_else(std::env::temp_dir);
             let opened = case::open(path, &cache.join("cases"))?;
             opened.keep_labels()?;
-            case = Some((opened.pair, opened.case));
+            case = Some((opened.pair, opened.case, opened.held));
             opened.dataset
         }
         Place::Path(path) => Dataset::open(path)
@@ -117,7 +117,7 @@ pub struct LiveSource {
     reviews: Reviews,
     /// Second masks, by person.
     repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
-    case: Option<(PairId, Case)>,
+    case: Option<(PairId, Case, Held)>,
 }
 
 impl LiveSource {
@@ -150,8 +150,8 @@ impl DataSource for LiveSource {
         Some(&self.dataset)
     }
 
-    fn case(&self) -> Option<(PairId, &Case)> {
-        self.case.as_ref().map(|(pair, case)| (*pair, case))
+    fn case(&self) -> Option<(PairId, &Case, &Held)> {
+        self.case.as_ref().map(|(pair, case, held)| (*pair, case, held))
     }
 
     fn rig(&self) -> Arc<Rig> {

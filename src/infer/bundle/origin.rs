@@ -59,7 +59,7 @@ impl Origin {
     }
 
     /// Whether a bundle of this hash is one of the program's.
-    pub(in crate::infer) fn ships(hash: &str) -> bool {
+    pub(crate) fn ships(hash: &str) -> bool {
         Self::built_in()
             .any(|origin| origin.file(MANIFEST).read(files::SMALL).is_ok_and(|manifest| sha256(&manifest) == hash))
     }
