@@ -19,7 +19,7 @@ use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary,
 use super::widget::texture::{Histogram, Memo, depth_image, picture_image};
 use crate::app::action::Action;
 use crate::app::command::{Hover, LabelsCommand, LibraryCommand, Pane, TasksCommand, ViewCommand};
-use crate::app::keys::{ImprintSource, ShiftMode};
+use crate::app::keys::ImprintSource;
 use crate::app::results::Preview;
 use crate::app::settings::{ColorMap as MapChoice, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
@@ -493,9 +493,6 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
     let state = cx.state;
     let right = match pane {
-        Pane::Predicted => state.chosen(finger).map_or(String::new(), |recipe| {
-            format!("{} · {}", state.made_with(recipe), state.settings.shift.label().to_lowercase())
-        }),
         Pane::Error => state
             .comparison(finger)
             .ready()
@@ -510,11 +507,7 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     if let Some(warning) = state.ambiguity(finger).and_then(|a| a.caption()).filter(|_| pane == Pane::Predicted) {
         output.caption(Align2::RIGHT_BOTTOM, warning, super::theme::DARK.caution);
     }
-    let color = match (pane, state.settings.shift) {
-        (Pane::Predicted, ShiftMode::Raw) => super::theme::DARK.caution,
-        _ => cx.p.strong_on_image(),
-    };
-    output.caption(Align2::RIGHT_TOP, &right, color);
+    output.caption(Align2::RIGHT_TOP, &right, cx.p.strong_on_image());
 }
 
 /// The value under the pointer, in millimeters and in the unit that is stored.

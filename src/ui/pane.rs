@@ -51,9 +51,15 @@ fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
     if ui.rect_contains_pointer(ui.max_rect()) {
         panes.hovered = Some(pane);
     }
-    let place = ui.max_rect();
-    draw(cx, ui, &mut panes.memories, pane);
-    super::outdated::show(cx, ui, pane, place);
+    // How a prediction was made stands below whatever shows it.
+    let (place, below) = super::made_with::split(cx, ui.max_rect(), pane);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
+        ui.set_clip_rect(place.intersect(ui.clip_rect()));
+        draw(cx, ui, &mut panes.memories, pane);
+    });
+    if let Some(below) = below {
+        super::made_with::show(cx, ui, pane, place, below);
+    }
 }
 
 /// The help mark of a pane, if it has mouse controls of its own.

@@ -34,9 +34,14 @@ pub struct Prediction {
 /// How a prediction was made, as it stands beside each picture, 3D view and file of it: `model · 2 steps · seed 42`, with the
 /// sampler, its noise and the guidance where they are not the usual ones.
 pub fn made_with(model: &str, config: &GenerateConfig) -> String {
+    format!("{model} · {}", settings_text(config))
+}
+
+/// The same without the model.
+pub fn settings_text(config: &GenerateConfig) -> String {
     let GenerateConfig { steps, eta, seed, sampler, guidance, .. } = *config;
     let plural = if steps == 1 { "" } else { "s" };
-    let mut text = format!("{model} · {steps} step{plural} · seed {seed}");
+    let mut text = format!("{steps} step{plural} · seed {seed}");
     if sampler != Sampler::default() {
         text += &format!(" · {}", <&str>::from(sampler));
     }

@@ -13,7 +13,7 @@ use crate::app::keys::{ShiftMode, TouchKey};
 use crate::domain::grid::DepthMap;
 use crate::domain::postprocess::RawPrediction;
 use crate::domain::rig::PadId;
-use crate::work::prediction::Prediction;
+use crate::work::prediction::{Prediction, made_with};
 
 /// The predictions that are shown where the settings do not name one that is there.
 #[derive(Clone, Debug, Default)]
@@ -127,10 +127,14 @@ impl State {
 
     /// How a prediction was made, in the words that stand beside it wherever it is shown: `model · 2 steps · seed 42`.
     pub fn made_with(&self, recipe: &PredictionKey) -> String {
+        made_with(self.model_name(recipe), &recipe.config())
+    }
+
+    /// The name of the model that made a prediction.
+    pub fn model_name(&self, recipe: &PredictionKey) -> &str {
         let bundle = self.library.bundle(&recipe.bundle).map(|bundle| &*bundle.name);
         let lacking = self.library.lacking.as_ref().filter(|(id, _)| *id == recipe.bundle).map(|(_, name)| &**name);
-        let model = bundle.or(lacking).unwrap_or("a model that is not there any more");
-        crate::work::prediction::made_with(model, &recipe.config())
+        bundle.or(lacking).unwrap_or("a model that is not there any more")
     }
 
     /// Whether the open case was made with this generator, and it is not here.

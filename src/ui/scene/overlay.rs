@@ -17,7 +17,7 @@ use crate::gpu::guides;
 use crate::gpu::view::Camera;
 use crate::ui::cx::Cx;
 use crate::ui::scene_view::SceneOutput;
-use crate::ui::theme::{Palette, SMALL, grade_color};
+use crate::ui::theme::{Palette, grade_color};
 use crate::work::pose::PoseResult;
 use crate::work::verdict::Grade;
 
@@ -28,18 +28,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: Imprin
     if cx.state.settings.scene.layer(SceneLayer::Guides).shown {
         axes_and_scale(cx.p, &ui.painter_at(rect), &camera, output, rect);
     }
-    if source == ImprintSource::Predicted {
-        made_with(cx, &ui.painter_at(rect), rect);
-    }
     legend::show(cx, ui, memory, source, rect);
     super::steps::show_legend(cx, ui, memory, source, rect);
-}
-
-/// Model, steps and seed of the prediction that the cloud was made of, at the upper right corner.
-fn made_with(cx: &Cx<'_>, painter: &egui::Painter, rect: Rect) {
-    let Some(recipe) = cx.state.rig().pads().find_map(|finger| cx.state.chosen(finger)) else { return };
-    let at = rect.right_top() + egui::vec2(-6.0, 4.0);
-    painter.text(at, Align2::RIGHT_TOP, cx.state.made_with(recipe), FontId::proportional(SMALL), cx.p.weak);
 }
 
 /// Angle and figures of the step shown, where that is not the registered pose.

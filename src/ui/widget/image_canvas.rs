@@ -239,11 +239,7 @@ impl CanvasOutput {
             return;
         }
         let rect = self.painter.clip_rect().shrink(6.0);
-        // Long ones leave room for the one in the other corner.
-        let mut job =
-            egui::text::LayoutJob::simple_singleline(text.to_owned(), egui::FontId::proportional(11.0), color);
-        job.wrap = egui::text::TextWrapping::truncate_at_width((rect.width() - 48.0).max(48.0));
-        let galley = self.painter.layout_job(job);
+        let galley = self.painter.layout_no_wrap(text.to_owned(), egui::FontId::proportional(11.0), color);
         let place = corner.align_size_within_rect(galley.size(), rect);
         self.painter.rect_filled(place.expand2(vec2(4.0, 2.0)), 3.0, Color32::from_black_alpha(150));
         self.painter.galley(place.min, galley, color);
