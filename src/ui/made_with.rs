@@ -48,8 +48,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, place: Rect, line: 
     };
     let shift = cx.state.settings.shift;
     let model = cx.state.model_name(recipe);
-    let settings = format!(" · {} · {}", settings_text(&recipe.config()), shift.label().to_lowercase());
     let why = cx.state.outdated(finger).map(|outdated| outdated.why);
+    let settings = match why {
+        None => format!(" · {} · {}", settings_text(&recipe.config()), shift.label().to_lowercase()),
+        Some(_) => format!(" · {}", settings_text(&recipe.config())),
+    };
     let (lead, tip) = match why {
         None => ("", "What is shown was predicted so"),
         Some(Why::OnItsWay) => ("Predicting anew; this is ", "The settings ask for another prediction"),
