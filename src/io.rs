@@ -13,6 +13,7 @@ pub mod exchange;
 pub mod files;
 pub mod folders;
 pub mod follow;
+pub mod home;
 pub mod images;
 pub mod masks;
 pub mod memory;

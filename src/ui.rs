@@ -8,6 +8,7 @@ pub mod theme;
 mod thumbnail;
 mod timemachine;
 mod train;
+mod unsaved;
 mod versus;
 pub mod widget;
 

@@ -7,6 +7,7 @@ mod generating;
 mod inspect;
 mod masks;
 mod random;
+mod unsaved;
 mod whole;
 
 use std::collections::BTreeSet;

@@ -241,7 +241,7 @@ fn what_people_did_stays_unless_asked_and_undo_brings_back_what_was() {
     let fresh = Labels::of(&dataset);
     let stored = fresh.load(&names[1]).unwrap();
     assert_eq!(stored.review, Review::Todo);
-    let (done, _) = fresh.past(&names[1], &stored);
+    let done = fresh.past(&names[1], &stored).done;
     let last = done.last().unwrap();
     assert_eq!(last.name, "import of masks");
     for (place, [old, new]) in &last.change.masks {
