@@ -2,6 +2,7 @@
 //!
 //! Every error names the file, what is wrong with it, and (`hint`) what to do about it.
 
+pub(crate) mod archive;
 pub mod atomic;
 pub mod case_file;
 pub mod cases;

@@ -235,10 +235,10 @@ impl HandMask {
         Some(Mask::from_fn(width, height, |x, y| !checked[(x, y)] || self.marks.is_ignored(x, y)))
     }
 
-    /// Draws on it, as the person `by`.
-    pub fn draw(&mut self, drawing: &Drawing, ground: Ground<'_>, by: Provenance) {
+    /// Draws on it, as the person `by`. Whether it touched anything.
+    pub fn draw(&mut self, drawing: &Drawing, ground: Ground<'_>, by: Provenance) -> bool {
         let mut touched = Mask::filled(self.mask.width(), self.mask.height(), false);
-        self.draw_on(drawing, &mut touched, ground, 0, by);
+        self.draw_on(drawing, &mut touched, ground, 0, by)
     }
 
     /// Draws what comes after the first `from` points of a drawing that grows, as the person `by`. `touched` holds what was
