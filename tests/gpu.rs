@@ -440,9 +440,7 @@ fn empty_and_impossible_input_is_a_picture_or_an_error_not_a_panic() {
 
 #[test]
 fn a_device_without_storage_buffers_paints_the_window_and_says_what_the_3d_views_lack() {
-    if support::gpu().is_none() {
-        return;
-    }
+    let Some(_adapter) = support::gpu() else { return };
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let (adapter, device, queue) = block_on(async {
         let adapter = instance.request_adapter(&wgpu::RequestAdapterOptions::default()).await.unwrap();

@@ -2,10 +2,8 @@
 
 use serde::Deserialize;
 
-use super::stored::store_error;
-use super::{Act, Labels, Review};
+use super::{Act, Review};
 use crate::domain::label::Provenance;
-use crate::work::error::TaskError;
 
 /// Something that was done to the labels of a pair.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
@@ -87,18 +85,6 @@ pub(super) fn count(bytes: &[u8]) -> (usize, usize) {
     let lines = || bytes.split(|&b| b == b'\n').filter(|line| !line.trim_ascii().is_empty());
     let unread = lines().filter(|line| serde_json::from_slice::<Record>(line).is_err());
     (lines().count(), unread.count())
-}
-
-impl Labels {
-    /// What was done to the labels of a pair, the oldest first; nothing where there is no journal.
-    ///
-    /// # Errors
-    /// If the journal cannot be read.
-    pub fn records(&self, name: &str) -> Result<Vec<Record>, TaskError> {
-        let what = format!("Journal of {name}");
-        let store = self.store(&what)?;
-        Ok(parse(&store.journal(name).map_err(|err| store_error(&what, &err))?))
-    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::{
-    Change, Deed, HandMask, ImprintOf, MaskPlace, PairLabels, Review, Reviews, Revision, Told, journal, note, record,
+    Change, Deed, HandMask, ImprintOf, MaskPlace, PairLabels, Record, Review, Reviews, Revision, Told, journal, note,
+    record,
 };
 use crate::domain::dataset::Problem;
 use crate::domain::rig::PadId;
@@ -170,6 +171,16 @@ impl Labels {
         let bytes = store.journal(name).unwrap_or_default();
         let (done, undone) = journal::fold(bytes.split(|&b| b == b'\n'), labels, store.rig());
         Told { done, undone, problem: self.journal_problem(name) }
+    }
+
+    /// What was done to the labels of a pair, the oldest first; nothing where there is no journal.
+    ///
+    /// # Errors
+    /// If the journal cannot be read.
+    pub fn records(&self, name: &str) -> Result<Vec<Record>, TaskError> {
+        let what = format!("Journal of {name}");
+        let store = self.store(&what)?;
+        Ok(record::parse(&store.journal(name).map_err(|err| store_error(&what, &err))?))
     }
 
     /// What is wrong with the journal of a pair: it cannot be read, or lines of it cannot. Masks do not depend on it.
