@@ -39,21 +39,20 @@ impl Rig {
     }
 }
 
-/// A studio whose labels cannot be written, for root neither: a file lies where their folder should be.
-fn stuck() -> Option<Rig> {
-    let mut rig = Rig::new(SIZE, 1)?;
+/// Flags a pair whose labels cannot be written, by root neither: a file lies where their folder should be.
+fn stick(rig: &mut Rig) {
     rig.send(SettingsCommand::DismissHint);
     rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
     std::fs::write(rig.data.join(FOLDER), "in the way").unwrap();
     rig.harness.get_by_label(REVIEW).click();
     rig.settle();
     rig.harness.get_by_label("not saved");
-    Some(rig)
 }
 
 #[test]
 fn closing_is_held_up_until_what_is_unsaved_is_saved_or_given_up() {
-    let Some(mut rig) = stuck() else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    stick(&mut rig);
     let delays: Vec<Duration> = rig.harness.output().viewport_output.values().map(|v| v.repaint_delay).collect();
     let seconds = Duration::from_secs(1)..=Duration::from_secs(5);
     assert!(delays.iter().all(|delay| seconds.contains(delay)), "it looks again after seconds: {delays:?}");
@@ -79,7 +78,8 @@ fn closing_is_held_up_until_what_is_unsaved_is_saved_or_given_up() {
 
 #[test]
 fn labels_go_elsewhere_or_nowhere_and_are_kept_where_nobody_was_asked() {
-    let Some(mut rig) = stuck() else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    stick(&mut rig);
     rig.ask_to_close();
     rig.harness.get_by_label("Save elsewhere…").click();
     rig.settle();
@@ -94,7 +94,8 @@ fn labels_go_elsewhere_or_nowhere_and_are_kept_where_nobody_was_asked() {
     let there = Labels::in_folder(&dataset, &usb.join(FOLDER)).reviews().states;
     assert_eq!(there.into_values().collect::<Vec<_>>(), [Review::Flagged]);
 
-    let Some(mut rig) = stuck() else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    stick(&mut rig);
     rig.ask_to_close();
     rig.harness.get_by_label("Discard and close").click();
     let answers: Vec<ViewportCommand> = (0..20).flat_map(|_| rig.step_answering()).collect();
@@ -102,7 +103,8 @@ fn labels_go_elsewhere_or_nowhere_and_are_kept_where_nobody_was_asked() {
     assert!(!rig.config.join("recovered").exists());
 
     // The window is torn down without a word, as when its display goes away.
-    let Some(rig) = stuck() else { return };
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    stick(&mut rig);
     let (data, config) = (rig.data.clone(), rig.config.clone());
     let Rig { harness, _folder, .. } = rig;
     drop(harness);
