@@ -2,7 +2,7 @@
 #import <common/view.wgsl>
 #import <common/edl.wgsl>
 
-@group(1) @binding(0) var depths: texture_depth_multisampled_2d;
+@group(1) @binding(0) var depths: texture_multisampled_2d<f32>;
 
 @vertex
 fn vs_main(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4<f32> {
@@ -11,13 +11,13 @@ fn vs_main(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4<f32> {
 
 @fragment
 fn fs_main(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
-    let own = textureLoad(depths, vec2<i32>(at.xy), 0);
+    let own = textureLoad(depths, vec2<i32>(at.xy), 0).x;
     if own <= 0.0 {
         discard;
     }
     var behind = 0.0;
     for (var i = 0; i < NEIGHBORS; i++) {
-        behind += meters_behind(own, textureLoad(depths, neighbor(at.xy, i), 0));
+        behind += meters_behind(own, textureLoad(depths, neighbor(at.xy, i), 0).x);
     }
     return shade(behind);
 }

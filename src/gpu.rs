@@ -41,6 +41,15 @@ pub enum GpuError {
         /// The driver's reason.
         reason: String,
     },
+    /// The adapter is there, but a driver of the kind that a browser has: flat triangles alone.
+    #[error(
+        "the driver of {adapter} has no storage buffers, which points and lines need. Install a Vulkan driver (on Debian or \
+         Ubuntu: mesa-vulkan-drivers); all but the 3D views works without"
+    )]
+    NoStorage {
+        /// Name of the adapter.
+        adapter: String,
+    },
     /// A call was refused by the driver or its validation.
     #[error("{what} failed on the graphics device: {reason}")]
     Device {

@@ -2,6 +2,7 @@
 //!
 //! Every error names the file, what is wrong with it, and (`hint`) what to do about it.
 
+pub(crate) mod archive;
 pub mod atomic;
 pub mod case_file;
 pub mod cases;
@@ -13,6 +14,7 @@ pub mod exchange;
 pub mod files;
 pub mod folders;
 pub mod follow;
+pub mod home;
 pub mod images;
 pub mod masks;
 pub mod memory;

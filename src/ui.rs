@@ -8,6 +8,7 @@ pub mod theme;
 mod thumbnail;
 mod timemachine;
 mod train;
+mod unsaved;
 mod versus;
 pub mod widget;
 
@@ -51,8 +52,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use eframe::egui;
+use eframe::egui_wgpu::WgpuSetup;
 
 use crate::app::services::live::LiveServices;
+use crate::gpu::Gpu;
 
 /// Size of the window on the first start, points. eframe makes it smaller where the screen is.
 const WINDOW: [f32; 2] = [1600.0, 960.0];
@@ -70,7 +73,7 @@ fn icon() -> egui::IconData {
 /// # Errors
 /// In words, if no window can be opened: no display, or no graphics device.
 pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
-    let native = eframe::NativeOptions {
+    let mut native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Touch2Touch Studio")
             .with_app_id("touch2touch")
@@ -83,13 +86,17 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
         dithering: false,
         ..Default::default()
     };
+    if let WgpuSetup::CreateNew(setup) = &mut native.wgpu_options.wgpu_setup {
+        setup.device_descriptor = Arc::new(Gpu::wanted);
+    }
     let mut options = Options::new(Arc::new(LiveServices::new()), open);
     options.reset = reset;
     eframe::run_native("touch2touch", native, Box::new(move |cc| Ok(Box::new(StudioApp::new(cc, options))))).map_err(
         |err| {
             format!(
                 "The window cannot be opened: {err}. The studio needs a display (X11 or Wayland) and a Vulkan or GL \
-                 driver; the command line works without either (touch2touch --help)."
+                 driver (on Debian or Ubuntu: mesa-vulkan-drivers); the command line works without either (touch2touch \
+                 --help)."
             )
         },
     )

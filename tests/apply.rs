@@ -8,6 +8,7 @@ mod inspect;
 mod masks;
 mod random;
 mod shown;
+mod unsaved;
 mod whole;
 
 use std::collections::BTreeSet;

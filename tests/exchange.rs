@@ -105,7 +105,7 @@ fn every_form_comes_back_the_same_into_an_empty_folder_of_labels() {
                 std::fs::remove_file(folder.join(MANIFEST)).unwrap();
             }
             let found = import(&dataset, &from(folder));
-            assert_eq!((found.new, found.total(), found.is_whole()), (8, 8, true), "{format:?}: {found:?}");
+            assert_eq!((found.new, found.total(), found.complete), (8, 8, true), "{format:?}: {found:?}");
             assert_eq!(found.format, *format);
             let after = all(&dataset);
             assert!(after.keys().eq(before.keys()), "{format:?}");
@@ -128,7 +128,7 @@ fn every_form_comes_back_the_same_into_an_empty_folder_of_labels() {
             Format::Npy | Format::Png => folder.join("train"),
         };
         let found = import(&dataset, &from(&part));
-        assert!(found.same > 0 && found.same < 8 && found.is_whole(), "{format:?}: {found:?}");
+        assert!(found.same > 0 && found.same < 8 && found.complete, "{format:?}: {found:?}");
     }
 }
 
@@ -241,7 +241,7 @@ fn what_people_did_stays_unless_asked_and_undo_brings_back_what_was() {
     let fresh = Labels::of(&dataset);
     let stored = fresh.load(&names[1]).unwrap();
     assert_eq!(stored.review, Review::Todo);
-    let (done, _) = fresh.past(&names[1], &stored);
+    let done = fresh.past(&names[1], &stored).done;
     let last = done.last().unwrap();
     assert_eq!(last.name, "import of masks");
     for (place, [old, new]) in &last.change.masks {
@@ -283,7 +283,7 @@ fn what_does_not_fit_is_said_with_its_file_and_changes_nothing() {
     let before = all(&dataset);
     let found = import(&dataset, &from(&folder));
     let why = |list: &[touch2touch::work::error::Remark]| list.iter().map(|r| r.why.clone()).collect::<Vec<_>>();
-    assert_eq!((found.same, found.total(), found.is_whole()), (2, 0, false), "{found:?}");
+    assert_eq!((found.same, found.total(), found.complete), (2, 0, false), "{found:?}");
     assert_eq!(found.unmatched.len(), 1);
     assert!(why(&found.unmatched)[0].contains("no pair and finger"), "{found:?}");
     let refused = why(&found.refused);

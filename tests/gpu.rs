@@ -4,9 +4,11 @@
 
 use std::sync::Arc;
 
+use futures_lite::future::block_on;
 use glam::{DAffine3, DVec2, DVec3};
 use touch2touch::domain::colormap::{ColorMap, Range};
 use touch2touch::domain::mesh::TriMesh;
+use touch2touch::gpu::context::COLOR_FORMAT;
 use touch2touch::gpu::edges::EdgeStyle;
 use touch2touch::gpu::lines::{LinesItem, LinesStyle, Segment};
 use touch2touch::gpu::mesh::{self, Look, MeshItem, MeshStyle, Shading};
@@ -14,9 +16,10 @@ use touch2touch::gpu::pick;
 use touch2touch::gpu::pipelines::Pipelines;
 use touch2touch::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use touch2touch::gpu::scene::{SceneData, SceneRenderer};
+use touch2touch::gpu::sheet::Sheet;
 use touch2touch::gpu::target::{Picture, Target};
 use touch2touch::gpu::view::{Camera, Plane, Preset};
-use touch2touch::gpu::{Gpu, GpuError, guides, shaders};
+use touch2touch::gpu::{Gpu, GpuError, guides, shaders, wgpu};
 
 use crate::support;
 
@@ -433,6 +436,25 @@ fn empty_and_impossible_input_is_a_picture_or_an_error_not_a_panic() {
     view.target.resize(&view.gpu, [0, 0]).unwrap();
     assert_eq!(view.target.size(), [1, 1]);
     assert_eq!(view.picture(&scene()).rgba.len(), 4);
+}
+
+#[test]
+fn a_device_without_storage_buffers_paints_the_window_and_says_what_the_3d_views_lack() {
+    let Some(_adapter) = support::gpu() else { return };
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let (adapter, device, queue) = block_on(async {
+        let adapter = instance.request_adapter(&wgpu::RequestAdapterOptions::default()).await.unwrap();
+        // What the toolkit asks a GL driver for.
+        let required_limits = wgpu::Limits::downlevel_webgl2_defaults();
+        let descriptor = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
+        let (device, queue) = adapter.request_device(&descriptor).await.unwrap();
+        (adapter, device, queue)
+    });
+    let gpu = Gpu::new(&adapter, device, queue);
+    Sheet::new(&gpu, COLOR_FORMAT).unwrap().prove(&gpu, COLOR_FORMAT).unwrap();
+    let why = Pipelines::new(&gpu).unwrap_err();
+    assert!(matches!(&why, GpuError::NoStorage { .. }), "{why}");
+    assert!(why.to_string().contains("mesa-vulkan-drivers"), "{why}");
 }
 
 #[test]

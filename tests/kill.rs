@@ -49,7 +49,7 @@ use touch2touch::work::bundles::BundleInfo;
 use touch2touch::work::error::TaskError;
 use touch2touch::work::export::{ExportChoice, Plan, Which};
 use touch2touch::work::job::JobCx;
-use touch2touch::work::labels::Deed;
+use touch2touch::work::labels::{Deed, Recovered};
 use touch2touch::work::models::Wanted;
 use touch2touch::work::prediction::Prediction;
 
@@ -139,7 +139,12 @@ impl Services for Files {
                 reviews.insert(entry.name.clone(), review);
             }
         }
-        Ok(Opened { source: Arc::new(Source { live, saves: self.saves }), reviews, notes: BTreeMap::new() })
+        Ok(Opened {
+            source: Arc::new(Source { live, saves: self.saves }),
+            reviews,
+            notes: BTreeMap::new(),
+            recovered: Recovered::default(),
+        })
     }
     fn find_bundles(&self, _: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {
         Default::default()

@@ -22,6 +22,7 @@ mod kill;
 mod layers;
 mod models;
 mod pose;
+mod recovery;
 mod rules;
 mod sim;
 mod stability;

@@ -30,4 +30,5 @@ mod seeds;
 mod shortcuts;
 mod train;
 mod unit;
+mod unsaved;
 mod workbench;

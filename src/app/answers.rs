@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::Effect;
+use super::effect::{Effect, NotSaved};
 use super::keys::{DatasetSeq, Revision};
 use super::labels::state::Merged;
 use super::library::state::Place;
@@ -63,6 +63,10 @@ pub enum Answer {
     RequestFailed(DatasetSeq, Request, TaskError),
     /// The labels of a pair are on the disk, as they were when this writing was asked for.
     LabelsSaved(String, Revision, Option<Box<Merged>>),
+    /// The labels of a pair could not be written.
+    LabelsFailed(Box<NotSaved>),
+    /// Labels are in another folder, as they were when that was asked for.
+    LabelsKept(Vec<(String, Revision)>, PathBuf),
     /// The settings are on the disk.
     SettingsSaved,
     /// A job failed that is neither of a ticket nor of a request.
@@ -153,14 +157,15 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::LabelsSaved(name, revision, merged) => {
             // An answer to anything but the last request: what was changed since is not on the disk yet.
             if state.document.asked.get(&name) == Some(&revision) {
-                state.document.asked.remove(&name);
-                state.document.unsaved.remove(&name);
+                labels::unsaved::saved(state, &name, effects);
                 labels::saved(state);
             }
             if let Some(merged) = merged {
                 labels::merged(state, &name, &merged, effects);
             }
         }
+        Answer::LabelsFailed(not) => labels::unsaved::failed(state, *not, effects),
+        Answer::LabelsKept(revisions, folder) => labels::unsaved::kept(state, revisions, folder, effects),
         Answer::JobFailed(err) => state.log.error(&err),
         Answer::Evaluated(ticket, evaluation) => {
             state.tasks.running.remove(&ticket);

@@ -7,7 +7,7 @@ pub use super::evaluate::EvaluateCommand;
 pub use super::export::ExportCommand;
 pub use super::follow::FollowCommand;
 pub use super::inspect::InspectCommand;
-pub use super::labels::LabelsCommand;
+pub use super::labels::{LabelsCommand, UnsavedCommand};
 pub use super::library::LibraryCommand;
 pub use super::pane::Pane;
 pub use super::predict::PredictCommand;

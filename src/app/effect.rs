@@ -17,11 +17,12 @@ use crate::io::dataset::ToolUnit;
 use crate::work::adapt::AdaptSetup;
 use crate::work::bundles::BundleInfo;
 use crate::work::case::CaseSetup;
+use crate::work::error::TaskError;
 use crate::work::evaluate::{Evaluation, Setup};
 use crate::work::export::ExportChoice;
 use crate::work::figure::FigureSetup;
 use crate::work::import::ImportSetup;
-use crate::work::labels::Deed;
+use crate::work::labels::{Deed, Unsaved};
 use crate::work::propose::BatchSetup;
 use crate::work::sweep::SweepSetup;
 use crate::work::train::TrainSetup;
@@ -41,6 +42,23 @@ pub struct LabelsToSave {
     pub deed: Deed,
     /// Who draws it a second time, apart from the pair's labels; `None` for these.
     pub repeat: Option<String>,
+}
+
+/// Labels that could not be written.
+#[derive(Clone)]
+pub struct NotSaved {
+    /// The data set they are of.
+    pub source: Arc<dyn DataSource>,
+    /// What was to be written.
+    pub save: LabelsToSave,
+    /// Why not.
+    pub err: TaskError,
+}
+
+impl std::fmt::Debug for NotSaved {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "NotSaved({}, {})", self.save.name, self.err)
+    }
 }
 
 /// Work that leaves the state.
@@ -87,6 +105,17 @@ pub enum Effect {
     Cancel(Ticket),
     /// Write the labels of a pair; a newer request for the same pair replaces a waiting one.
     SaveLabels(Arc<dyn DataSource>, Box<LabelsToSave>),
+    /// Write labels that could not be written where they belong to another folder.
+    KeepLabels {
+        /// The data.
+        source: Arc<dyn DataSource>,
+        /// What is to be written.
+        unsaved: Vec<Unsaved>,
+        /// Where to; `None` = where they wait for the next opening.
+        folder: Option<PathBuf>,
+        /// The requests that it is the answer to.
+        revisions: Vec<(String, Revision)>,
+    },
     /// Write the settings; a newer request replaces a waiting one.
     SaveSettings(Box<Settings>),
     /// Write masks for UNet training.
@@ -223,6 +252,13 @@ pub enum Effect {
     Ui(UiRequest),
 }
 
+impl Effect {
+    /// Has labels wait for the next opening of their data set.
+    pub(super) fn keep_waiting(source: Arc<dyn DataSource>, unsaved: Vec<Unsaved>) -> Self {
+        Self::KeepLabels { source, unsaved, folder: None, revisions: Vec::new() }
+    }
+}
+
 impl std::fmt::Debug for Effect {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -233,6 +269,7 @@ impl std::fmt::Debug for Effect {
             Self::Refit { ticket, recipe, .. } => write!(f, "Refit({ticket:?}, {recipe:?})"),
             Self::Cancel(ticket) => write!(f, "Cancel({ticket:?})"),
             Self::SaveLabels(_, save) => write!(f, "SaveLabels({})", save.name),
+            Self::KeepLabels { unsaved, folder, .. } => write!(f, "KeepLabels({}, {folder:?})", unsaved.len()),
             Self::SaveSettings(_) => write!(f, "SaveSettings"),
             Self::ExportMasks { folder, .. } => write!(f, "ExportMasks({})", folder.display()),
             Self::ImportMasks { setup, .. } => write!(f, "ImportMasks({})", setup.from.display()),

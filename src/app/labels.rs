@@ -4,10 +4,14 @@ mod batch;
 pub mod ghost;
 mod repeat;
 pub mod state;
+pub(super) mod unsaved;
 
 pub(super) use batch::{imported, proposed};
 pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
-pub use state::{Changed, Document, HandMask, MaskPlace, Merged, PairLabels, Repeating, Review, Stored, Stroke};
+pub use state::{
+    Changed, Document, HandMask, MaskPlace, Merged, PairLabels, Question, Repeating, Review, Stored, Stroke,
+};
+pub use unsaved::UnsavedCommand;
 
 use std::borrow::Cow;
 
@@ -76,6 +80,8 @@ pub enum LabelsCommand {
     AcceptPose(ImprintSource, bool),
     /// Writes all labels and settings now.
     Save,
+    /// To what is not on the disk yet.
+    Unsaved(UnsavedCommand),
 }
 
 /// How a drawing in a 3D view begins.
@@ -128,6 +134,7 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         }
         LabelsCommand::AcceptPose(source, accept) => accept_pose(state, source, accept, effects),
         LabelsCommand::Save => save_all(state, effects),
+        LabelsCommand::Unsaved(command) => unsaved::step(state, command, effects),
     }
 }
 
@@ -552,8 +559,14 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
     }
 }
 
-/// Writes the labels of a pair of the open data set.
-fn save_pair(state: &mut State, name: &str, mut deed: Deed, effects: &mut Vec<Effect>) {
+/// Writes the labels of a pair of the open data set, which were changed.
+fn save_pair(state: &mut State, name: &str, deed: Deed, effects: &mut Vec<Effect>) {
+    // Whether that works is to be said anew.
+    state.document.failed.remove(name);
+    save_again(state, name, deed, effects);
+}
+
+fn save_again(state: &mut State, name: &str, mut deed: Deed, effects: &mut Vec<Effect>) {
     let repeat = state.document.repeats.get(name).map(|repeating| repeating.person.clone());
     deed.person = repeat.clone().or_else(|| state.known_person());
     let Some(open) = &state.library.open else { return };
@@ -578,7 +591,7 @@ fn save_all(state: &mut State, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
     let unsaved: Vec<String> = state.document.unsaved.iter().cloned().collect();
     for name in unsaved {
-        save_pair(state, &name, Deed::named("saved again"), effects);
+        save_again(state, &name, Deed::named("saved again"), effects);
     }
     settings::save(state, effects);
     state.log.push(Level::Info, "Labels and preferences are being written", None, None);

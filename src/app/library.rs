@@ -305,6 +305,12 @@ pub(super) fn show(
     effects: &mut Vec<Effect>,
 ) -> bool {
     labels::end_stroke(state, effects);
+    // What is being written goes on; what could not be would be forgotten.
+    let failed = state.document.failed.clone();
+    let unsaved: Vec<_> = state.unsaved().into_iter().filter(|one| failed.contains_key(&one.name)).collect();
+    if let Some(open) = state.library.open.as_ref().filter(|_| !unsaved.is_empty()) {
+        effects.push(Effect::keep_waiting(open.source.clone(), unsaved));
+    }
     // Predictions under way are of the data set before.
     tasks::cancel_all(state, effects);
     let before = state.entry().map(|entry| entry.name.clone());
@@ -362,6 +368,11 @@ pub(super) fn show(
         n => format!("{}: {pairs} pairs, {n} problem{}", opened.source.title(), if n == 1 { "" } else { "s" }),
     };
     state.log.push(level, text, None, hint);
+    if let Some(text) = opened.recovered.text() {
+        let hint = "Undo takes them back, pair by pair.";
+        state.log.push(Level::Warning, text, None, Some(hint.into()));
+    }
+    opened.recovered.failed.iter().for_each(|err| state.log.error(err));
     remember(state, &place, effects);
     same_place
 }

@@ -7,10 +7,12 @@ mod perform;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::time::{Duration, Instant};
 
 use super::answers::Answer;
 use super::apply::apply;
-use super::command::{Command, LibraryCommand};
+use super::command::{Command, LabelsCommand, LibraryCommand, UnsavedCommand};
+use super::effect::Effect;
 use super::jobs::Lane;
 use super::keys::{DatasetSeq, Request, TouchKey};
 use super::library::state::Place;
@@ -20,6 +22,7 @@ use super::services::SharedServices;
 use super::state::State;
 use super::tasks::state::Ticket;
 use super::view::state::UiRequest;
+use crate::io::caught::caught;
 use crate::work::job::{Cancel, Progress};
 use lanes::{Event, Lanes};
 
@@ -47,6 +50,8 @@ pub(super) enum JobId {
     Follow,
     /// Showing a folder.
     Reveal,
+    /// Writing labels to another folder.
+    KeepLabels(usize),
 }
 
 /// Runs what `apply` wants done and what the panes want to show.
@@ -64,6 +69,10 @@ pub struct Runtime {
     wake: Wake,
     cancels: BTreeMap<Ticket, Cancel>,
     follower: Option<follow::Job>,
+    /// When labels that could not be written are tried again.
+    retry_at: Option<Instant>,
+    /// Folders that labels were kept in so far: each such job is one of its own.
+    kept: usize,
     threaded: bool,
 }
 
@@ -92,6 +101,8 @@ impl Runtime {
             wake,
             cancels: BTreeMap::new(),
             follower: None,
+            retry_at: None,
+            kept: 0,
             threaded,
         }
     }
@@ -132,6 +143,7 @@ impl Runtime {
         for command in commands {
             self.run(state, command, &mut ui);
         }
+        self.retry(state, &mut ui);
         let wish = state.preview_wish();
         if wish != *lock(&self.preview_wish) {
             *lock(&self.preview_wish) = wish;
@@ -145,6 +157,52 @@ impl Runtime {
             Some((state.library.open.as_ref()?.seq, request.job(state, services)?))
         });
         ui
+    }
+
+    /// Tries labels again that could not be written, after a while.
+    fn retry(&mut self, state: &mut State, ui: &mut Vec<UiRequest>) {
+        if state.document.failed.is_empty() {
+            self.retry_at = None;
+            return;
+        }
+        let now = Instant::now();
+        let due = self.retry_at.is_some_and(|at| at <= now);
+        if due {
+            self.run(state, LabelsCommand::Unsaved(UnsavedCommand::Retry), ui);
+        }
+        if due || self.retry_at.is_none() {
+            self.retry_at = now.checked_add(self.services.retry_after());
+        }
+    }
+
+    /// How long until [`Runtime::tick`] has to be called although nothing happens; `None` = not at all.
+    pub fn next_tick(&self) -> Option<Duration> {
+        Some(self.retry_at?.saturating_duration_since(Instant::now()))
+    }
+
+    /// Ends: waits for the files that are being written, and has labels that could not be written wait for the next opening
+    /// of their data set. Call [`Runtime::tick`] no more.
+    pub fn finish(&mut self, state: &mut State) {
+        self.follow(None);
+        self.lanes.close();
+        let mut keep: Vec<Effect> = Vec::new();
+        while let Ok(Event { answer, .. }) = self.events.try_recv() {
+            keep.extend(apply(state, answer.into()).into_iter().filter(|e| matches!(e, Effect::KeepLabels { .. })));
+        }
+        let unsaved = state.unsaved();
+        if let Some(open) = state.library.open.as_ref().filter(|_| !unsaved.is_empty()) {
+            keep.push(Effect::keep_waiting(open.source.clone(), unsaved));
+        }
+        for effect in keep {
+            if let Effect::KeepLabels { source, unsaved, folder, .. } = effect {
+                match caught(|| source.keep_labels(&unsaved, folder.as_deref())) {
+                    Ok(Ok(folder)) => log::warn!("Labels that could not be saved are in {}", folder.display()),
+                    Ok(Err(err)) => log::error!("{err}"),
+                    Err(message) => log::error!("Keep the labels: {message}"),
+                }
+            }
+        }
+        state.document.unsaved.clear();
     }
 
     /// Runs the first waiting job of a lane here and now; `false` if none waits. Only without threads.

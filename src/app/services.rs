@@ -32,7 +32,7 @@ use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{ExportChoice, HandMasks, Plan};
 use crate::work::job::JobCx;
 use crate::work::label_stats::LabelStats;
-use crate::work::labels::{Deed, Labels, Past};
+use crate::work::labels::{Deed, Labels, Recovered, Told, Unsaved};
 use crate::work::models::{Models, Wanted};
 use crate::work::prediction::Prediction;
 use crate::work::propose::{self, Batch, BatchSetup};
@@ -105,9 +105,9 @@ pub trait DataSource: Send + Sync {
     /// If there are some and they cannot be read: then they must not be written either.
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError>;
 
-    /// What was done to them before, and what was taken back of it, the oldest first.
-    fn past(&self, _name: &str, _labels: &PairLabels) -> (Vec<Past>, Vec<Past>) {
-        Default::default()
+    /// What was done to them before, and what was taken back of it.
+    fn past(&self, _name: &str, _labels: &PairLabels) -> Told {
+        Told::default()
     }
 
     /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones, and says what was done. The
@@ -116,6 +116,15 @@ pub trait DataSource: Send + Sync {
     /// # Errors
     /// If they cannot be written.
     fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError>;
+
+    /// Writes labels that could not be written where they belong into a folder; `None` = where they wait for the next opening.
+    /// Where they are then.
+    ///
+    /// # Errors
+    /// If they cannot be written there either.
+    fn keep_labels(&self, _unsaved: &[Unsaved], _folder: Option<&Path>) -> Result<PathBuf, TaskError> {
+        Err(TaskError::new("Keep the labels elsewhere", "this source keeps none"))
+    }
 
     /// Reads what a person drew a second time of a pair; empty if there is nothing.
     ///
@@ -195,6 +204,8 @@ pub struct Opened {
     pub reviews: BTreeMap<String, Review>,
     /// Notes stored with it, by pair name.
     pub notes: BTreeMap<String, String>,
+    /// Labels that could not be saved before, and are now.
+    pub recovered: Recovered,
 }
 
 impl std::fmt::Debug for Opened {
@@ -317,6 +328,11 @@ pub trait Services: Send + Sync {
     /// How long a pair stays on screen before it is predicted without being asked for.
     fn patience(&self) -> Duration {
         Duration::ZERO
+    }
+
+    /// How long labels that could not be written wait until they are tried again.
+    fn retry_after(&self) -> Duration {
+        Duration::from_secs(5)
     }
 
     /// Makes a case of a pair and writes it.

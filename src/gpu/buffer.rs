@@ -55,7 +55,7 @@ impl Elements {
         old: Option<wgpu::Buffer>,
     ) -> Result<Self, GpuError> {
         let bytes = std::mem::size_of_val(elements) as u64;
-        let limit = gpu.max_storage_bytes();
+        let limit = gpu.max_bytes(usage);
         let too_large = || GpuError::TooLarge { what: what.to_owned(), bytes, limit };
         let count = u32::try_from(elements.len()).map_err(|_| too_large())?;
         if bytes > limit {

@@ -25,6 +25,8 @@ pub struct Gpu {
     pub samples: u32,
     /// The adapter is a program: four samples cost it 2.5 times the time of one, so it is spared them.
     pub software: bool,
+    /// Vertices can be read from storage buffers, which points, lines and edges need.
+    pub(super) storage: bool,
     max_samples: u32,
     /// Name and driver of the adapter, for the log and the about box.
     pub adapter: String,
@@ -47,13 +49,26 @@ impl Gpu {
         device.on_uncaptured_error(Arc::new(|error| log::error!("graphics device: {error}")));
         let software = info.device_type == wgpu::DeviceType::Cpu;
         let max_samples = if can { 4 } else { 1 };
+        let storage = device.limits().max_storage_buffers_per_shader_stage > 0
+            && adapter.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::VERTEX_STORAGE);
         let adapter = format!("{} ({})", info.name, info.driver_info);
-        Self { device, queue, samples: if software { 1 } else { max_samples }, software, max_samples, adapter }
+        Self { device, queue, samples: if software { 1 } else { max_samples }, software, storage, max_samples, adapter }
     }
 
     /// The same device with the smoothest edges it can draw, for figures.
     pub fn smooth(&self) -> Self {
         Self { samples: self.max_samples, ..self.clone() }
+    }
+
+    /// What the window asks an adapter for. Of a GL driver all that it has: the toolkit asks such a driver for what a browser
+    /// has, and that is no storage buffers.
+    pub fn wanted(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
+        let required_limits = match adapter.get_info().backend {
+            wgpu::Backend::Gl => adapter.limits(),
+            // Room for the pictures of large screens.
+            _ => wgpu::Limits { max_texture_dimension_2d: 8192, ..wgpu::Limits::default() },
+        };
+        wgpu::DeviceDescriptor { label: Some("touch2touch window"), required_limits, ..Default::default() }
     }
 
     /// A device without a window, on the best adapter there is; a software renderer will do.
@@ -77,21 +92,27 @@ impl Gpu {
     /// [`GpuError::Device`] with `what`, or what `work` returns.
     pub fn guarded<T>(&self, what: &str, work: impl FnOnce() -> Result<T, GpuError>) -> Result<T, GpuError> {
         let memory = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let internal = self.device.push_error_scope(wgpu::ErrorFilter::Internal);
         let validation = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
         let result = work();
         let invalid = block_on(validation.pop());
+        let internal = block_on(internal.pop());
         let full = block_on(memory.pop());
         let value = result?;
-        match invalid.or(full) {
+        match invalid.or(internal).or(full) {
             None => Ok(value),
             Some(error) => Err(GpuError::Device { what: what.to_owned(), reason: error.to_string() }),
         }
     }
 
-    /// Largest storage buffer that a shader can read, bytes.
-    pub(super) fn max_storage_bytes(&self) -> u64 {
+    /// Largest buffer for a usage, bytes. A device without storage buffers still has vertices and indices.
+    pub(super) fn max_bytes(&self, usage: wgpu::BufferUsages) -> u64 {
         let limits = self.device.limits();
-        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+        if usage.contains(wgpu::BufferUsages::STORAGE) {
+            limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+        } else {
+            limits.max_buffer_size
+        }
     }
 }
 

@@ -60,9 +60,12 @@ impl Pipelines {
     /// Compiles the shaders and builds every pipeline.
     ///
     /// # Errors
-    /// [`GpuError::Shader`] with file and line, or [`GpuError::Device`] with the driver's reason: to be shown in
-    /// place of the view.
+    /// [`GpuError::NoStorage`], [`GpuError::Shader`] with file and line, or [`GpuError::Device`] with the driver's reason: to
+    /// be shown in place of the view.
     pub fn new(gpu: &Gpu) -> Result<Self, GpuError> {
+        if !gpu.storage {
+            return Err(GpuError::NoStorage { adapter: gpu.adapter.clone() });
+        }
         let compiled = |name| shaders::compile(gpu, name);
         let (points, mesh, edges) = (compiled("points.wgsl")?, compiled("mesh.wgsl")?, compiled("edges.wgsl")?);
         let lines = compiled("lines.wgsl")?;
@@ -188,7 +191,8 @@ fn depth_texture(multisampled: bool) -> wgpu::BindGroupLayoutEntry {
         binding: 0,
         visibility: wgpu::ShaderStages::FRAGMENT,
         ty: wgpu::BindingType::Texture {
-            sample_type: wgpu::TextureSampleType::Depth,
+            // Not as depth: GL cannot load single pixels of that.
+            sample_type: wgpu::TextureSampleType::Float { filterable: false },
             view_dimension: wgpu::TextureViewDimension::D2,
             multisampled,
         },

@@ -186,6 +186,18 @@ impl Sheet {
         })
     }
 
+    /// Paints one pixel, so that a device which cannot is known before anything is left to this sheet.
+    ///
+    /// # Errors
+    /// As [`Self::paint`].
+    pub fn prove(&mut self, gpu: &Gpu, format: wgpu::TextureFormat) -> Result<(), GpuError> {
+        let corner = |at| Corner { at, uv: [0.0; 2], color: [0, 0, 0, 255] };
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0]].map(corner);
+        let run = Run { scissor: [0, 0, 1, 1], indices: 0..3, fill: Fill::Flat { opaque: true } };
+        let picture = self.picture(gpu, [1, 1], format);
+        self.paint(gpu, &picture, &corners, &[0, 1, 2], &[run])
+    }
+
     fn bind(&self, gpu: &Gpu, view: &wgpu::TextureView, nearest: bool) -> wgpu::BindGroup {
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("Sheet::texture"),

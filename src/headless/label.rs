@@ -23,7 +23,7 @@ use crate::work::error::TaskError;
 use crate::work::job::JobCx;
 use crate::work::label_stats::LabelStats;
 use crate::work::labels::{
-    Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person,
+    Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person, take_in,
 };
 use crate::work::mask::{Contact, MaskInputs};
 use crate::work::pose::pose;
@@ -34,15 +34,27 @@ pub(super) use args::LabelArgs;
 use report::{Report, Stored};
 
 pub(super) fn run(args: &LabelArgs) -> VerbResult {
+    if args.pose.is_some() && args.accept.is_none() && args.propose.is_none() {
+        anyhow::bail!(
+            "--pose alone changes nothing: name the imprint that it is accepted of (--accept), or --propose cad_hand"
+        );
+    }
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let labels = Labels::of(&dataset);
     let output = Output::new(args.common, "", 0);
     let folder = labels.folder()?.to_owned();
     let (mut pairs, mut complete) = (Vec::new(), true);
+    if let Some(kept) = &args.take_in {
+        let found = take_in(&dataset, &labels, kept)?;
+        found.text().into_iter().for_each(|text| output.note(&text));
+        found.failed.iter().for_each(|err| output.note(&err.to_string()));
+        complete = found.failed.is_empty();
+    }
     if let Some(name) = &args.pair {
         let id = find_pair(&dataset, name)?;
         let entry = &dataset.index.pairs[id.0 as usize];
         let mut stored = labels.load(&entry.name)?;
+        labels.journal_problem(&entry.name).into_iter().for_each(|err| output.note(&format!("note: {err}")));
         let before = stored.clone();
         change(args, (&dataset, &labels, id), &mut stored)?;
         if stored != before {
@@ -163,6 +175,7 @@ fn change(
                 Some(_) => touch.proposals((dataset, all, id), (&found.imprints, &of), &felt, labels)?,
                 None => PerPad::default(),
             };
+            let mut drawn_on = vec![false; args.draw.len()];
             for pad in felt {
                 let Some(one) = &found.masks[pad] else { continue };
                 let drawn = match args.from {
@@ -181,11 +194,11 @@ fn change(
                     hand = accepted(drawn, proposal, args.over_hand);
                 }
                 if let Some(imprint) = &found.imprints[pad] {
-                    for drawing in &args.draw {
+                    for (drawing, touches) in args.draw.iter().zip(&mut drawn_on) {
                         let sight = drawing.sight.as_deref();
                         let seen = sight.map(|sight| seen(&touch.sample, &found.imprints.as_ref(), pad, sight));
                         let seen = seen.transpose()?;
-                        hand.draw(drawing, Ground { seen: seen.as_ref(), ..Ground::new(imprint) }, by());
+                        *touches |= hand.draw(drawing, Ground { seen: seen.as_ref(), ..Ground::new(imprint) }, by());
                     }
                 }
                 for clean_up in &args.clean {
@@ -194,6 +207,13 @@ fn change(
                 if makes || !hand.is_same(&start) {
                     labels.draw(&place(pad), Some(hand));
                 }
+            }
+            if let Some(at) = drawn_on.iter().position(|touches| !touches) {
+                let drawing = serde_json::to_string(&args.draw[at])?;
+                anyhow::bail!(
+                    "--draw {drawing} touches no pixel: points are pixels of the image (or of its sight), 0,0 is the center \
+                     of the upper left one"
+                );
             }
         }
     }

@@ -169,6 +169,7 @@ fn pose_cases(
         let influence = influence.zip(answer).map(|(stem, found)| {
             influence::write(stem, (&contact.clouds(sample)?, sample, tool), (imprint, engine), found)
         });
+        let influence = influence.transpose()?;
         Ok(Case {
             name: name.to_owned(),
             engine: engine.to_string(),
@@ -185,7 +186,7 @@ fn pose_cases(
             accepted: accepted.map(|a| Accepted::new(a, truth.map(|truth| truth.inverse().theta_rad))),
             report: found.ok().map(|found| found.report).filter(|_| args.trace),
             ambiguity: left_open.clone(),
-            no_influence: influence.as_ref().and_then(|found| found.as_ref().err().map(says)),
+            no_influence: influence.as_ref().and_then(|found| found.as_ref().err().map(ToString::to_string)),
             influence: influence.and_then(Result::ok),
             fan,
         })

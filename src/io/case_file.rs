@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{Read as _, Write as _};
 use std::path::{Component, Path, PathBuf};
 
-use super::{atomic, files};
+use super::{archive, atomic, files};
 
 /// The ending of a case.
 pub const ENDING: &str = "t2tcase";
@@ -103,8 +103,7 @@ pub fn write(file: &Path, content: &CaseContent) -> Result<(), CaseFileError> {
     if let Some(name) = content.files.keys().find(|name| !is_plain(name)).or(odd) {
         return Err(damaged(format!("{:?} is no name that every system can unpack", files::clip(name))));
     }
-    atomic::write(file, |out| {
-        let mut zip = zip::ZipWriter::new(out);
+    archive::write(file, |zip| {
         // Without a date, so that the same case is the same file.
         let options = zip::write::SimpleFileOptions::default().last_modified_time(zip::DateTime::default());
         zip.start_file(MANIFEST, options)?;
@@ -113,11 +112,14 @@ pub fn write(file: &Path, content: &CaseContent) -> Result<(), CaseFileError> {
             zip.start_file(format!("data/{name}"), options)?;
             zip.write_all(bytes)?;
         }
+<<<<<<< HEAD
         for (name, bytes) in &content.beside {
             zip.start_file(name.as_str(), options)?;
             zip.write_all(bytes)?;
         }
         zip.finish()?;
+=======
+>>>>>>> doors
         Ok(())
     })
     .map_err(|source| CaseFileError::Io { file: file.to_owned(), source })

@@ -26,6 +26,7 @@ use crate::domain::rig::{PerPad, Rig};
 use crate::domain::sample::{DepthCamera, Sample};
 use crate::domain::turn::Turn;
 
+use super::home::Home;
 use super::stl::MeshError;
 
 pub use built_in::BuiltIn;
@@ -93,6 +94,8 @@ pub struct Dataset {
     pub title: String,
     /// Its root folder; `None` for what is built in. The same for every sub-folder it was opened from.
     pub root: Option<PathBuf>,
+    /// That folder as it was opened.
+    pub home: Option<Home>,
     /// The kind of source.
     pub kind: SourceKind,
     /// Names of all pairs in natural order.
@@ -158,6 +161,7 @@ impl Dataset {
         let title = scan.root.file_name().map_or_else(|| "dataset".into(), |n| n.to_string_lossy().into_owned());
         Self {
             title,
+            home: Home::at(&scan.root),
             root: Some(scan.root),
             kind: scan.kind,
             index: Index { pairs: scan.pairs },
@@ -180,6 +184,7 @@ impl Dataset {
         Self {
             title: set.title(),
             root: None,
+            home: None,
             kind: SourceKind::Demo,
             index: Index { pairs: set.pairs() },
             problems: Vec::new(),

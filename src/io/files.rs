@@ -3,7 +3,7 @@
 //! Every reader of `io`, `infer` and `app` goes through here (`tests/layers.rs` holds them to it). A named pipe would wait
 //! for a writer for ever, and a link to `/dev/zero` never ends.
 
-use std::fs::{File, Metadata};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
 
@@ -31,6 +31,63 @@ fn ordinary(found: &Metadata) -> io::Result<()> {
         Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, not a file"))
     } else {
         Err(io::Error::new(io::ErrorKind::InvalidInput, "it is a pipe, a socket or a device, not an ordinary file"))
+    }
+}
+
+/// Opens an ordinary file that this program keeps writing on, for reading and appending; makes it where there is none. A link
+/// is not followed: it may lead out of the folder that the file is meant to be in.
+///
+/// # Errors
+/// The system's, and [`io::ErrorKind::InvalidInput`] for a link, a pipe, a socket or a device.
+pub fn append(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).append(true);
+    // Asked before opening, as in `open`.
+    let found = match std::fs::symlink_metadata(path) {
+        Ok(found) => found,
+        Err(err) if err.kind() == io::ErrorKind::NotFound => match options.clone().create_new(true).open(path) {
+            // Somebody else made it meanwhile.
+            Err(err) if err.kind() == io::ErrorKind::AlreadyExists => std::fs::symlink_metadata(path)?,
+            made => return made,
+        },
+        Err(err) => return Err(err),
+    };
+    let link = || io::Error::new(io::ErrorKind::InvalidInput, "it is a link, not an ordinary file");
+    if found.is_symlink() {
+        return Err(link());
+    }
+    ordinary(&found)?;
+    let file = options.open(path)?;
+    if Identity::of(&file.metadata()?) == Identity::of(&found) { Ok(file) } else { Err(link()) }
+}
+
+/// What makes a file or folder the same one, whatever lies at its path later.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Identity {
+    /// Device and inode, where the system has them.
+    place: [u64; 2],
+    /// When it was made, where the system says: the inode of what was deleted is given out again.
+    made: Option<std::time::SystemTime>,
+}
+
+impl Identity {
+    /// That of a file or folder.
+    pub fn of(found: &Metadata) -> Self {
+        #[cfg(unix)]
+        let place = {
+            use std::os::unix::fs::MetadataExt as _;
+            [found.dev(), found.ino()]
+        };
+        #[cfg(not(unix))]
+        let place = [0; 2];
+        Self { place, made: found.created().ok() }
+    }
+
+    /// It in a few letters, for files.
+    pub fn text(self) -> String {
+        let made = self.made.and_then(|made| made.duration_since(std::time::UNIX_EPOCH).ok());
+        let [device, inode] = self.place;
+        format!("{device:x}-{inode:x}-{:x}", made.map_or(0, |made| made.as_nanos()))
     }
 }
 
@@ -117,6 +174,26 @@ mod tests {
         std::fs::write(&file, b"1").unwrap();
         std::os::unix::fs::symlink(&file, &link).unwrap();
         assert_eq!(read(&link, 1).unwrap(), b"1");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_appended_to_is_an_ordinary_file_in_its_own_place() {
+        use std::io::Write as _;
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        append(&at("new")).unwrap().write_all(b"1").unwrap();
+        append(&at("new")).unwrap().write_all(b"2").unwrap();
+        assert_eq!(std::fs::read(at("new")).unwrap(), b"12");
+        assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
+        std::os::unix::fs::symlink(at("new"), at("link")).unwrap();
+        std::os::unix::fs::symlink(at("not there"), at("to nothing")).unwrap();
+        for name in ["pipe", "link", "to nothing"] {
+            let error = append(&at(name)).unwrap_err();
+            assert!(error.to_string().contains("not an ordinary file"), "{name}: {error}");
+        }
+        assert!(!at("not there").exists());
+        assert_eq!(append(dir.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
     }
 
     #[test]

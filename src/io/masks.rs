@@ -8,13 +8,15 @@
 //!
 //! A file that cannot be understood blocks its pair: it is reported, and nothing overwrites it.
 
-use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
+mod journal;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use super::dataset::Dataset;
+use super::home::{Away, Home};
 use super::{atomic, files, folders, names};
 use crate::domain::dataset::Problem;
 use crate::domain::grid::Mask;
@@ -25,9 +27,6 @@ use crate::domain::rig::{PadId, Rig};
 /// Name of the folder beside a data set.
 pub const FOLDER: &str = "touch2touch_masks";
 const REPEATS: &str = "repeats";
-/// The file that is locked while labels are written.
-const LOCK: &str = ".lock";
-const JOURNAL_SUFFIX: &str = ".journal.jsonl";
 const FORMAT: &str = "touch2touch-mask";
 const REVIEW_FORMAT: &str = "touch2touch-review";
 const VERSION: u32 = 1;
@@ -63,6 +62,9 @@ pub enum StoreError {
         /// What is wrong.
         reason: String,
     },
+    /// The data set is not where it was opened.
+    #[error(transparent)]
+    Lost(#[from] Away),
     /// No folder can be written.
     #[error("no folder for masks can be written; tried {tried}")]
     NoFolder {
@@ -77,13 +79,14 @@ impl StoreError {
         match self {
             Self::Io { .. } => "check the permissions and the free space of the disk",
             Self::Damaged { .. } => "restore the file from a backup, or move it away to start this mask anew",
+            Self::Lost(_) => "put the data set back where it was, or save the labels elsewhere",
             Self::NoFolder { .. } => "make one of these folders writable, or set XDG_DATA_HOME to one that is",
         }
     }
 
     fn to_problem(&self) -> Problem {
         let file = match self {
-            Self::Io { file, .. } | Self::Damaged { file, .. } => file.clone(),
+            Self::Io { file, .. } | Self::Damaged { file, .. } | Self::Lost(Away { root: file, .. }) => file.clone(),
             Self::NoFolder { .. } => PathBuf::new(),
         };
         Problem { file, what: self.to_string(), hint: self.hint().into() }
@@ -189,6 +192,8 @@ pub struct MaskStore {
     also_read: Option<PathBuf>,
     /// The names of the pads.
     rig: Arc<Rig>,
+    /// The data set's folder, without which nothing is written: a path where another one lies, or none, is not the place.
+    home: Option<Home>,
 }
 
 impl MaskStore {
@@ -206,7 +211,12 @@ impl MaskStore {
             None => names::label(&dataset.title),
         };
         let user = folders::data().map(|folder| folder.join("masks").join(key));
-        Ok(Self { rig: dataset.rig.clone(), ..Self::choose(dataset.root.as_deref(), user)? })
+        let (rig, home) = (dataset.rig.clone(), dataset.home.clone());
+        // What lies at its path now says nothing about it.
+        if let Some(gone) = home.as_ref().filter(|home| home.check().is_err()) {
+            return Ok(Self { folder: gone.root().join(FOLDER), also_read: None, rig, home });
+        }
+        Ok(Self { rig, home, ..Self::choose(dataset.root.as_deref(), user)? })
     }
 
     /// [`MaskStore::for_dataset`] with the two places given, for the lab's rig.
@@ -220,13 +230,14 @@ impl MaskStore {
         {
             // Labels made while the data set was read-only stay visible.
             let also_read = user_folder.filter(|folder| folder.is_dir());
-            return Ok(Self { folder: beside.clone(), also_read, rig: Rig::lab() });
+            return Ok(Self { folder: beside.clone(), also_read, rig: Rig::lab(), home: None });
         }
         let mut tried: Vec<String> = beside.iter().map(|p| p.display().to_string()).collect();
         if let Some(user) = user_folder {
             let there = user.ancestors().find(|folder| folder.is_dir());
             if there.is_some_and(is_writable) {
-                return Ok(Self { folder: user, also_read: beside.filter(|folder| folder.is_dir()), rig: Rig::lab() });
+                let also_read = beside.filter(|folder| folder.is_dir());
+                return Ok(Self { folder: user, also_read, rig: Rig::lab(), home: None });
             }
             tried.push(user.display().to_string());
         }
@@ -235,7 +246,7 @@ impl MaskStore {
 
     /// A store in a given folder, for the lab's rig.
     pub fn in_folder(folder: PathBuf) -> Self {
-        Self { folder, also_read: None, rig: Rig::lab() }
+        Self { folder, also_read: None, rig: Rig::lab(), home: None }
     }
 
     /// The same folder, for other sensors.
@@ -249,17 +260,7 @@ impl MaskStore {
     pub fn repeats_of(&self, person: &str) -> Self {
         let within = |folder: &PathBuf| folder.join(REPEATS).join(names::label(person));
         let also_read = self.also_read.as_ref().map(within);
-        Self { folder: within(&self.folder), also_read, rig: self.rig.clone() }
-    }
-
-    /// Keeps other programs that ask as well from writing here until the answer is dropped. Where the disk knows no locks
-    /// nothing is kept out.
-    pub fn hold(&self) -> Option<std::fs::File> {
-        std::fs::create_dir_all(&self.folder).ok()?;
-        let open = std::fs::OpenOptions::new().create(true).truncate(false).write(true).open(self.folder.join(LOCK));
-        let file = open.ok()?;
-        file.lock().ok()?;
-        Some(file)
+        Self { folder: within(&self.folder), also_read, ..self.clone() }
     }
 
     /// Where files are written.
@@ -301,6 +302,7 @@ impl MaskStore {
         self.load(pair, finger)?;
         let file = self.mask_file(pair, finger);
         let Some(stored) = mask else {
+            self.at_home()?;
             return match std::fs::remove_file(&file) {
                 Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
                     Err(StoreError::Io { file, what: "remove the mask", source })
@@ -444,44 +446,19 @@ impl MaskStore {
         masks
     }
 
-    fn journal_file(&self, pair: &str) -> PathBuf {
-        self.folder.join(format!("{}{JOURNAL_SUFFIX}", names::label(pair)))
+    /// Whether the data set is still there.
+    fn at_home(&self) -> Result<(), StoreError> {
+        Ok(self.home.as_ref().map_or(Ok(()), Home::check)?)
     }
 
-    /// Appends a line to the journal of a pair: who did what, before and after. Nothing is ever removed from it.
-    ///
-    /// # Errors
-    /// [`StoreError::Io`].
-    pub fn append_journal(&self, pair: &str, line: &impl Serialize) -> Result<(), StoreError> {
-        let file = self.journal_file(pair);
-        let io = |source| StoreError::Io { file: file.clone(), what: "write the journal", source };
-        std::fs::create_dir_all(&self.folder).map_err(io)?;
-        let mut bytes = serde_json::to_vec(line).map_err(|err| io(err.into()))?;
-        bytes.push(b'\n');
-        let mut out = std::fs::OpenOptions::new().create(true).append(true).read(true).open(&file).map_err(io)?;
-        // A line cut short by a crash is closed, so that this one stands by itself.
-        let length = out.metadata().map_err(io)?.len();
-        if length > 0 {
-            let mut last = [0];
-            out.seek(SeekFrom::End(-1)).and_then(|_| out.read_exact(&mut last)).map_err(io)?;
-            if last != *b"\n" {
-                bytes.insert(0, b'\n');
-            }
-        }
-        // One write, so that a crash can only cut this line short.
-        out.write_all(&bytes).and_then(|()| out.sync_data()).map_err(io)
-    }
-
-    /// The lines of the journal of a pair; empty if there is none.
-    ///
-    /// # Errors
-    /// [`StoreError::Io`].
-    pub fn journal(&self, pair: &str) -> Result<Vec<u8>, StoreError> {
-        let file = self.journal_file(pair);
-        match files::read(&file, files::SMALL) {
-            Err(err) if err.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-            read => read.map_err(|source| StoreError::Io { file, what: "read the journal", source }),
-        }
+    /// Makes the folder where it is missing; never the data set's own.
+    fn make_folder(&self, what: &'static str) -> Result<(), StoreError> {
+        self.at_home()?;
+        std::fs::create_dir_all(&self.folder).map_err(|source| StoreError::Io {
+            file: self.folder.clone(),
+            what,
+            source,
+        })
     }
 
     fn folders(&self) -> impl Iterator<Item = &Path> {
@@ -518,7 +495,7 @@ impl MaskStore {
 
     fn write(&self, file: &Path, content: &impl Serialize) -> Result<(), StoreError> {
         let io = |source| StoreError::Io { file: file.to_owned(), what: "save the labels", source };
-        std::fs::create_dir_all(&self.folder).map_err(io)?;
+        self.make_folder("save the labels")?;
         let mut bytes = serde_json::to_vec(content).map_err(|err| io(err.into()))?;
         bytes.push(b'\n');
         atomic::write_bytes(file, &bytes).map_err(io)

@@ -7,7 +7,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::pt::{Tensor, Values};
-use super::{atomic, files};
+use super::{archive, atomic, files};
 use crate::domain::grid::{Grid, RgbGrid};
 
 /// Why an `.npz` file cannot be read.
@@ -125,13 +125,11 @@ pub fn write(path: &Path, arrays: &[(&str, Tensor)]) -> Result<(), NpzError> {
             return Err(NpzError::Array { file: path.to_owned(), name: (*name).to_owned(), reason });
         }
     }
-    atomic::write(path, |out| {
-        let mut zip = zip::ZipWriter::new(out);
+    archive::write(path, |zip| {
         for (name, tensor) in arrays {
             zip.start_file(format!("{name}.npy"), zip::write::SimpleFileOptions::default())?;
             zip.write_all(&npy::bytes(&tensor.shape, &tensor.values))?;
         }
-        zip.finish()?;
         Ok(())
     })
     .map_err(|source| NpzError::Io { file: path.to_owned(), source })

@@ -69,22 +69,39 @@ pub struct ShardWriter {
     size: [usize; 2],
     files: Vec<BufWriter<File>>,
     touches: usize,
+    finished: bool,
+}
+
+impl Drop for ShardWriter {
+    /// What was not finished is of no use to anybody.
+    fn drop(&mut self) {
+        if self.finished {
+            return;
+        }
+        self.files.clear();
+        for name in FILES {
+            std::fs::remove_file(self.folder.join(name)).ok();
+        }
+        // Only if nothing else lies there.
+        std::fs::remove_dir(&self.folder).ok();
+    }
 }
 
 impl ShardWriter {
-    /// Begins a shard of imprints of this size; what an earlier run left unfinished there is replaced.
+    /// Begins a shard of imprints of this size; what an earlier run left unfinished there is replaced. Unless it is finished,
+    /// nothing of it stays.
     ///
     /// # Errors
     /// Whatever the disk says.
     pub fn create(folder: &Path, size: [usize; 2]) -> io::Result<Self> {
         std::fs::create_dir_all(folder)?;
-        let create = |name: &str| {
+        let mut shard = Self { folder: folder.to_owned(), size, files: Vec::new(), touches: 0, finished: false };
+        for name in FILES {
             let mut file = BufWriter::new(File::create(folder.join(name))?);
             file.write_all(&[0; HEADER])?;
-            Ok(file)
-        };
-        let files = FILES.into_iter().map(create).collect::<io::Result<_>>()?;
-        Ok(Self { folder: folder.to_owned(), size, files, touches: 0 })
+            shard.files.push(file);
+        }
+        Ok(shard)
     }
 
     /// Adds a touch.
@@ -145,7 +162,9 @@ impl ShardWriter {
             file.flush()?;
             file.get_ref().sync_all()?;
         }
-        atomic::write_bytes(&self.folder.join(DONE), about.to_string().as_bytes())
+        atomic::write_bytes(&self.folder.join(DONE), about.to_string().as_bytes())?;
+        self.finished = true;
+        Ok(())
     }
 }
 

@@ -17,11 +17,11 @@ use super::pane::{Docking, Panes};
 use super::scene_view::Device;
 use super::screenshot::Shot;
 use super::theme::{DARK, LIGHT};
-use super::{bars, export, layout, log as log_pane, palette, pane, shortcuts, theme};
+use super::{bars, export, layout, log as log_pane, palette, pane, shortcuts, theme, unsaved};
 use crate::app::action::Action;
 use crate::app::command::{
     Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest,
-    ViewCommand,
+    UnsavedCommand, ViewCommand,
 };
 use crate::app::evaluate::EvaluateCommand;
 use crate::app::export::Output;
@@ -34,6 +34,7 @@ use crate::app::settings::{Last, MaskTool, Theme, Workspace};
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
 use crate::domain::rig::SensorKind;
+use crate::io::caught::caught;
 
 /// How the studio is started.
 pub struct Options {
@@ -89,7 +90,10 @@ pub struct StudioApp {
     applied_theme: Option<Theme>,
     applied_zoom: f32,
     folder: Option<PathBuf>,
-    services: SharedServices,
+    /// Whether the window may close: everything is saved, or is not to be.
+    leaving: bool,
+    /// Whether what has to be done at the end was done.
+    ended: bool,
     shot_sender: Sender<(Shot, Arc<egui::ColorImage>)>,
     shots: Receiver<(Shot, Arc<egui::ColorImage>)>,
 }
@@ -141,7 +145,8 @@ impl StudioApp {
             applied_theme: None,
             applied_zoom: 1.0,
             folder: options.screenshots,
-            services: options.services,
+            leaving: false,
+            ended: false,
             shot_sender,
             shots,
         }
@@ -231,6 +236,9 @@ impl StudioApp {
         for request in requests {
             self.perform(ctx, request);
         }
+        if let Some(wait) = self.runtime.next_tick() {
+            ctx.request_repaint_after(wait);
+        }
         self.shared.saved.observe(&self.state.document.unsaved);
         self.first_prediction();
         self.resume();
@@ -303,6 +311,11 @@ impl StudioApp {
             UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
             UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
             UiRequest::PickMasks => self.shared.dialogs.open(Purpose::Masks, ctx),
+            UiRequest::PickLabelsFolder => self.shared.dialogs.open(Purpose::Labels, ctx),
+            UiRequest::Close => {
+                self.leaving = true;
+                ctx.send_viewport_cmd(ViewportCommand::Close);
+            }
             UiRequest::Camera(preset) => {
                 // The view under the pointer turns; linked cameras turn together.
                 let over = self.panes.hovered.filter(|pane| matches!(pane.kind(), Kind::Scene(_)));
@@ -422,6 +435,12 @@ impl StudioApp {
 
 impl eframe::App for StudioApp {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        let doc = &self.state.document;
+        let open = !doc.unsaved.is_empty() || doc.stroke.is_some();
+        if open && !self.leaving && ctx.input(|i| i.viewport().close_requested()) {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            self.inbox.push(LabelsCommand::Unsaved(UnsavedCommand::Close).into());
+        }
         self.tick(ctx);
     }
 
@@ -450,8 +469,10 @@ impl eframe::App for StudioApp {
                 device: self.device.as_ref().map_err(String::as_str),
                 p: palette_colors,
             };
-            let covered =
-                cx.state.selection.palette || cx.state.selection.shortcut_sheet || cx.shared.dialogs.is_path_box_open();
+            let covered = cx.state.selection.palette
+                || cx.state.selection.shortcut_sheet
+                || cx.shared.dialogs.is_path_box_open()
+                || cx.state.document.question.is_some();
             let state = cx.state;
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
             let keys = &state.settings.keys;
@@ -496,6 +517,7 @@ impl eframe::App for StudioApp {
             export::import::form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);
             shortcuts::sheet(&mut cx, &ctx, &mut self.shortcuts);
+            unsaved::question(&mut cx, &ctx);
             bars::drop_overlay(&cx, &ctx);
             if let Some((purpose, path)) = cx.shared.dialogs.show(&ctx) {
                 cx.push(match purpose {
@@ -505,6 +527,7 @@ impl eframe::App for StudioApp {
                         Command::Export(ExportCommand::WriteCase(path, camera))
                     }
                     Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
+                    Purpose::Labels => Command::Labels(LabelsCommand::Unsaved(UnsavedCommand::Elsewhere(path))),
                     Purpose::Masks => Command::Export(ExportCommand::AskImport(Some(path))),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
                 });
@@ -523,15 +546,34 @@ impl eframe::App for StudioApp {
     }
 
     fn on_exit(&mut self) {
-        self.remember();
-        let commands = std::mem::take(&mut self.inbox);
-        self.runtime.tick(&mut self.state, commands);
-        self.runtime.tick(
-            &mut self.state,
-            vec![Command::Labels(LabelsCommand::EndStroke), Command::Labels(LabelsCommand::Save)],
-        );
-        // Dropping the runtime waits for what is being written.
-        self.runtime = Runtime::inline(self.services.clone());
+        self.end();
+    }
+}
+
+impl Drop for StudioApp {
+    /// The window may go without asking: its display went away, or drawing it panicked.
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+impl StudioApp {
+    /// Saves what can be saved; what cannot waits for the next start.
+    fn end(&mut self) {
+        if std::mem::replace(&mut self.ended, true) {
+            return;
+        }
+        let ended = caught(|| {
+            self.remember();
+            let commands = std::mem::take(&mut self.inbox);
+            self.runtime.tick(&mut self.state, commands);
+            let last = vec![Command::Labels(LabelsCommand::EndStroke), Command::Labels(LabelsCommand::Save)];
+            self.runtime.tick(&mut self.state, last);
+            self.runtime.finish(&mut self.state);
+        });
+        if let Err(message) = ended {
+            log::error!("at the end: {message}");
+        }
     }
 }
 

@@ -23,6 +23,8 @@ pub(super) enum Purpose {
     Table,
     /// The folder of masks that are imported.
     Masks,
+    /// The folder that labels are written to which could not be saved.
+    Labels,
     /// Where something is written.
     Output(Output),
 }
@@ -33,6 +35,7 @@ impl Purpose {
             Self::Folder => "Open a folder of pairs",
             Self::File => "Open a file of a data set",
             Self::Output(output) => output.title(),
+            Self::Labels => "Save the labels to a folder",
             Self::Masks => "Import masks from a folder",
             Self::Table => "Write the results table to a folder",
         }
@@ -78,7 +81,7 @@ impl Dialogs {
         let work = move || {
             let dialog = rfd::FileDialog::new().set_title(purpose.title());
             let path = match purpose {
-                Purpose::Folder | Purpose::Table | Purpose::Masks => dialog.pick_folder(),
+                Purpose::Folder | Purpose::Table | Purpose::Masks | Purpose::Labels => dialog.pick_folder(),
                 Purpose::File => dialog.pick_file(),
                 Purpose::Output(output) => match output.file_name() {
                     Some(name) => dialog.set_file_name(name).save_file(),
@@ -138,6 +141,7 @@ impl Dialogs {
                     Some(name) => format!("A file such as {name}"),
                     None => "A folder; it is made if it is not there.".to_owned(),
                 },
+                Purpose::Labels => "A folder on another disk; touch2touch_masks is made in it.".to_owned(),
                 Purpose::Masks => {
                     "The folder of an export, one of its parts, or one .png, .npy or .json of masks.".to_owned()
                 }

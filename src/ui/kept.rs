@@ -102,7 +102,8 @@ impl Kept {
         if !gpu.software || !plain {
             return Ok(false);
         }
-        let sheet = Sheet::new(&gpu, format)?;
+        let mut sheet = Sheet::new(&gpu, format)?;
+        sheet.prove(&gpu, format)?;
         let (versions, tiles) = (BTreeMap::new(), Vec::new());
         ctx.add_plugin(Self { gpu, format, sheet, picture: None, versions, tiles, painted: 0 });
         Ok(true)

@@ -390,8 +390,7 @@ pub(super) fn save_state(cx: &Cx<'_>, ui: &mut Ui) {
     let (text, color) = if cx.state.document.stroke.is_some() {
         ("unsaved stroke".to_owned(), cx.p.caution)
     } else {
-        let unsaved = cx.state.document.unsaved.contains(cx.state.pair_name());
-        super::saved::text(&cx.shared.saved, unsaved, cx.p)
+        super::saved::text(&cx.shared.saved, &cx.state.document, cx.state.pair_name(), cx.p)
     };
     if !text.is_empty() {
         ui.label(RichText::new(text).size(SMALL).color(color))

@@ -5,6 +5,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use eframe::egui::Color32;
 
 use super::theme::Palette;
+use crate::app::labels::Document;
 
 /// What is known about saving.
 #[derive(Debug, Default)]
@@ -35,9 +36,15 @@ fn clock(since_epoch: Duration) -> String {
 }
 
 /// The state of a pair in words, with its color.
-pub(super) fn text(saved: &Saved, unsaved: bool, p: &Palette) -> (String, Color32) {
-    if unsaved {
+pub(super) fn text(saved: &Saved, doc: &Document, pair: &str, p: &Palette) -> (String, Color32) {
+    if doc.failed.contains_key(pair) {
+        return ("not saved".into(), p.wrong);
+    }
+    if doc.unsaved.contains(pair) {
         return ("saving…".into(), p.caution);
+    }
+    if doc.elsewhere.contains(pair) {
+        return ("saved elsewhere".into(), p.caution);
     }
     match saved.at {
         Some(at) => (format!("saved {}", clock(at)), p.good),

@@ -47,6 +47,8 @@ pub struct Remark {
 pub enum TaskErrorKind {
     /// It met something wrong in its input or surroundings.
     Failed,
+    /// The data set is not where it was opened: nothing can be written there.
+    Lost,
     /// It was told to stop.
     Cancelled,
     /// A defect in this program; caught at the edge of the lane.

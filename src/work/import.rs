@@ -58,8 +58,10 @@ pub struct Import {
     pub unmatched: Vec<Remark>,
     /// Masks that cannot be taken, and why.
     pub refused: Vec<Remark>,
-    /// Whether all were looked at: false if stopped early.
+    /// Whether all that was found was looked at and belonged somewhere.
     pub complete: bool,
+    /// Whether it was told to stop early.
+    pub stopped: bool,
     /// Where the labels lie; empty where there is no such place.
     pub labels: PathBuf,
 }
@@ -68,11 +70,6 @@ impl Import {
     /// Masks that change.
     pub fn total(&self) -> usize {
         self.new + self.replaced
-    }
-
-    /// Whether all that was found was looked at, and belonged somewhere.
-    pub fn is_whole(&self) -> bool {
-        self.complete && self.unmatched.is_empty() && self.refused.is_empty()
     }
 
     /// What changes and what does not, a line each.
@@ -99,7 +96,7 @@ impl Import {
 
     /// What was done, in words.
     pub fn text(&self) -> String {
-        let stopped = if self.complete { "" } else { "; stopped early" };
+        let stopped = if self.stopped { "; stopped early" } else { "" };
         format!("Imported from {}: {}{stopped}", self.from.display(), self.lines().join("; "))
     }
 }
@@ -129,20 +126,14 @@ fn go(dataset: &Dataset, setup: &ImportSetup, write: bool, cx: &JobCx) -> Result
         Err(err) if write => return Err(err),
         folder => folder.map(std::path::Path::to_owned).unwrap_or_default(),
     };
-    let mut found = Import {
-        from: setup.from.clone(),
-        format: listing.format,
-        complete: true,
-        labels: folder,
-        ..Import::default()
-    };
+    let mut found = Import { from: setup.from.clone(), format: listing.format, labels: folder, ..Import::default() };
     let name = |file: &std::path::Path| file.strip_prefix(&setup.from).unwrap_or(file).display().to_string();
     found.refused = listing.refused.iter().map(|err| Remark { name: name(&err.file), why: err.what.clone() }).collect();
     let pairs = matched(dataset, &listing.masks, &mut found.unmatched);
     let total = pairs.len() as u64;
     for (done, (pair, masks)) in pairs.into_iter().enumerate() {
         if cx.cancel.is_cancelled() {
-            found.complete = false;
+            found.stopped = true;
             break;
         }
         let Some(entry) = dataset.index.get(pair) else { continue };
@@ -153,9 +144,10 @@ fn go(dataset: &Dataset, setup: &ImportSetup, write: bool, cx: &JobCx) -> Result
             found.refused.push(Remark { name: entry.name.clone(), why: err.why });
         }
     }
-    if !found.complete && found.total() == 0 {
+    if found.stopped && found.total() == 0 {
         cx.check(WHAT)?;
     }
+    found.complete = !found.stopped && found.unmatched.is_empty() && found.refused.is_empty();
     Ok(found)
 }
 

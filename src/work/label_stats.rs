@@ -226,13 +226,15 @@ pub fn label_stats(
     let why = |what: &str, err: &TaskError| format!("{what}: {}", err.why);
     // Without a place for labels there are none.
     for entry in dataset.index.pairs.iter().filter(|_| labels.folder().is_ok()) {
+        stats.problems.extend(labels.journal_problem(&entry.name).map(|err| why(&entry.name, &err)));
         match labels.records(&entry.name) {
             Ok(records) if records.is_empty() => {}
             Ok(records) => {
                 stats.add(PairWork::of(&entry.name, entry.tool.as_ref(), &records));
                 journals.insert(entry.name.clone(), records);
             }
-            Err(err) => stats.problems.push(why(&entry.name, &err)),
+            // It is among the problems already.
+            Err(_) => {}
         }
     }
     match repeats(dataset, labels, reviews, &journals, (person, share)) {

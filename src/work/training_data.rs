@@ -147,7 +147,7 @@ pub fn write_shards(
         let touches = writer.touches();
         if touches == 0 {
             // The trainer cannot read a shard of nothing, and what is mended should be tried again.
-            std::fs::remove_dir_all(&folder).map_err(fail)?;
+            drop(writer);
             continue;
         }
         let left_out = &done.left_out[first_left_out..];

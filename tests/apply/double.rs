@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use touch2touch::app::command::{Command, Opened};
 use touch2touch::app::keys::{PredictionKey, ShiftMode, TouchKey};
@@ -29,11 +30,11 @@ use touch2touch::infer::bundle::Origin;
 use touch2touch::infer::bundle::SensorPair;
 use touch2touch::infer::engine::EngineChoice;
 use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
-use touch2touch::work::error::TaskError;
+use touch2touch::work::error::{TaskError, TaskErrorKind};
 use touch2touch::work::export::{ExportChoice, Plan};
 use touch2touch::work::job::JobCx;
 use touch2touch::work::label_stats::LabelStats;
-use touch2touch::work::labels::Deed;
+use touch2touch::work::labels::{Deed, Recovered, Unsaved};
 use touch2touch::work::models::Wanted;
 use touch2touch::work::prediction::Prediction;
 
@@ -53,6 +54,10 @@ pub(crate) struct Source {
     /// Pairs whose stored labels are damaged.
     pub(crate) damaged: Mutex<BTreeSet<String>>,
     pub(crate) full_disk: AtomicBool,
+    /// The data set is not where it was opened.
+    pub(crate) lost: AtomicBool,
+    /// Labels kept where they wait, or in a folder that was named.
+    pub(crate) waiting: Mutex<Vec<(Option<PathBuf>, Unsaved)>>,
     pub(crate) saves: AtomicU64,
     /// Second masks as they would lie on the disk.
     pub(crate) repeats: Mutex<BTreeMap<String, PairLabels>>,
@@ -83,6 +88,8 @@ impl Source {
             labels: Mutex::default(),
             damaged: Mutex::default(),
             full_disk: AtomicBool::new(false),
+            lost: AtomicBool::new(false),
+            waiting: Mutex::default(),
             saves: AtomicU64::new(0),
             repeats: Mutex::default(),
             due: Mutex::default(),
@@ -173,9 +180,19 @@ impl DataSource for Source {
         if self.full_disk.load(Ordering::Relaxed) {
             return Err(TaskError::new("Save the labels", "no space left"));
         }
+        if self.lost.load(Ordering::Relaxed) {
+            let err = TaskError::new("Save the labels", "the data set is gone");
+            return Err(TaskError { kind: TaskErrorKind::Lost, ..err });
+        }
         self.saves.fetch_add(1, Ordering::Relaxed);
         self.labels.lock().unwrap().insert(name.to_owned(), labels.clone());
         Ok(None)
+    }
+
+    fn keep_labels(&self, unsaved: &[Unsaved], folder: Option<&Path>) -> Result<PathBuf, TaskError> {
+        let kept = unsaved.iter().map(|one| (folder.map(Path::to_owned), one.clone()));
+        self.waiting.lock().unwrap().extend(kept);
+        Ok(folder.map_or_else(|| "waiting".into(), Path::to_owned))
     }
 
     fn load_repeat(&self, _: &str, name: &str) -> Result<PairLabels, TaskError> {
@@ -225,6 +242,8 @@ pub(crate) struct Double {
     pub(crate) looked_up: AtomicU64,
     /// The mask model sees no contact anywhere.
     pub(crate) blind: AtomicBool,
+    /// How long labels that could not be written wait, milliseconds.
+    pub(crate) retry_ms: AtomicU64,
     /// What lies on the disk.
     pub(crate) kept: Mutex<Vec<(PredictionKey, Prediction)>>,
     bundles: bool,
@@ -241,6 +260,7 @@ impl Double {
             batches: AtomicU64::new(0),
             looked_up: AtomicU64::new(0),
             blind: AtomicBool::new(false),
+            retry_ms: AtomicU64::new(3_600_000),
             kept: Mutex::default(),
             bundles,
         }
@@ -277,6 +297,7 @@ impl Services for Double {
             source,
             reviews: reviews.map(|(name, l)| (name.clone(), l.review)).collect(),
             notes: notes.map(|(name, l)| (name.clone(), l.note.clone())).collect(),
+            recovered: Recovered::default(),
         })
     }
 
@@ -337,6 +358,10 @@ impl Services for Double {
     ) -> Result<ContactMask, TaskError> {
         let blind = self.blind.load(Ordering::Relaxed);
         Ok(settled_model(imprint, imprint.map(|v| !blind && *v > 0.006)))
+    }
+
+    fn retry_after(&self) -> Duration {
+        Duration::from_millis(self.retry_ms.load(Ordering::Relaxed))
     }
 
     fn load_settings(&self) -> (Settings, Option<TaskError>) {

@@ -19,7 +19,7 @@ use super::panes;
 
 const MEASURED: ImprintSource = ImprintSource::Measured;
 
-fn bench() -> Bench {
+pub(super) fn bench() -> Bench {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Measured, Pane::Masks]));
     bench.settle();
@@ -30,7 +30,7 @@ fn begin(bench: &mut Bench, finger: PadId, at_px: [f32; 2]) {
     bench.send(LabelsCommand::BeginStroke { finger, source: MEASURED, at_px, erase: false });
 }
 
-fn stroke(bench: &mut Bench, finger: PadId, from: [f32; 2], to: [f32; 2]) {
+pub(super) fn stroke(bench: &mut Bench, finger: PadId, from: [f32; 2], to: [f32; 2]) {
     begin(bench, finger, from);
     bench.send(LabelsCommand::StrokeTo(to));
     bench.send(LabelsCommand::EndStroke);

@@ -317,3 +317,69 @@ fn masks_of_predictions_lie_beside_each_other_and_never_for_each_other() {
         assert_eq!(std::fs::read_to_string(&file).unwrap(), damage);
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn the_journal_and_the_lock_are_ordinary_files_in_their_own_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join(FOLDER);
+    std::fs::create_dir(&folder).unwrap();
+    let store = MaskStore::in_folder(folder.clone());
+    let foreign = dir.path().join("foreign");
+    std::fs::write(&foreign, "mine").unwrap();
+    let pipe = |at: &std::path::Path| assert!(Command::new("mkfifo").arg(at).status().unwrap().success());
+    for place in [store.journal_file(PAIR), folder.join(".lock")] {
+        for by_pipe in [false, true] {
+            match by_pipe {
+                false => std::os::unix::fs::symlink(&foreign, &place).unwrap(),
+                true => pipe(&place),
+            }
+            let refused = match place.ends_with(".lock") {
+                true => store.hold().map(drop),
+                false => store.append_journal(PAIR, &entry(1)),
+            };
+            let text = refused.unwrap_err().to_string();
+            assert!(text.contains("not an ordinary file") && text.contains(place.to_str().unwrap()), "{text}");
+            std::fs::remove_file(&place).unwrap();
+        }
+    }
+    assert_eq!(std::fs::read(&foreign).unwrap(), b"mine", "nothing is written through a link");
+    store.append_journal(PAIR, &entry(1)).unwrap();
+    assert!(store.hold().unwrap().is_some());
+}
+
+#[test]
+fn nothing_is_written_where_the_data_set_is_not_any_more() {
+    let dir = tempfile::tempdir().unwrap();
+    let (root, elsewhere) = (dir.path().join("set"), dir.path().join("renamed"));
+    let tool = touch2touch::domain::catalog::tools().first().unwrap();
+    let sample = touch2touch::domain::sim::simulate(tool, Default::default(), 1, &Default::default());
+    touch2touch::io::simulated::write_pair(&root, touch2touch::io::simulated::Layout::Train, &tool.name, 0, &sample)
+        .unwrap();
+    let dataset = Dataset::open(&root).unwrap();
+    let root = dataset.root.clone().unwrap();
+    let store = MaskStore::for_dataset(&dataset).unwrap();
+    let mask = stored(Mask::filled(175, 140, true));
+    store.save(PAIR, lab::RIGHT, Some(&mask)).unwrap();
+    std::fs::rename(&root, &elsewhere).unwrap();
+    // Of what was opened before, and of what is made from it now.
+    for store in [store.clone(), MaskStore::for_dataset(&dataset).unwrap()] {
+        let refused = [
+            store.save(PAIR, lab::RIGHT, Some(&mask)),
+            store.save(PAIR, lab::RIGHT, None),
+            store.save_review(PAIR, &StoredReview::default()),
+            store.append_journal(PAIR, &entry(1)),
+            store.hold().map(drop),
+            store.repeats_of("Anna").save(PAIR, lab::RIGHT, Some(&mask)),
+        ];
+        assert!(refused.iter().all(|r| matches!(r, Err(StoreError::Lost(_)))), "{refused:?}");
+        assert!(!root.exists(), "no folder is made at the old path");
+    }
+    std::fs::create_dir(&root).unwrap();
+    let text = store.save(PAIR, lab::RIGHT, Some(&mask)).unwrap_err().to_string();
+    assert!(text.contains("another folder"), "{text}");
+    assert_eq!(std::fs::read_dir(&root).unwrap().count(), 0);
+    std::fs::remove_dir(&root).unwrap();
+    std::fs::rename(&elsewhere, &root).unwrap();
+    store.save(PAIR, lab::RIGHT, Some(&mask)).unwrap();
+}

@@ -207,7 +207,7 @@ pub(super) struct Rig {
     pub(super) harness: Harness<'static, StudioApp>,
     pub(super) data: PathBuf,
     pub(super) config: PathBuf,
-    _folder: tempfile::TempDir,
+    pub(super) _folder: tempfile::TempDir,
 }
 
 impl Rig {

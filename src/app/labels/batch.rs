@@ -74,7 +74,7 @@ pub(in crate::app) fn proposed(state: &mut State, ticket: Ticket, batch: &Batch)
 /// Has the masks that were imported read again where they are looked at, and says what became of them.
 pub(in crate::app) fn imported(state: &mut State, import: &Import) {
     reread(state, &import.changed);
-    let level = if import.is_whole() { Level::Info } else { Level::Warning };
+    let level = if import.complete { Level::Info } else { Level::Warning };
     state.log.push(level, import.text(), None, None);
     if import.total() > 0 {
         state.log.place_last(import.labels.clone());

@@ -50,6 +50,12 @@ pub struct Document {
     pub(in crate::app) batch: Option<Ticket>,
     /// Pairs whose last change is not on the disk yet.
     pub unsaved: BTreeSet<String>,
+    /// Those of them whose last writing failed, and why.
+    pub failed: BTreeMap<String, TaskError>,
+    /// Pairs whose last change is in another folder than that of the data set.
+    pub elsewhere: BTreeSet<String>,
+    /// What is asked about them.
+    pub question: Option<Question>,
     /// The last request to write each of them.
     pub(in crate::app) asked: BTreeMap<String, Revision>,
     /// The stroke being drawn.
@@ -58,6 +64,15 @@ pub struct Document {
     pub changed: Option<Changed>,
     /// The last revision given out.
     pub(in crate::app) last_revision: u64,
+}
+
+/// Why a person is asked about labels that are not on the disk.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Question {
+    /// The window is to be closed.
+    Closing,
+    /// The data set is not where it was opened.
+    Lost,
 }
 
 /// The last change of a mask, so that what it did to the pose can be said.

@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use super::super::labels::state::{PairLabels, Stored};
+use super::super::tasks::state::Level;
 use super::{Computes, Job, Lane, PairKey, SharedServices, State};
 use crate::work::error::TaskError;
-use crate::work::labels::Past;
+use crate::work::labels::Told;
 
 /// The labels stored for a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -20,10 +21,8 @@ pub struct LabelsKey {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Read {
     labels: PairLabels,
-    /// What was done before, and can be taken back; the oldest first.
-    done: Vec<Past>,
-    /// What was taken back.
-    undone: Vec<Past>,
+    /// What was done before.
+    told: Told,
 }
 
 impl LabelsKey {
@@ -44,11 +43,11 @@ impl Computes for LabelsKey {
         Some(Job::new(Lane::Files, format!("Labels of {name}"), move |_| {
             if let Some(person) = repeat {
                 let labels = source.load_repeat(&person, &name)?;
-                return Ok(Read { labels, done: Vec::new(), undone: Vec::new() });
+                return Ok(Read { labels, told: Told::default() });
             }
             let labels = source.load_labels(&name)?;
-            let [done, undone] = source.past(&name, &labels).into();
-            Ok(Read { labels, done, undone })
+            let told = source.past(&name, &labels);
+            Ok(Read { labels, told })
         }))
     }
 
@@ -71,7 +70,11 @@ impl Computes for LabelsKey {
         doc.labels.insert(name.clone(), labels);
         doc.set_review(&name, review);
         doc.set_note(&name, note);
-        state.history.restore(&name, &read.done, &read.undone);
+        state.history.restore(&name, &read.told.done, &read.told.undone);
+        if let Some(problem) = &read.told.problem {
+            let (why, hint) = (problem.why.clone(), problem.hint.clone());
+            state.log.push(Level::Warning, problem.what.clone(), Some(why), hint);
+        }
     }
 
     fn failed(&self, state: &mut State, err: &TaskError) -> bool {

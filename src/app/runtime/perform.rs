@@ -4,12 +4,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::super::answers::Answer;
-use super::super::effect::{Effect, LabelsToSave};
+use super::super::effect::{Effect, LabelsToSave, NotSaved};
 use super::super::jobs::{Body, Lane};
 use super::super::labels::state::Merged;
 use super::super::results::Preview;
 use super::super::results::prediction::generate;
 use super::super::results::preview::{Onlooker, PreviewSink};
+use super::super::services::DataSource;
 use super::super::tasks::state::Ticket;
 use super::super::view::state::UiRequest;
 use super::lanes::{Event, Job};
@@ -111,23 +112,16 @@ impl Runtime {
                     (self.wake)();
                 }
             }
-            Effect::SaveLabels(source, save) => {
-                let id = JobId::SaveLabels(save.seq, save.name.clone());
+            Effect::SaveLabels(source, save) => self.save_labels(source, *save),
+            Effect::KeepLabels { source, unsaved, folder, revisions } => {
+                self.kept += 1;
                 self.unwatched(
                     Lane::Files,
-                    id,
-                    "Save the labels",
+                    JobId::KeepLabels(self.kept),
+                    "Keep the labels elsewhere",
                     Box::new(move |_| {
-                        let now = match &save.repeat {
-                            None => source.save_labels(&save.name, &save.labels, &save.deed)?,
-                            Some(person) => {
-                                source.save_repeat(person, &save.name, &save.labels, &save.deed)?;
-                                None
-                            }
-                        };
-                        let LabelsToSave { name, revision, labels: given, .. } = *save;
-                        let merged = now.map(|now| Box::new(Merged { given, now }));
-                        Ok(Answer::LabelsSaved(name, revision, merged))
+                        let folder = source.keep_labels(&unsaved, folder.as_deref())?;
+                        Ok(Answer::LabelsKept(revisions, folder))
                     }),
                 );
             }
@@ -277,6 +271,26 @@ impl Runtime {
                 self.task(Lane::Compute, ticket, "Export masks".into(), body);
             }
         }
+    }
+
+    fn save_labels(&self, source: Arc<dyn DataSource>, save: LabelsToSave) {
+        let not = NotSaved { source: source.clone(), save: save.clone(), err: TaskError::new("", "") };
+        let body: Body<Answer> = Box::new(move |_| {
+            let now = match &save.repeat {
+                None => source.save_labels(&save.name, &save.labels, &save.deed)?,
+                Some(person) => {
+                    source.save_repeat(person, &save.name, &save.labels, &save.deed)?;
+                    None
+                }
+            };
+            let LabelsToSave { name, revision, labels: given, .. } = save;
+            let merged = now.map(|now| Box::new(Merged { given, now }));
+            Ok(Answer::LabelsSaved(name, revision, merged))
+        });
+        let id = JobId::SaveLabels(not.save.seq, not.save.name.clone());
+        let failed = Box::new(move |err| Answer::LabelsFailed(Box::new(NotSaved { err, ..not })));
+        let what = "Save the labels".to_owned();
+        self.lanes.submit(Lane::Files, Job { id, what, cx: JobCx::unwatched(), body, failed });
     }
 
     /// Queues a job that a person started.

@@ -27,6 +27,7 @@ use crate::infer::engine::EngineChoice;
 use crate::infer::store::{self, Store};
 use crate::io::case_file;
 use crate::io::dataset::Dataset;
+use crate::io::masks::FOLDER;
 use crate::io::statistics::ShiftStatistics;
 use crate::io::{atomic, files, folders, names};
 use crate::work::adapt::{self, AdaptSetup, Adapted};
@@ -37,7 +38,7 @@ use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
 use crate::work::job::JobCx;
 use crate::work::label_stats::{LabelStats, label_stats};
-use crate::work::labels::{Deed, Labels, Past, Reviews};
+use crate::work::labels::{Deed, Labels, Recovered, Reviews, Told, Unsaved, recover};
 use crate::work::models::{KeptPrediction, Models, Wanted};
 use crate::work::new_bundle::models_folder;
 use crate::work::prediction::Prediction;
@@ -62,6 +63,8 @@ pub struct LiveServices {
     models_folder: Option<PathBuf>,
     /// Where tuning that was stopped is kept.
     unfinished: Option<PathBuf>,
+    /// Where labels wait that could not be saved.
+    waiting: Option<PathBuf>,
     models: Models,
 }
 
@@ -70,16 +73,18 @@ impl LiveServices {
     pub fn new() -> Self {
         let store = store::user_folder().map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
         let (models_folder, unfinished) = (models_folder(), unfinished_folder());
-        Self { config_folder: folders::config(), models_folder, unfinished, models: Models::new(store) }
+        let waiting = folders::data().map(|folder| folder.join("recovered"));
+        Self { config_folder: folders::config(), models_folder, unfinished, waiting, models: Models::new(store) }
     }
 
-    /// With settings, kept predictions and fitted models in a given folder; `None` keeps none.
+    /// With settings, kept predictions, fitted models and labels that wait in a given folder; `None` keeps none.
     pub fn with_config_folder(folder: Option<PathBuf>) -> Self {
         let kept = folder.as_ref().map(|folder| folder.join("predictions"));
         let store = kept.map(|folder| Store::new(folder, store::DEFAULT_BUDGET));
         let models_folder = folder.as_ref().map(|folder| folder.join("models"));
         let unfinished = folder.as_ref().map(|folder| folder.join("unfinished"));
-        Self { config_folder: folder, models_folder, unfinished, models: Models::new(store) }
+        let waiting = folder.as_ref().map(|folder| folder.join("recovered"));
+        Self { config_folder: folder, models_folder, unfinished, waiting, models: Models::new(store) }
     }
 }
 
@@ -88,6 +93,11 @@ impl LiveServices {
 /// # Errors
 /// If nothing in it can be opened.
 pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
+    open_recovering(place, None)
+}
+
+/// [`open_source`], with what waits in a folder of labels that could not be saved before.
+fn open_recovering(place: &Place, waiting: Option<&Path>) -> Result<LiveSource, TaskError> {
     let mut case = None;
     let dataset = match place {
         Place::Demo => Dataset::demo(),
@@ -103,9 +113,11 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
     };
     let mut problems = dataset.problems.clone();
     let labels = Labels::of(&dataset);
+    let recovered = waiting.map(|waiting| recover(&dataset, &labels, waiting)).unwrap_or_default();
     let mut reviews = labels.reviews();
     problems.append(&mut reviews.problems);
-    Ok(LiveSource { dataset: Arc::new(dataset), labels, problems, reviews, repeats: Arc::default(), case })
+    let (dataset, repeats, waiting) = (Arc::new(dataset), Arc::default(), waiting.map(Path::to_owned));
+    Ok(LiveSource { dataset, labels, problems, reviews, repeats, case, waiting, recovered })
 }
 
 /// An open data set with its store of labels.
@@ -117,7 +129,14 @@ pub struct LiveSource {
     reviews: Reviews,
     /// Second masks, by person.
     repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
+<<<<<<< HEAD
     case: Option<(PairId, Case, Held)>,
+=======
+    case: Option<(PairId, Case)>,
+    /// Where labels wait that could not be saved.
+    waiting: Option<PathBuf>,
+    recovered: Recovered,
+>>>>>>> doors
 }
 
 impl LiveSource {
@@ -185,12 +204,26 @@ impl DataSource for LiveSource {
         self.labels.load(name)
     }
 
-    fn past(&self, name: &str, labels: &PairLabels) -> (Vec<Past>, Vec<Past>) {
+    fn past(&self, name: &str, labels: &PairLabels) -> Told {
         self.labels.past(name, labels)
     }
 
     fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError> {
         self.labels.save(name, labels, deed)
+    }
+
+    fn keep_labels(&self, unsaved: &[Unsaved], folder: Option<&Path>) -> Result<PathBuf, TaskError> {
+        match (folder, &self.waiting) {
+            (Some(folder), _) => {
+                let folder = folder.join(FOLDER);
+                self.labels.keep_in(&self.dataset, unsaved, &folder)?;
+                Ok(folder)
+            }
+            (None, Some(waiting)) => self.labels.keep_waiting(&self.dataset, unsaved, waiting),
+            (None, None) => {
+                Err(TaskError::new("Keep the labels", "this system names no folder for what could not be saved"))
+            }
+        }
     }
 
     fn load_repeat(&self, person: &str, name: &str) -> Result<PairLabels, TaskError> {
@@ -226,9 +259,10 @@ impl DataSource for LiveSource {
 
 impl Services for LiveServices {
     fn open(&self, place: &Place) -> Result<Opened, TaskError> {
-        let source = open_source(place)?;
+        let source = open_recovering(place, self.waiting.as_deref())?;
         let Reviews { states: reviews, notes, .. } = source.reviews.clone();
-        Ok(Opened { source: Arc::new(source), reviews, notes })
+        let recovered = source.recovered.clone();
+        Ok(Opened { source: Arc::new(source), reviews, notes, recovered })
     }
 
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>) {

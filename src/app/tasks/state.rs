@@ -147,7 +147,9 @@ impl Log {
     pub fn error(&mut self, err: &TaskError) {
         let (level, text, detail) = match err.kind {
             TaskErrorKind::Cancelled => (Level::Info, format!("{}: cancelled", err.what), None),
-            TaskErrorKind::Failed | TaskErrorKind::Panicked => (Level::Error, err.what.clone(), Some(err.why.clone())),
+            TaskErrorKind::Failed | TaskErrorKind::Lost | TaskErrorKind::Panicked => {
+                (Level::Error, err.what.clone(), Some(err.why.clone()))
+            }
         };
         self.push(level, text, detail, err.hint.clone());
     }

@@ -74,6 +74,10 @@ pub enum UiRequest {
     PickOutput(Output),
     /// Ask for the folder of masks that are imported; answer with `ExportCommand::AskImport`.
     PickMasks,
+    /// Ask for the folder to write labels to that could not be saved; answer with `UnsavedCommand::Elsewhere`.
+    PickLabelsFolder,
+    /// Close the window.
+    Close,
     /// Turn the 3D cameras.
     Camera(CameraPreset),
     /// Write the camera of the 3D view under the pointer to the clipboard.

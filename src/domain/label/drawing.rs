@@ -81,6 +81,35 @@ impl Drawing {
         Self { tool, points, paint, sight: None }
     }
 
+    /// Whether it can touch anything.
+    ///
+    /// # Errors
+    /// In words: too few points, or numbers that are none or of no size.
+    pub fn check(&self) -> Result<(), String> {
+        let (name, needed) = match self.tool {
+            DrawTool::Brush { radius_px } if !(radius_px > 0.0 && radius_px.is_finite()) => {
+                return Err(format!("a brush of radius {radius_px} px paints nothing: radius_px is more than 0"));
+            }
+            DrawTool::Wand { tolerance_m } if !(tolerance_m >= 0.0 && tolerance_m.is_finite()) => {
+                return Err(format!("a wand of tolerance {tolerance_m} m takes nothing: tolerance_m is 0 or more"));
+            }
+            DrawTool::Brush { .. } => ("brush", 1),
+            DrawTool::Wand { .. } => ("wand", 1),
+            DrawTool::Rectangle => ("rectangle", 2),
+            DrawTool::Lasso => ("lasso", 3),
+            DrawTool::Polygon => ("polygon", 3),
+        };
+        let points = self.points.len();
+        if points < needed {
+            let s = if needed == 1 { "" } else { "s" };
+            return Err(format!("a {name} needs at least {needed} point{s} and has {points}"));
+        }
+        if self.points.iter().flatten().any(|v| !v.is_finite()) {
+            return Err(format!("a point of the {name} is no finite number"));
+        }
+        Ok(())
+    }
+
     /// Whether it is made of clicks, and not of one drag.
     pub fn is_by_clicks(&self) -> bool {
         self.tool == DrawTool::Polygon
@@ -241,6 +270,26 @@ mod tests {
         assert_eq!(drawn(DrawTool::Rectangle, &[[f32::NAN, 1.0]], true, &mut mask), None);
         let all = drawn(DrawTool::Rectangle, &[[-9e9, -9e9], [9e9, 9e9]], false, &mut mask);
         assert_eq!((all.map(|r| r.width), count(&mask)), (Some(40), 0));
+    }
+
+    #[test]
+    fn a_drawing_that_can_touch_nothing_says_why() {
+        let brush = |radius_px| DrawTool::Brush { radius_px };
+        for (tool, points, said) in [
+            (brush(-1.0), vec![[1.0, 1.0]], "radius -1 px"),
+            (brush(f32::NAN), vec![[1.0, 1.0]], "radius NaN"),
+            (brush(2.0), vec![], "at least 1 point and has 0"),
+            (DrawTool::Polygon, vec![], "at least 3 points and has 0"),
+            (DrawTool::Lasso, vec![[1.0, 1.0]; 2], "at least 3 points"),
+            (DrawTool::Rectangle, vec![[1.0, 1.0]], "at least 2 points"),
+            (DrawTool::Rectangle, vec![[1.0, f32::INFINITY]; 2], "no finite number"),
+            (DrawTool::Wand { tolerance_m: -1e-3 }, vec![[1.0, 1.0]], "tolerance -0.001 m"),
+        ] {
+            let why = Drawing { tool, points, paint: Paint::Contact, sight: None }.check().unwrap_err();
+            assert!(why.contains(said), "{why}");
+        }
+        let one = Drawing::begin(DrawTool::Wand { tolerance_m: 0.0 }, [1.0, 1.0], Paint::Contact);
+        assert_eq!(one.check(), Ok(()));
     }
 
     #[test]

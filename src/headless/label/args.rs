@@ -1,5 +1,7 @@
 //! What `label` is asked.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use strum::IntoEnumIterator as _;
 
@@ -32,7 +34,8 @@ fn parse_clean_up(text: &str) -> Result<CleanUp, String> {
 }
 
 fn parse_drawing(text: &str) -> Result<Drawing, String> {
-    serde_json::from_str(text).map_err(|err| err.to_string())
+    let drawing: Drawing = serde_json::from_str(text).map_err(|err| err.to_string())?;
+    drawing.check().map(|()| drawing)
 }
 
 /// Arguments of `label`.
@@ -88,6 +91,10 @@ pub(in super::super) struct LabelArgs {
     /// Remove the corrected mask: the automatic source is in force again.
     #[arg(long, requires = "pair")]
     pub(super) remove_mask: bool,
+    /// Take in labels that the studio saved to this folder because it could not write them beside the data. Masks that changed
+    /// meanwhile are merged by pixel.
+    #[arg(long, value_name = "FOLDER", conflicts_with = "pair")]
+    pub(super) take_in: Option<PathBuf>,
     /// Who labels; else whom the system says.
     #[arg(long, requires = "pair")]
     pub(super) person: Option<String>,

@@ -61,5 +61,5 @@ pub(super) fn run(args: &ImportArgs) -> VerbResult {
             found.text()
         }
     })?;
-    Ok(found.is_whole())
+    Ok(found.complete)
 }

@@ -109,12 +109,19 @@ impl TypedValueParser for EnginesParser {
     }
 }
 
+/// Largest angle and shift of a pose that is named: whole turns and a meter say a unit is wrong.
+const MAX_DEG: f64 = 360.0;
+const MAX_MM: f64 = 1000.0;
+
 pub(in crate::headless) fn parse_start(text: &str) -> Result<PlanarPose, String> {
     let numbers: Vec<f64> =
         text.split(',').filter_map(|n| n.trim().parse().ok()).filter(|n: &f64| n.is_finite()).collect();
     let (&[degrees, y_mm, z_mm], 3) = (numbers.as_slice(), text.split(',').count()) else {
         return Err("three numbers are needed: degrees, millimeters along y, millimeters along z".to_owned());
     };
+    if degrees.abs() > MAX_DEG || y_mm.abs() > MAX_MM || z_mm.abs() > MAX_MM {
+        return Err(format!("no hand holds a tool so: at most {MAX_DEG} degrees and {MAX_MM} mm either way"));
+    }
     Ok(PlanarPose { theta_rad: degrees.to_radians(), y_m: y_mm * 1e-3, z_m: z_mm * 1e-3 })
 }
 

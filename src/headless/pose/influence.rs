@@ -10,6 +10,7 @@ use crate::io::names;
 use crate::io::npz;
 use crate::io::pt::Tensor;
 use crate::work::cloud::Clouds;
+use crate::work::error::TaskError;
 use crate::work::influence::{Place, influence};
 use crate::work::labels::ImprintSource;
 use crate::work::pose::PoseResult;
@@ -40,14 +41,18 @@ impl NamedPlace {
     }
 }
 
-/// Finds and writes the influence as `STEM_IMPRINT_ENGINE_influence.npz`, one array a finger.
+/// Finds and writes the influence as `STEM_IMPRINT_ENGINE_influence.npz`, one array a finger; why there is none where this
+/// pose has none. That it cannot be written is an error.
 pub(super) fn write(
     stem: &Path,
     (clouds, sample, tool): (&Clouds, &Sample, &ToolModel),
     (imprint, engine): (ImprintSource, RegistrationChoice),
     found: &PoseResult,
-) -> anyhow::Result<Influences> {
-    let found = influence(clouds, sample, tool, engine, found.grasp_from_object)?;
+) -> anyhow::Result<Result<Influences, TaskError>> {
+    let found = match influence(clouds, sample, tool, engine, found.grasp_from_object) {
+        Ok(found) => found,
+        Err(why) => return Ok(Err(why)),
+    };
     let engine = engine.to_string().replace([':', '='], "_");
     let file = names::with_ending(stem, &format!("_{}_{engine}_influence.npz", imprint.key()));
     let name = |pad| sample.rig.pad_key(pad).to_string();
@@ -61,5 +66,5 @@ pub(super) fn write(
         .collect();
     npz::write(&file, &arrays.iter().map(|(name, values)| (name.as_str(), values.clone())).collect::<Vec<_>>())?;
     let places = found.places.into_iter().map(|place| NamedPlace { finger: name(place.finger), place }).collect();
-    Ok(Influences { file, places })
+    Ok(Ok(Influences { file, places }))
 }

@@ -71,7 +71,8 @@ fn bases(path: &Path) -> Vec<PathBuf> {
 /// The files of a folder with an ending, by name.
 fn with_ending(folder: &Path, ending: &str) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
-    let is_meant = |path: &PathBuf| path.is_file() && path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    // What is no ordinary file is refused when it is read, and not passed over.
+    let is_meant = |path: &PathBuf| !path.is_dir() && path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
     let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).filter(is_meant).collect();
     files.sort();
     files
@@ -106,7 +107,7 @@ fn files_of(path: &Path, format: Format) -> Vec<PathBuf> {
 /// The mask of a file; `None` for one that holds something else.
 fn listed(file: &Path, format: Format) -> Option<Listed> {
     let name = file.file_name()?.to_string_lossy().into_owned();
-    let beside = |path: PathBuf| path.is_file().then_some(path);
+    let beside = |path: PathBuf| std::fs::symlink_metadata(&path).is_ok_and(|found| !found.is_dir()).then_some(path);
     let (stem, stored) = match format {
         Format::Npy => {
             if name.ends_with(IGNORE_NPY) || name.ends_with(IMPRINT_NPY) {

@@ -7,6 +7,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use super::{PtError, Tensor, Values};
+use crate::io::archive;
 
 /// A value of the dict to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,15 +47,14 @@ pub fn write_dict(path: &Path, items: &[(&str, PtItem)]) -> Result<(), PtError> 
             }
         }
     }
-    crate::io::atomic::write(path, |file| archive(std::io::BufWriter::new(file), items)).map_err(|source| PtError::Io {
+    archive::write(path, |zip| fill(zip, items)).map_err(|source| PtError::Io {
         file: path.to_owned(),
         what: "cannot write the file",
         source,
     })
 }
 
-fn archive<W: Write + Seek>(out: W, items: &[(&str, PtItem)]) -> std::io::Result<()> {
-    let mut zip = ZipWriter::new(out);
+fn fill<W: Write + Seek>(zip: &mut ZipWriter<W>, items: &[(&str, PtItem)]) -> std::io::Result<()> {
     let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).with_alignment(ALIGNMENT);
     zip.start_file("archive/data.pkl", options)?;
     zip.write_all(&pickle(items))?;
@@ -65,8 +65,7 @@ fn archive<W: Write + Seek>(out: W, items: &[(&str, PtItem)]) -> std::io::Result
         zip.write_all(&bytes_of(&tensor.values).0)?;
     }
     zip.start_file("archive/version", options)?;
-    zip.write_all(b"3\n")?;
-    zip.finish()?.flush()
+    zip.write_all(b"3\n")
 }
 
 fn tensors<'a>(items: &'a [(&str, PtItem)]) -> impl Iterator<Item = &'a Tensor> {

@@ -10,6 +10,7 @@ use super::{HandMask, ImprintOf, MaskPlace, PairLabels, Review, Revision};
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::PackedMask;
 use crate::domain::rig::Rig;
+use crate::work::error::TaskError;
 
 /// What kind of act changed the labels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -127,6 +128,17 @@ pub struct Past {
     pub change: Change,
 }
 
+/// What the journal of a pair tells of what was done before.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Told {
+    /// What can be taken back, the oldest first.
+    pub done: Vec<Past>,
+    /// What was taken back and can be done again, the oldest first.
+    pub undone: Vec<Past>,
+    /// What of the journal cannot be read.
+    pub problem: Option<TaskError>,
+}
+
 /// A mask that changed.
 #[derive(Serialize, Deserialize)]
 struct MaskLine {
@@ -176,8 +188,13 @@ impl Line {
         }
     }
 
+    /// Who did it.
+    pub(super) fn person(&self) -> Option<String> {
+        Some(self.person.clone()).filter(|person| !person.is_empty())
+    }
+
     /// What it says; `None` if a mask in it cannot be understood.
-    fn read(self, rig: &Rig) -> Option<(Act, Past)> {
+    pub(super) fn read(self, rig: &Rig) -> Option<(Act, Past)> {
         let mut masks = BTreeMap::new();
         for line in self.masks {
             let pad = rig.pads().find(|pad| rig.pad_key(*pad) == line.finger)?;

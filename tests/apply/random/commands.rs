@@ -13,9 +13,10 @@ use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
     AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
     InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
-    TrainCommand, UiRequest, ViewCommand, WorkbenchCommand,
+    TrainCommand, UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
 use touch2touch::app::dial::DialPairs;
+use touch2touch::app::effect::{LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::ScoreChoice;
 use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::inspect::BasinColor;
@@ -23,7 +24,7 @@ use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode,
     TouchKey,
 };
-use touch2touch::app::labels::{Review, StrokeIn3d};
+use touch2touch::app::labels::{PairLabels, Review, StrokeIn3d};
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::results::ambiguity::AmbiguityKey;
 use touch2touch::app::results::{Computed, Preview};
@@ -55,6 +56,7 @@ use touch2touch::work::export::{ExportChoice, Which};
 use touch2touch::work::figure::FigurePane;
 use touch2touch::work::import::Import;
 use touch2touch::work::job::{PreviewPicture, Progress};
+use touch2touch::work::labels::Deed;
 use touch2touch::work::propose::Batch;
 use touch2touch::work::queue::QueueBy;
 use touch2touch::work::subject::Subject;
@@ -156,6 +158,24 @@ fn shift() -> impl Strategy<Value = ShiftMode> {
 
 fn error() -> impl Strategy<Value = TaskError> {
     select(vec![TaskError::new("Something", "it did not work"), TaskError::cancelled("Something")])
+}
+
+fn unsaved() -> impl Strategy<Value = UnsavedCommand> {
+    select(vec![
+        UnsavedCommand::Close,
+        UnsavedCommand::Stay,
+        UnsavedCommand::Discard,
+        UnsavedCommand::Retry,
+        UnsavedCommand::AskFolder,
+        UnsavedCommand::Elsewhere("elsewhere".into()),
+    ])
+}
+
+fn not_saved(seq: DatasetSeq) -> Box<NotSaved> {
+    let (name, labels, deed) = ("tool_a/data_0".to_owned(), PairLabels::default(), Deed::default());
+    let save = LabelsToSave { seq, name, revision: Revision(1), labels, deed, repeat: None };
+    let err = TaskError::new("Save the labels", "no space left");
+    Box::new(NotSaved { source: Double::new(false, true).source, save, err })
 }
 
 fn ticket() -> impl Strategy<Value = Ticket> {
@@ -379,6 +399,7 @@ draws! {
         1 SetNote(select(vec!["tool_a/data_0".to_owned(), "no such pair".into()]), select(vec![String::new(), " odd\n edge ".into(), "x".repeat(3000)])),
         1 AcceptPose(source(), any::<bool>()),
         1 Save,
+        3 Unsaved(unsaved()),
     }
     inspect: InspectCommand {
         1 Source(source()),
@@ -534,6 +555,8 @@ draws! {
         1 TaskFailed(ticket(), error()),
         1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Request::Sample(t.pair)), error()),
         1 LabelsSaved(Just("tool_a/data_0".to_owned()), Just(Revision(u64::MAX)), Just(None)),
+        1 LabelsFailed(select(vec![DatasetSeq(1), NEVER]).prop_map(not_saved)),
+        1 LabelsKept(select(vec![Vec::new(), vec![("tool_a/data_0".to_owned(), Revision(1))]]), Just(PathBuf::from("elsewhere"))),
         1 SettingsSaved,
         1 JobFailed(error()),
         1 Evaluated(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(evaluation()))),

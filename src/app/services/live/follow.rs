@@ -1,6 +1,7 @@
 //! Following a folder: the same follower as `touch2touch watch`.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
@@ -9,13 +10,14 @@ use super::LiveSource;
 use crate::domain::dataset::Problem;
 use crate::io::follow::{Arrival, Follower};
 use crate::work::error::TaskError;
-use crate::work::labels::{Labels, Reviews};
+use crate::work::labels::{Labels, Recovered, Reviews};
 
 struct LiveFollowing {
     follower: Follower,
     reviews: Reviews,
     labels: Labels,
     repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
+    waiting: Option<PathBuf>,
     /// Troubles of the folder that were said.
     said: Vec<Problem>,
 }
@@ -24,7 +26,8 @@ struct LiveFollowing {
 pub(super) fn start(source: &LiveSource) -> Option<Box<dyn Following>> {
     let follower = Follower::continuing(source.dataset.clone())?;
     let (reviews, labels, repeats) = (source.reviews.clone(), source.labels.clone(), source.repeats.clone());
-    Some(Box::new(LiveFollowing { follower, reviews, labels, repeats, said: Vec::new() }))
+    let waiting = source.waiting.clone();
+    Some(Box::new(LiveFollowing { follower, reviews, labels, repeats, waiting, said: Vec::new() }))
 }
 
 impl Following for LiveFollowing {
@@ -52,6 +55,8 @@ impl Following for LiveFollowing {
             reviews: self.reviews.clone(),
             repeats: self.repeats.clone(),
             case: None,
+            waiting: self.waiting.clone(),
+            recovered: Recovered::default(),
             dataset,
         });
         Some(Followed { source, pair: ready.id, completed: ready.completed, sample })

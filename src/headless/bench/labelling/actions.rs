@@ -119,7 +119,9 @@ impl Move {
     fn on(&self, hand: &mut HandMask, imprint: &DepthMap, rig: &Rig) {
         for does in &self.does {
             match does {
-                Does::Draw(drawing) => hand.draw(drawing, Ground::new(imprint), Provenance::hand("script")),
+                Does::Draw(drawing) => {
+                    hand.draw(drawing, Ground::new(imprint), Provenance::hand("script"));
+                }
                 Does::Clean(clean_up) => {
                     hand.clean(*clean_up, rig);
                 }

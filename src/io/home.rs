@@ -1,0 +1,78 @@
+//! [`Home`]: the folder of a data set as it was opened.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::files::Identity;
+
+/// A folder that is remembered by what it is and not by its path alone: while a data set is open its folder may be renamed,
+/// deleted or replaced, and what is written to the old path would be of nothing.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Home {
+    root: PathBuf,
+    identity: Identity,
+}
+
+/// A data set is not where it was opened.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the data set is not where it was opened: {} {how}", root.display())]
+pub struct Away {
+    /// Its folder.
+    pub root: PathBuf,
+    how: String,
+}
+
+impl Home {
+    /// The folder that lies at a path now; `None` where there is none.
+    pub fn at(root: &Path) -> Option<Self> {
+        let found = std::fs::metadata(root).ok().filter(std::fs::Metadata::is_dir)?;
+        Some(Self { root: root.to_owned(), identity: Identity::of(&found) })
+    }
+
+    /// Its path.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// What it is, in a few letters.
+    pub fn identity(&self) -> String {
+        self.identity.text()
+    }
+
+    /// Whether it is still there.
+    ///
+    /// # Errors
+    /// [`Away`], also where the system does not say.
+    pub fn check(&self) -> Result<(), Away> {
+        let away = |how: String| Err(Away { root: self.root.clone(), how });
+        match std::fs::metadata(&self.root) {
+            Ok(found) if Identity::of(&found) == self.identity => Ok(()),
+            Ok(_) => away("is another folder now".into()),
+            Err(err) if err.kind() == io::ErrorKind::NotFound => away("is gone".into()),
+            Err(err) => away(format!("cannot be looked at ({err})")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_the_same_only_where_it_was_and_as_it_was() {
+        let dir = tempfile::tempdir().unwrap();
+        let (root, elsewhere) = (dir.path().join("data"), dir.path().join("renamed"));
+        assert_eq!(Home::at(&root), None);
+        std::fs::create_dir(&root).unwrap();
+        let home = Home::at(&root).unwrap();
+        std::fs::write(root.join("new"), "1").unwrap();
+        assert_eq!(home.check(), Ok(()), "what lies in it may change");
+        std::fs::rename(&root, &elsewhere).unwrap();
+        assert!(home.check().unwrap_err().to_string().ends_with("data is gone"));
+        std::fs::create_dir(&root).unwrap();
+        assert!(home.check().unwrap_err().to_string().ends_with("data is another folder now"));
+        std::fs::remove_dir(&root).unwrap();
+        std::fs::rename(&elsewhere, &root).unwrap();
+        assert_eq!(home.check(), Ok(()), "it came back");
+    }
+}

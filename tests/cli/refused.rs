@@ -1,0 +1,110 @@
+//! What cannot be done is an error that says what: full disks, files that are none, arguments that do nothing.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use super::{error_text, json, run};
+
+/// A small simulated data set.
+fn simulate(out: &Path) {
+    let args = ["simulate", "--out", out.to_str().unwrap(), "--tools", "pattern_36", "--grasps", "2", "--seed", "7"];
+    let made = run(&args, out.parent().unwrap());
+    assert!(made.status.success(), "{}", error_text(&made));
+}
+
+/// Runs the program where no file may grow beyond some KiB, which is how a full disk looks to it.
+#[cfg(unix)]
+fn cramped(kib: u32, args: &[&str], folder: &Path) -> Output {
+    let script = format!("trap '' XFSZ; ulimit -f {kib}; exec \"$0\" \"$@\"");
+    Command::new("bash")
+        .args(["-c", &script, env!("CARGO_BIN_EXE_touch2touch")])
+        .args(args)
+        .current_dir(folder)
+        .env("TOUCH2TOUCH_CACHE", folder.join("cache"))
+        .output()
+        .unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_ends_in_an_error_and_leaves_no_halves() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let set = at("set");
+    simulate(&set);
+    let set = set.to_str().unwrap();
+    let (influence, shards, case) = (at("influence"), at("shards"), at("a.t2tcase"));
+    // Of many pairs each is an error of its own.
+    for (code, args, left) in [
+        (1, vec!["pose", set, "--limit", "1", "--influence", influence.to_str().unwrap()], &influence),
+        (2, vec!["training-data", set, "--out", shards.to_str().unwrap()], &shards),
+        (2, vec!["case", "make", set, "--pair", "data_0", "--measured-only", "--out", case.to_str().unwrap()], &case),
+    ] {
+        let full = cramped(4, &args, dir.path());
+        let text = error_text(&full);
+        assert_eq!(full.status.code(), Some(code), "{args:?}: {text}");
+        assert!(!text.contains("ZipWriter") && text.contains("File too large"), "{args:?}: {text}");
+        let halves = std::fs::read_dir(left).map_or(0, |list| list.count());
+        assert_eq!((halves, left.is_file()), (0, false), "{args:?}");
+    }
+}
+
+#[test]
+fn arguments_of_label_that_do_nothing_are_errors() {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    simulate(&set);
+    let label = |args: &[&str]| {
+        let all = [&["label", set.to_str().unwrap(), "--pair", "data_0"], args].concat();
+        run(&all, dir.path())
+    };
+    let outside = r#"{"tool": "wand", "tolerance_m": 0.001, "points": [[-500, 3]]}"#;
+    let brush = r#"{"tool": "brush", "radius_px": -1, "points": [[50, 50]]}"#;
+    let far = r#"{"tool": "brush", "radius_px": 3, "points": [[5000, 50]]}"#;
+    let polygon = r#"{"tool": "polygon", "points": []}"#;
+    for (args, said) in [
+        (vec!["--accept", "measured", "--pose", "1e300,0,0"], "at most 360 degrees"),
+        (vec!["--accept", "measured", "--pose", "0,5000,0"], "1000 mm"),
+        (vec!["--pose", "10,0,0"], "--pose alone changes nothing"),
+        (vec!["--draw", brush], "radius -1 px"),
+        (vec!["--draw", polygon], "at least 3 points and has 0"),
+        (vec!["--draw", outside], "touches no pixel"),
+        (vec!["--draw", far], "touches no pixel"),
+    ] {
+        let refused = label(&args);
+        let text = error_text(&refused);
+        assert_eq!(refused.status.code(), Some(2), "{args:?}: {text}");
+        assert!(text.contains(said), "{args:?}: {text}");
+    }
+    assert!(!set.join("touch2touch_masks").exists(), "nothing was stored");
+    let drawn = label(&["--draw", r#"{"tool": "brush", "radius_px": 3, "points": [[50, 50]]}"#, "--json"]);
+    assert!(drawn.status.success(), "{}", error_text(&drawn));
+}
+
+#[cfg(unix)]
+#[test]
+fn what_is_no_file_among_labels_and_masks_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    simulate(&set);
+    let set = set.to_str().unwrap();
+    let pipe = |at: &Path| assert!(Command::new("mkfifo").arg(at).status().unwrap().success());
+    let done = run(&["label", set, "--pair", "data_0", "--adopt", "--review", "done"], dir.path());
+    assert!(done.status.success(), "{}", error_text(&done));
+    // A lock that would never be given: it ends, and nothing is stored.
+    let masks = Path::new(set).join("touch2touch_masks");
+    std::fs::remove_file(masks.join(".lock")).unwrap();
+    pipe(&masks.join(".lock"));
+    let stuck = run(&["label", set, "--pair", "data_0", "--note", "odd"], dir.path());
+    assert!(stuck.status.code() == Some(2) && error_text(&stuck).contains("not an ordinary file"), "{stuck:?}");
+    std::fs::remove_file(masks.join(".lock")).unwrap();
+
+    let out = dir.path().join("masks");
+    let export = run(&["masks", "export", set, "--out", out.to_str().unwrap(), "--format", "png"], dir.path());
+    assert!(export.status.success(), "{}", error_text(&export));
+    pipe(&out.join("train/odd_right.png"));
+    let found = run(&["masks", "import", set, "--from", out.to_str().unwrap(), "--json"], dir.path());
+    let report = json(&found);
+    assert_eq!((report["complete"].as_bool(), found.status.code()), (Some(false), Some(1)), "{report}");
+    assert!(error_text(&found).contains("odd_right"), "{}", error_text(&found));
+}

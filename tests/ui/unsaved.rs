@@ -1,0 +1,137 @@
+//! Closing the window over labels that are not on the disk.
+
+use std::time::Duration;
+
+use eframe::egui::{Event, Key, ViewportCommand, ViewportEvent, ViewportId};
+use egui_kittest::kittest::Queryable as _;
+use touch2touch::app::command::SettingsCommand;
+use touch2touch::app::labels::{Question, Review};
+use touch2touch::app::settings::Workspace;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::masks::FOLDER;
+use touch2touch::work::labels::{Labels, recover};
+
+use super::rig::Rig;
+
+const SIZE: [f32; 2] = [1280.0, 800.0];
+const REVIEW: &str = "Review: flagged";
+
+impl Rig {
+    /// Asks the window to close as the system does, and goes on; what the studio answered the system.
+    fn ask_to_close(&mut self) -> Vec<ViewportCommand> {
+        let root = self.harness.input_mut().viewports.entry(ViewportId::ROOT).or_default();
+        root.events.push(ViewportEvent::Close);
+        let mut answers = self.step_answering();
+        self.harness.input_mut().viewports.entry(ViewportId::ROOT).or_default().events.clear();
+        for _ in 0..20 {
+            answers.extend(self.step_answering());
+        }
+        answers
+    }
+
+    fn step_answering(&mut self) -> Vec<ViewportCommand> {
+        self.harness.step();
+        self.harness.output().viewport_output[&ViewportId::ROOT].commands.clone()
+    }
+
+    fn question(&self) -> Option<Question> {
+        self.harness.state().state().document.question
+    }
+}
+
+/// Flags a pair whose labels cannot be written, by root neither: a file lies where their folder should be.
+fn stick(rig: &mut Rig) {
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    std::fs::write(rig.data.join(FOLDER), "in the way").unwrap();
+    rig.harness.get_by_label(REVIEW).click();
+    rig.settle();
+    rig.harness.get_by_label("not saved");
+}
+
+#[test]
+fn closing_is_held_up_until_what_is_unsaved_is_saved_or_given_up() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    stick(&mut rig);
+    let delays: Vec<Duration> = rig.harness.output().viewport_output.values().map(|v| v.repaint_delay).collect();
+    let seconds = Duration::from_secs(1)..=Duration::from_secs(5);
+    assert!(delays.iter().all(|delay| seconds.contains(delay)), "it looks again after seconds: {delays:?}");
+    let answers = rig.ask_to_close();
+    assert!(
+        answers.contains(&ViewportCommand::CancelClose) && !answers.contains(&ViewportCommand::Close),
+        "{answers:?}"
+    );
+    assert_eq!(rig.question(), Some(Question::Closing));
+    rig.harness.get_by_label("Close without saving?");
+    rig.harness.get_by_label("Stay open").click();
+    rig.settle();
+    assert_eq!(rig.question(), None);
+    // Once more; it can be saved by now.
+    rig.ask_to_close();
+    std::fs::remove_file(rig.data.join(FOLDER)).unwrap();
+    rig.harness.get_by_label("Try again").click();
+    let answers: Vec<ViewportCommand> = (0..20).flat_map(|_| rig.step_answering()).collect();
+    assert!(answers.contains(&ViewportCommand::Close), "{answers:?}");
+    let states = Labels::of(&Dataset::open(&rig.data).unwrap()).reviews().states;
+    assert_eq!(states.into_values().collect::<Vec<_>>(), [Review::Flagged]);
+}
+
+#[test]
+fn labels_go_elsewhere_or_nowhere_and_are_kept_where_nobody_was_asked() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    stick(&mut rig);
+    rig.ask_to_close();
+    rig.harness.get_by_label("Save elsewhere…").click();
+    rig.settle();
+    let usb = rig.config.join("usb");
+    rig.harness.get_by_label("Path").focus();
+    rig.harness.event(Event::Text(usb.to_str().unwrap().to_owned()));
+    rig.harness.step();
+    rig.harness.get_by_label("Use this path").click();
+    let answers: Vec<ViewportCommand> = (0..20).flat_map(|_| rig.step_answering()).collect();
+    assert!(answers.contains(&ViewportCommand::Close), "{answers:?}");
+    let dataset = Dataset::open(&rig.data).unwrap();
+    let there = Labels::in_folder(&dataset, &usb.join(FOLDER)).reviews().states;
+    assert_eq!(there.into_values().collect::<Vec<_>>(), [Review::Flagged]);
+
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    stick(&mut rig);
+    rig.ask_to_close();
+    rig.harness.get_by_label("Discard and close").click();
+    let answers: Vec<ViewportCommand> = (0..20).flat_map(|_| rig.step_answering()).collect();
+    assert!(answers.contains(&ViewportCommand::Close), "{answers:?}");
+    assert!(!rig.config.join("recovered").exists());
+
+    // The window is torn down without a word, as when its display goes away.
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    stick(&mut rig);
+    let (data, config) = (rig.data.clone(), rig.config.clone());
+    let Rig { harness, _folder, .. } = rig;
+    drop(harness);
+    std::fs::remove_file(data.join(FOLDER)).unwrap();
+    let dataset = Dataset::open(&data).unwrap();
+    let labels = Labels::of(&dataset);
+    let found = recover(&dataset, &labels, &config.join("recovered"));
+    assert_eq!((found.pairs.len(), found.failed), (1, Vec::new()));
+    assert_eq!(labels.reviews().states.into_values().collect::<Vec<_>>(), [Review::Flagged]);
+}
+
+#[test]
+fn a_data_set_that_is_renamed_under_the_studio_is_asked_about_and_nothing_is_made_in_its_place() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    rig.send(SettingsCommand::DismissHint);
+    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    let renamed = rig.data.with_file_name("renamed");
+    std::fs::rename(&rig.data, &renamed).unwrap();
+    rig.harness.get_by_label(REVIEW).click();
+    rig.settle();
+    assert_eq!(rig.question(), Some(Question::Lost));
+    assert!(!rig.data.exists());
+    rig.harness.get_by_label_contains("The data set is gone");
+    std::fs::rename(&renamed, &rig.data).unwrap();
+    rig.harness.get_by_label("Try again").click();
+    rig.settle();
+    assert_eq!(rig.question(), None);
+    rig.harness.key_press(Key::Escape);
+    assert!(rig.data.join(FOLDER).is_dir());
+}
