@@ -92,7 +92,7 @@ fn handful(dataset: &Dataset, pairs: usize) -> Vec<PairId> {
 }
 
 /// The predictions of samples' images, each placed in the imprint of each finger; `None` where they cannot be made.
-fn placed(samples: &[&Sample], (models, generating): Generator<'_>, cx: &JobCx) -> Option<Vec<Placed>> {
+pub(crate) fn placed(samples: &[&Sample], (models, generating): Generator<'_>, cx: &JobCx) -> Option<Vec<Placed>> {
     let made = generating.pairs(models, samples, cx).ok()??;
     let one = |(sample, made): (&&Sample, super::predict::Predicted)| {
         let made = made.map(|made| made?.ok());
