@@ -23,6 +23,7 @@ mod hostile;
 #[cfg(feature = "onnx")]
 mod outputs;
 mod queue;
+mod read_as;
 mod training_data;
 mod unit;
 #[cfg(feature = "onnx")]

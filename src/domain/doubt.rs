@@ -19,7 +19,7 @@ mod predictions;
 use std::collections::BTreeMap;
 
 use super::mesh::TriMesh;
-use super::read_as::{ReadAs, list};
+use super::read_as::ReadAs;
 use super::rig::PerPad;
 use super::sample::{PadTouch, Reading, Sample};
 
@@ -96,10 +96,7 @@ impl Doubt {
         Self {
             cause: Cause::Stored(read_as),
             what: format!("{}: {figures}", read_as.mistake()),
-            hint: format!(
-                "correct what writes the files, or read them so with --read-as {read_as} (for good: `touch2touch read-as PATH \
-                 --set {read_as}`)"
-            ),
+            hint: format!("correct what writes the files, or read them so with --read-as {read_as}"),
         }
     }
 }
@@ -203,8 +200,5 @@ impl Gain {
     }
 }
 
-/// The readings of doubts as `--read-as` takes them; `None` where no doubt has one.
-pub fn remedy(doubts: &[Doubt]) -> Option<String> {
-    let readings: Vec<ReadAs> = doubts.iter().filter_map(Doubt::read_as).collect();
-    (!readings.is_empty()).then(|| list(&readings))
-}
+#[cfg(test)]
+mod tests;

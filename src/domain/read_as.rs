@@ -178,6 +178,20 @@ pub fn parse_list(text: &str) -> Result<Vec<ReadAs>, String> {
     keys.map(str::parse).collect()
 }
 
+/// What is read so already, read so once more: what is its own opposite ends instead.
+pub fn also(known: &[ReadAs], more: ReadAs) -> Vec<ReadAs> {
+    let own_opposite = !matches!(
+        more,
+        ReadAs::Scale(..) | ReadAs::ScaleCamera(_) | ReadAs::Image255(_) | ReadAs::ImageIsDifference(_) | ReadAs::ImageUnwrap
+    );
+    let mut all = known.to_vec();
+    match known.iter().rposition(|one| own_opposite && *one == more) {
+        Some(at) => drop(all.remove(at)),
+        None => all.push(more),
+    }
+    all
+}
+
 /// Several keys as [`parse_list`] reads them.
 pub fn list(read_as: &[ReadAs]) -> String {
     read_as.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
@@ -369,5 +383,98 @@ fn swap_depths(sample: &mut Sample, depths: Depths) {
         if let (Depths::Whole, Some(camera), Some(others)) = (depths, &mut touch.camera, &other.camera) {
             camera.depth_reference = others.depth_reference.clone();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use strum::IntoEnumIterator as _;
+
+    use super::*;
+    use crate::domain::catalog::tools;
+    use crate::domain::rig::lab;
+    use crate::domain::sim::{Grasp, SimConfig, simulate};
+
+    fn all() -> Vec<ReadAs> {
+        let mut all = vec![ReadAs::NegateTheta, ReadAs::ScaleCamera(1.25), ReadAs::ImageUnwrap];
+        for depths in [Depths::Imprints, Depths::Whole] {
+            all.extend([ReadAs::SwapFingers(depths), ReadAs::Scale(depths, 0.5)]);
+            all.extend(Lay::iter().map(|lay| ReadAs::Lay(depths, lay)));
+        }
+        all.extend([ReadAs::ImageSwapFingers, ReadAs::ImageSwapReference]);
+        all.extend(Lay::iter().map(ReadAs::ImageLay));
+        all.extend([Images::Touch, Images::Reference, Images::Both].map(ReadAs::ImageBgr));
+        all.extend([Images::Touch, Images::Reference, Images::Both].map(ReadAs::Image255));
+        all.extend([Stored::Signed, Stored::Gray, Stored::Wrapped].map(ReadAs::ImageIsDifference));
+        all
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_nothing_else_is() {
+        for read_as in all() {
+            assert_eq!(read_as.to_string().parse(), Ok(read_as));
+            assert!(KEYS.contains(read_as.to_string().trim_start_matches("whole-").split('=').next().unwrap()), "{read_as}");
+            assert!(!read_as.mistake().is_empty());
+        }
+        assert_eq!(parse_list(&list(&all())), Ok(all()));
+        assert_eq!(parse_list(" \n"), Ok(Vec::new()));
+        for wrong in
+            ["swap", "whole-negate-theta", "scale-depth", "scale-depth=0", "scale-depth=NaN", "scale-camera=1e9", "turn=1", "image-"]
+        {
+            assert!(wrong.parse::<ReadAs>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_is_its_own_opposite_ends_what_was_said_before() {
+        let swap = ReadAs::SwapFingers(Depths::Imprints);
+        assert_eq!(also(&[swap, ReadAs::NegateTheta], swap), [ReadAs::NegateTheta]);
+        let half = ReadAs::Scale(Depths::Imprints, 0.5);
+        assert_eq!(also(&[half], half), [half, half]);
+    }
+
+    /// What can be compared of a sample.
+    fn felt(sample: &Sample) -> Vec<f32> {
+        let mut all = vec![sample.grasp_from_object.unwrap().theta_rad as f32];
+        for touch in sample.pads.iter().flatten() {
+            all.extend(touch.color().unwrap().difference.as_slice().iter().flatten());
+            let depth = touch.depth().unwrap();
+            let camera = depth.camera.as_ref().unwrap();
+            all.extend(depth.imprint.as_slice().iter().chain(camera.depth_reference.as_slice()));
+            all.push(camera.intrinsics.fx as f32);
+        }
+        all
+    }
+
+    #[test]
+    fn each_changes_something_and_mistakes_are_undone() {
+        let grasp = Grasp { theta_rad: 0.2, x_m: 0.002, y_m: -0.001 };
+        let sample = simulate(&tools()[1], grasp, 1, &SimConfig::default());
+        for read_as in all().into_iter().filter(|read_as| *read_as != ReadAs::ImageUnwrap) {
+            let once = ReadAs::all(&[read_as], &sample);
+            assert_ne!(felt(&once), felt(&sample), "{read_as}");
+            if also(&[read_as], read_as).is_empty() {
+                assert_eq!(felt(&ReadAs::all(&[read_as], &once)), felt(&sample), "{read_as}");
+            }
+        }
+        let twice = ReadAs::all(&[ReadAs::ScaleCamera(0.8), ReadAs::ScaleCamera(1.25)], &sample);
+        assert_eq!(felt(&twice), felt(&sample));
+        // Images in 8 bits with a sign: the difference comes back.
+        let mut wrong = sample.clone();
+        each_color(&mut wrong, |touch| {
+            let images = touch.images.clone().unwrap();
+            let [raw, reference] = [images.raw, images.reference].map(|image| image.map(|pixel| pixel.map(wrapped)));
+            *touch = ColorTouch::from_images(raw, reference).unwrap();
+        });
+        assert_ne!(felt(&wrong), felt(&sample));
+        assert_eq!(felt(&ReadAs::all(&[ReadAs::ImageUnwrap], &wrong)), felt(&sample));
+        // The place of the grasp stays where the sign of its angle changes.
+        let stored = ReadAs::all(&[ReadAs::NegateTheta], &sample).grasp_from_object.unwrap().inverse();
+        let before = sample.grasp_from_object.unwrap().inverse();
+        assert!((stored.y_m - before.y_m).abs() < 1e-12 && (stored.theta_rad + before.theta_rad).abs() < 1e-12);
+        // What is not there stays so.
+        let nothing = Sample::default();
+        all().iter().for_each(|read_as| assert!(ReadAs::all(&[*read_as], &nothing).pads.is_empty()));
+        assert!(sample.pad(lab::LEFT).unwrap().depth().unwrap().truth.is_some());
     }
 }

@@ -14,7 +14,7 @@ use crate::domain::dataset::{PairId, Problem};
 use crate::domain::doubt::{Doubt, Felt, Placed, judge};
 use crate::domain::mesh::TriMesh;
 use crate::domain::postprocess::ShiftMode;
-use crate::domain::read_as::{ReadAs, list};
+use crate::domain::read_as::{also, list};
 use crate::domain::sample::Sample;
 use crate::io::dataset::{Dataset, SourceKind};
 
@@ -50,27 +50,35 @@ pub fn examine_reading(dataset: &Dataset, pairs: usize, generator: Option<Genera
     }
 }
 
-/// The same as entries of a problem list.
+/// How the data set is to be read where some doubts are true, as `--read-as` takes it; `None` where no reading helps.
+pub fn remedy(dataset: &Dataset, doubts: &[Doubt]) -> Option<String> {
+    let mut readings = doubts.iter().filter_map(Doubt::read_as).peekable();
+    readings.peek()?;
+    Some(list(&readings.fold(dataset.read_as().to_vec(), |known, more| also(&known, more))))
+}
+
+/// Doubts as entries of a problem list.
 pub fn problems(dataset: &Dataset, doubts: &[Doubt]) -> Vec<Problem> {
     let file = dataset.root.clone().unwrap_or_else(|| PathBuf::from(&dataset.title));
-    let stored: Vec<ReadAs> = doubts.iter().filter_map(Doubt::read_as).collect();
+    let remedy = remedy(dataset, doubts).unwrap_or_default();
     let of = |doubt: &Doubt| {
         let hint = match doubt.read_as() {
-            Some(_) => {
-                let all: Vec<ReadAs> = dataset.read_as().iter().copied().chain(stored.clone()).collect();
-                format!(
-                    "correct what writes the files, or have them read so: `touch2touch read-as {} --set {}`; --read-as {} \
-                     tries it for one run",
-                    file.display(),
-                    list(&all),
-                    list(&all)
-                )
-            }
+            Some(_) if remedy.is_empty() => format!("read them as they are stored: `touch2touch read-as {} --clear`", file.display()),
+            Some(_) => format!(
+                "correct what writes the files, or have them read so: `touch2touch read-as {} --set {remedy}`; --read-as {remedy} \
+                 tries it for one run",
+                file.display(),
+            ),
             None => doubt.hint.clone(),
         };
         Problem { file: file.clone(), what: doubt.what.clone(), hint }
     };
     doubts.iter().map(of).collect()
+}
+
+/// What seems wrong with a data set, for the notes of whoever answers from it: cheaply, without predictions.
+pub fn notes(dataset: &Dataset) -> Vec<Problem> {
+    problems(dataset, &examine_reading(dataset, PAIRS, None, &JobCx::unwatched()))
 }
 
 /// About so many pairs, of as many tools as there are, spread over the pairs of each.

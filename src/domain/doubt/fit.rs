@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::domain::align::{AlignConfig, align};
+use crate::domain::align::{AlignConfig, Rung, align};
 use crate::domain::blur::gaussian;
-use crate::domain::cloud::lift_pixel;
+use crate::domain::cloud::{lift, lift_pixel};
 use crate::domain::contact::{rest_and_top, threshold};
 use crate::domain::field::DistanceField;
 use crate::domain::frames::PlanarPose;
@@ -78,11 +78,12 @@ pub(super) fn registered(sample: &Sample, field: &DistanceField) -> Option<Plana
         let Some((depth, camera)) = touch.depth().zip(touch.camera()) else { continue };
         let Some([rest, top]) = rest_and_top(&depth.imprint) else { continue };
         let contact: Mask = threshold(&depth.imprint, rest + CONTACT_SHARE * (top - rest));
-        points.extend(crate::domain::cloud::lift(&depth.imprint, camera, Some(&contact)).ok()?.points);
+        points.extend(lift(&depth.imprint, camera, Some(&contact)).ok()?.points);
     }
     let yz: Vec<DVec2> = points.iter().map(|p| DVec2::new(p.y, p.z)).collect();
     let config = AlignConfig::default();
-    let rungs = config.rungs.iter().copied().filter(|rung| *rung != crate::domain::align::Rung::Certified).collect();
+    // Under a wrong reading nothing fits, and a grid would be searched in vain.
+    let rungs = config.rungs.iter().copied().filter(|rung| *rung <= Rung::Several).collect();
     Some(align(&yz, field, &AlignConfig { rungs, ..config }).ok()?.grasp_from_object)
 }
 

@@ -65,6 +65,8 @@ struct Plain {
     least: f64,
     /// Median of each channel.
     median: [f64; 3],
+    /// Median of each channel, modulo 256 nearest to 0.
+    wrapped: [f64; 3],
     /// Whether the three channels are equal.
     gray: bool,
 }
@@ -72,12 +74,15 @@ struct Plain {
 impl Plain {
     fn of(image: &RgbGrid) -> Self {
         let values = || image.as_slice().iter().flatten().map(|v| f64::from(*v));
-        let channel = |c: usize| median(image.as_slice().iter().step_by(7).map(|p| f64::from(p[c]))).unwrap_or(0.0);
+        let some = || image.as_slice().iter().step_by(7);
+        let channel = |c: usize| median(some().map(|p| f64::from(p[c]))).unwrap_or(0.0);
+        let wrapped = |c: usize| median(some().map(|p| wrap(f64::from(p[c])))).unwrap_or(0.0);
         let unequal = image.as_slice().iter().filter(|p| (p[0] - p[1]).abs().max((p[1] - p[2]).abs()) > 1e-3).count();
         Self {
             most: values().fold(f64::NEG_INFINITY, f64::max),
             least: values().fold(f64::INFINITY, f64::min),
             median: [0, 1, 2].map(channel),
+            wrapped: [0, 1, 2].map(wrapped),
             gray: unequal * 100 <= image.len(),
         }
     }
@@ -131,7 +136,7 @@ fn stored(images: &[&ColorImages], faces: &[Face]) -> Option<Doubt> {
     let reversed = |[a, b, c]: [f64; 3]| [c, b, a];
     let typical = |of: &dyn Fn(&Face) -> f64| median(faces.iter().map(of)).unwrap_or(0.0);
     let off = typical(&|face| size(minus(face.touch.median, face.reference.median)));
-    let wrapped = typical(&|face| size(face.touch.median.map(wrap)));
+    let wrapped = typical(&|face| size(face.touch.wrapped));
     let gray = typical(&|face| size(face.touch.median.map(|v| v - 128.0)));
     let signed = typical(&|face| size(face.touch.median));
     let without = most(faces, |face| face.reference.single());
