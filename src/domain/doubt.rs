@@ -133,17 +133,17 @@ fn only(sample: &Sample, color: bool) -> Sample {
         .pads
         .iter()
         .map(|touch| {
-        let touch = touch.as_ref()?;
-        let mut kept = PadTouch::default();
+            let touch = touch.as_ref()?;
+            let mut kept = PadTouch::default();
             kept.lent.clone_from(&touch.lent);
-        for (sensor, reading) in touch.readings() {
-            if matches!(reading, Reading::Color(_)) == color {
-                kept.set(*sensor, reading.clone());
+            for (sensor, reading) in touch.readings() {
+                if matches!(reading, Reading::Color(_)) == color {
+                    kept.set(*sensor, reading.clone());
+                }
             }
-        }
-        Some(kept)
-    })
-    .collect();
+            Some(kept)
+        })
+        .collect();
     let Sample { rig, grasp_from_object, scale, laid, reading, .. } = sample;
     Sample {
         rig: rig.clone(),

@@ -182,7 +182,11 @@ pub fn parse_list(text: &str) -> Result<Vec<ReadAs>, String> {
 pub fn also(known: &[ReadAs], more: ReadAs) -> Vec<ReadAs> {
     let own_opposite = !matches!(
         more,
-        ReadAs::Scale(..) | ReadAs::ScaleCamera(_) | ReadAs::Image255(_) | ReadAs::ImageIsDifference(_) | ReadAs::ImageUnwrap
+        ReadAs::Scale(..)
+            | ReadAs::ScaleCamera(_)
+            | ReadAs::Image255(_)
+            | ReadAs::ImageIsDifference(_)
+            | ReadAs::ImageUnwrap
     );
     let mut all = known.to_vec();
     match known.iter().rposition(|one| own_opposite && *one == more) {
@@ -413,14 +417,24 @@ mod tests {
     fn what_is_written_is_read_and_nothing_else_is() {
         for read_as in all() {
             assert_eq!(read_as.to_string().parse(), Ok(read_as));
-            assert!(KEYS.contains(read_as.to_string().trim_start_matches("whole-").split('=').next().unwrap()), "{read_as}");
+            assert!(
+                KEYS.contains(read_as.to_string().trim_start_matches("whole-").split('=').next().unwrap()),
+                "{read_as}"
+            );
             assert!(!read_as.mistake().is_empty());
         }
         assert_eq!(parse_list(&list(&all())), Ok(all()));
         assert_eq!(parse_list(" \n"), Ok(Vec::new()));
-        for wrong in
-            ["swap", "whole-negate-theta", "scale-depth", "scale-depth=0", "scale-depth=NaN", "scale-camera=1e9", "turn=1", "image-"]
-        {
+        for wrong in [
+            "swap",
+            "whole-negate-theta",
+            "scale-depth",
+            "scale-depth=0",
+            "scale-depth=NaN",
+            "scale-camera=1e9",
+            "turn=1",
+            "image-",
+        ] {
             assert!(wrong.parse::<ReadAs>().is_err(), "{wrong}");
         }
     }

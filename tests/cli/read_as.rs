@@ -28,14 +28,19 @@ fn fingers_that_were_swapped_are_said_by_every_verb_and_read_right_for_good() {
     let tools = "pattern_01_2_lines_angle_1,pattern_02_2_lines_angle_2,pattern_33,pattern_37";
     let made = ["simulate", "--out", path, "--tools", tools, "--grasps", "1", "--seed", "4"];
     assert!(run(&made, dir.path()).status.success());
-    let doctor = |words: &[&str]| json(&run(&[&["doctor", path, "--no-predictions", "--json"], words].concat(), dir.path()));
+    let doctor =
+        |words: &[&str]| json(&run(&[&["doctor", path, "--no-predictions", "--json"], words].concat(), dir.path()));
     let sound = doctor(&[]);
     assert!(sound["problems"] == serde_json::json!([]) && sound["read_as"].is_null(), "{sound}");
     let error = |words: &[&str]| {
         let done = run(&[&["pose", path, "--mask", "threshold", "--json"], words].concat(), dir.path());
         let notes = json(&done)["notes"].to_string();
-        let mut errors: Vec<f64> =
-            json(&done)["cases"].as_array().unwrap().iter().map(|case| case["error_deg"].as_f64().unwrap_or(90.0)).collect();
+        let mut errors: Vec<f64> = json(&done)["cases"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|case| case["error_deg"].as_f64().unwrap_or(90.0))
+            .collect();
         errors.sort_by(f64::total_cmp);
         (errors[errors.len() / 2], notes)
     };

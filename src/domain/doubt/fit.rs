@@ -47,7 +47,9 @@ pub(super) fn likeness(sample: &Sample, field: &DistanceField, grasp_from_object
         let first = felt.len();
         for y in 0..relief.height() {
             for x in 0..relief.width() {
-                let Some(point) = lift_pixel(&depth.imprint, camera, STEP_PX * x + 1, STEP_PX * y + 1) else { continue };
+                let Some(point) = lift_pixel(&depth.imprint, camera, STEP_PX * x + 1, STEP_PX * y + 1) else {
+                    continue;
+                };
                 let off = field.sample(object_from_grasp.transform_yz(DVec2::new(point.y, point.z))).distance;
                 if off <= AROUND_M {
                     felt.push(relief[(x, y)]);

@@ -46,7 +46,8 @@ pub(super) fn judge(felt: &[Felt<'_>]) -> Option<Doubt> {
         return None;
     }
     let faces: Vec<Face> = images.iter().map(|images| Face::of(images)).collect();
-    plain(&faces).or_else(|| stored(&images, &faces)).or_else(|| swapped(felt)).or_else(|| laid(felt, &faces))
+    let colored = felt.iter().any(|felt| is_gelslim(&felt.sample.rig));
+    plain(&faces, colored).or_else(|| stored(&images, &faces)).or_else(|| swapped(felt)).or_else(|| laid(felt, &faces))
 }
 
 /// What there is to say of one touch at a glance.
@@ -105,8 +106,13 @@ fn most(faces: &[Face], shows: impl Fn(&Face) -> bool) -> Option<String> {
     enough.then(|| format!("{count} of {}", counted(faces.len(), "image")))
 }
 
-/// What shows at a glance.
-fn plain(faces: &[Face]) -> Option<Doubt> {
+/// Whether the color sensor is a GelSlim, of which is known that its light is colored, and where it comes from.
+fn is_gelslim(rig: &Rig) -> bool {
+    rig.color().is_some_and(|sensor| sensor.key == lab::GELSLIM.key)
+}
+
+/// What shows at a glance. `colored`: the sensor's light has colors.
+fn plain(faces: &[Face], colored: bool) -> Option<Doubt> {
     let broken = |cause, what: String, hint: &str| Some(Doubt { cause, what, hint: hint.into() });
     if let Some(of) = most(faces, |face| face.same && !face.touch.single()) {
         let what = format!("touched and untouched image are the same, pixel by pixel: {of}");
@@ -121,6 +127,9 @@ fn plain(faces: &[Face]) -> Option<Doubt> {
         if let Some(of) = most(faces, |face| is(touch, &face.touch) && is(reference, &face.reference)) {
             return Some(Doubt::stored(ReadAs::Image255(which), &format!("they reach no more than 1: {of}")));
         }
+    }
+    if !colored {
+        return None;
     }
     if let Some(of) = most(faces, |face| face.touch.gray && face.reference.gray && !face.touch.single()) {
         let what = format!("the three channels are equal: {of} are gray");
@@ -283,8 +292,7 @@ fn laid(felt: &[Felt<'_>], faces: &[Face]) -> Option<Doubt> {
 
 /// How the images of a sample lie by their light, where it tells surely. Only a GelSlim's light is known.
 fn of_light(sample: &Sample) -> Vec<Turn> {
-    let known = |rig: &Rig| rig.color().is_some_and(|sensor| sensor.key == lab::GELSLIM.key);
-    if !known(&sample.rig) {
+    if !is_gelslim(&sample.rig) {
         return Vec::new();
     }
     let colors = sample.pads.iter().flatten().filter_map(|touch| touch.color());

@@ -23,9 +23,11 @@ const CLEARLY_OF_TOOL: f64 = 0.15;
 /// Pairs whose likeness is at least this are not tried with other CAD models.
 const GOOD: f64 = 0.65;
 /// Imprints of less mean likeness have nothing to do with their tools.
-const NOTHING: f64 = 0.25;
-/// Imprints of a tool of less mean likeness do not belong to its CAD model.
-const NOT_ITS_MODEL: f64 = 0.4;
+const NOTHING: f64 = 0.15;
+/// Imprints of a tool do not belong to its CAD model where their mean likeness is less than this share of the other tools',
+/// which must be beyond doubt. A poor membrane alone has half of it.
+const NOT_ITS_MODEL: f64 = 0.3;
+const OTHERS_LIE_ON: f64 = 0.55;
 /// Angles differ from here on, radians.
 const ANGLES_DIFFER_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
@@ -129,11 +131,7 @@ impl<'a> Pairs<'a> {
 }
 
 /// What is wrong with the imprints of some pairs, or with their CAD models.
-pub(super) fn judge(
-    samples: &[Sample],
-    named: &[Option<&str>],
-    meshes: &BTreeMap<String, TriMesh>,
-) -> Option<Doubt> {
+pub(super) fn judge(samples: &[Sample], named: &[Option<&str>], meshes: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
     let pairs = Pairs::of(samples, named, meshes);
     if pairs.samples.is_empty() {
         return None;
@@ -152,7 +150,7 @@ pub(super) fn judge(
     if let Some((read_as, gain)) = read {
         return Some(Doubt::stored(read_as, &figures(&pairs, &stored, read_as, &gain)));
     }
-    if let Some(doubt) = one_model(&pairs, &models) {
+    if let Some(doubt) = one_model(&pairs, &models, &stored) {
         return Some(doubt);
     }
     (mean < NOTHING).then(|| Doubt {
@@ -167,9 +165,10 @@ pub(super) fn judge(
 }
 
 /// CAD models that do not fit where those of other tools do, and that none of them replaces.
-fn one_model(pairs: &Pairs<'_>, doubted: &[(&str, f64)]) -> Option<Doubt> {
-    let bad: Vec<&(&str, f64)> = doubted.iter().filter(|(_, score)| *score < NOT_ITS_MODEL).collect();
+fn one_model(pairs: &Pairs<'_>, doubted: &[(&str, f64)], stored: &[f64]) -> Option<Doubt> {
     let tools: BTreeSet<&str> = pairs.tools.iter().copied().collect();
+    let typical = median(stored.iter().copied()).filter(|typical| *typical >= OTHERS_LIE_ON)?;
+    let bad: Vec<&(&str, f64)> = doubted.iter().filter(|(_, score)| *score < NOT_ITS_MODEL * typical).collect();
     if bad.is_empty() || 2 * bad.len() > tools.len() {
         return None;
     }
@@ -209,7 +208,9 @@ fn figures(pairs: &Pairs<'_>, stored: &[f64], read_as: ReadAs, gain: &Gain) -> S
     let (before, after) = (errors(&[]), errors(&[read_as]));
     let angles = match (before, after) {
         (Some(before), Some(after)) if (before - after).to_radians() > ANGLES_DIFFER_RAD => {
-            format!("read otherwise, the registered angle is off by a median of {after:.1}° instead of {before:.1}°, and the")
+            format!(
+                "read otherwise, the registered angle is off by a median of {after:.1}° instead of {before:.1}°, and the"
+            )
         }
         _ => "read otherwise, the".into(),
     };
@@ -243,7 +244,8 @@ fn of_models(
     let others = other_models(pairs, doubted);
     let turned = other_axes(pairs, meshes, doubted);
     let explained = |tools: &[(&str, f64)]| {
-        let gained: f64 = tools.iter().map(|(tool, gain)| gain * pairs.tools.iter().filter(|t| *t == tool).count() as f64).sum();
+        let gained: f64 =
+            tools.iter().map(|(tool, gain)| gain * pairs.tools.iter().filter(|t| *t == tool).count() as f64).sum();
         (stored.iter().sum::<f64>() + gained) / stored.len() as f64
     };
     let by_others = explained(&others.iter().map(|(tool, _, gain)| (*tool, *gain)).collect::<Vec<_>>());

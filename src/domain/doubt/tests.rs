@@ -90,7 +90,8 @@ fn predictions_tell_the_fingers_of_the_images() {
     let felt: Vec<Felt<'_>> = sound.pairs.iter().map(|(_, sample)| Felt { tool: None, sample }).collect();
     let made = |swapped: bool| {
         move |samples: &[&Sample]| {
-            let imprint = |sample: &Sample, pad| -> Option<DepthMap> { Some(sample.pad(pad)?.depth()?.imprint.clone()) };
+            let imprint =
+                |sample: &Sample, pad| -> Option<DepthMap> { Some(sample.pad(pad)?.depth()?.imprint.clone()) };
             let of = |sample: &&Sample| -> Placed {
                 let pads = sample.rig.pad_list();
                 let from = |at: usize| if swapped { pads[pads.len() - 1 - at] } else { pads[at] };

@@ -91,9 +91,10 @@ pub(in crate::headless) fn run(args: &DoctorArgs) -> VerbResult {
     let found = (!args.no_generator).then(|| bundles::find(&[]).take(BundleKind::Generator, None, &Rig::lab()));
     let bundle = found.transpose()?;
     let config = bundle.as_ref().and_then(|bundle| Some(bundle.generator.as_ref()?.defaults));
-    let generator: Option<Generator<'_>> = bundle.as_ref().zip(config.as_ref()).map(|(bundle, config)| {
-        (&models, Generating { bundle, engine: args.runtime.choice(), config })
-    });
+    let generator: Option<Generator<'_>> = bundle
+        .as_ref()
+        .zip(config.as_ref())
+        .map(|(bundle, config)| (&models, Generating { bundle, engine: args.runtime.choice(), config }));
     let mut spoilt: Vec<Row> = kinds.iter().map(|kind| Row::new(&kind.name)).collect();
     for number in 0..args.sets {
         let sound = sound_set(args, Condition::Plain, number);
@@ -156,7 +157,8 @@ impl Row {
 
 /// A sound data set: every other one of other sensors than the nominal ones, each of other tools.
 fn sound_set(args: &DoctorArgs, condition: Condition, number: u32) -> Set {
-    let config = if number % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(args.seed + u64::from(number)) };
+    let config =
+        if number % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(args.seed + u64::from(number)) };
     let all = tools();
     let mut set = Set { pairs: Vec::new(), tools: Default::default() };
     for at in 0..u64::from(args.pairs) {
@@ -191,7 +193,10 @@ fn text(report: &Report) -> String {
             otherwise.sort();
             otherwise.dedup();
             let said = if otherwise.is_empty() { String::new() } else { format!("  also: {}", otherwise.join(", ")) };
-            *text += &format!("{:<66} {:>2} of {:>2} named, {:>2} noticed{said}\n", row.kind, row.named, row.sets, row.noticed);
+            *text += &format!(
+                "{:<66} {:>2} of {:>2} named, {:>2} noticed{said}\n",
+                row.kind, row.named, row.sets, row.noticed
+            );
         }
     };
     rows(&mut text, &report.spoilt);

@@ -182,8 +182,11 @@ fn images() -> Vec<Kind> {
         images_of("GelSlims: white untouched image", &["no-reference"], |a, b| (a.clone(), each(b, |_| 255.0))),
         images_of("GelSlims: gray", &["gray"], |a, b| (gray(a), gray(b))),
     ];
-    let differences: [(&str, &str, fn(f32) -> f32); 3] =
-        [("signed", &signs, |v| v), ("gray added", &grays, |v| (v + 128.0).clamp(0.0, 255.0)), ("wrapped", &wraps, |v| v.rem_euclid(256.0))];
+    let differences: [(&str, &str, fn(f32) -> f32); 3] = [
+        ("signed", &signs, |v| v),
+        ("gray added", &grays, |v| (v + 128.0).clamp(0.0, 255.0)),
+        ("wrapped", &wraps, |v| v.rem_euclid(256.0)),
+    ];
     for (name, key, store) in differences {
         for (beside, reference) in [("untouched image kept", 1.0), ("no untouched image", 0.0)] {
             all.push(kind(&format!("GelSlims: differences stored, {name}, {beside}"), &[key], move |set| {
