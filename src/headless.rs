@@ -25,6 +25,7 @@ mod notes;
 mod output;
 mod pose;
 mod predict;
+mod read_as;
 mod report;
 mod seeds;
 mod simulate;
@@ -111,6 +112,8 @@ enum Verb {
     Doctor(doctor::DoctorArgs),
     /// Say which unit the CAD models (STL) of a data set are in, or set it for good.
     Unit(unit::UnitArgs),
+    /// Say how a data set is read otherwise than it is stored, or set it for good: fingers swapped, pictures mirrored, ...
+    ReadAs(read_as::ReadAsArgs),
     /// Time and error of the registration engines and of the generator, side by side.
     #[command(subcommand)]
     Bench(bench::BenchVerb),
@@ -258,6 +261,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
         Some(Verb::Unit(args)) => unit::run(&args),
+        Some(Verb::ReadAs(args)) => read_as::run(&args),
         Some(Verb::Bench(verb)) => bench::run(&verb),
         Some(Verb::Case(verb)) => case::run(&verb),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),

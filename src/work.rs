@@ -20,6 +20,7 @@ pub mod case;
 pub mod cloud;
 pub mod compare;
 pub mod deviation;
+pub mod doubts;
 pub mod ensemble;
 pub mod error;
 pub mod evaluate;

@@ -24,6 +24,7 @@ mod hostile;
 mod outputs;
 mod queue;
 mod refused;
+mod read_as;
 mod training_data;
 mod unit;
 #[cfg(feature = "onnx")]

@@ -1,6 +1,8 @@
 //! Contact masks from depth (threshold, top percent) and from the CAD model at a known pose, and the mask
 //! network's input image. Masks drawn by hand and by the network come from elsewhere.
 
+mod rise;
+
 use glam::DAffine3;
 use rayon::prelude::*;
 
@@ -10,6 +12,8 @@ use super::grid::{DepthMap, Grid, Mask};
 use super::mesh::MeshDistance;
 use super::sample::DepthCamera;
 use super::units::text_mm;
+
+pub use rise::{rest_and_top, rise, stands_out};
 
 /// Distance to the CAD model that the lab still calls contact, meters (`ICP_dataset_cal.py` lines 337-391).
 pub const LAB_CAD_DISTANCE_M: f64 = 0.001;
@@ -101,46 +105,12 @@ pub fn without_grain(imprint: &DepthMap, radius_px: usize) -> DepthMap {
     DepthMap::from_vec(width, height, rows.concat()).unwrap_or_else(|_| imprint.clone())
 }
 
-/// Side of the squares whose medians [`rise`] compares, as a share of the imprint's width: 7 px of 175.
-const SQUARES_ACROSS: usize = 25;
-/// Share of the squares that lie lower than the imprint's rest, and of those that lie higher than its top.
-const REST_SHARE: f64 = 0.25;
-const TOP_SHARE: f64 = 0.02;
 /// An imprint that rises less than this holds no contact: a bubble that is touched at all gives way by more.
 pub const FLAT_M: f32 = 0.000_5;
 /// An imprint that rises by this holds contact somewhere, whatever a model says.
 pub const CLEAR_M: f32 = 0.002;
 /// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
 const CONTACT_SHARE: f32 = 0.6;
-
-/// Rest and top of an imprint, meters: the depth that a quarter of it stays below, and that of its deepest parts, both
-/// of medians over small squares, so that neither noise nor flying pixels count. `None` if nothing was measured.
-pub fn rest_and_top(imprint: &DepthMap) -> Option<[f32; 2]> {
-    let side = imprint.width().div_ceil(SQUARES_ACROSS).max(1);
-    let mut medians = Vec::new();
-    let mut values: Vec<f32> = Vec::with_capacity(side * side);
-    for y in (0..imprint.height()).step_by(side) {
-        for x in (0..imprint.width()).step_by(side) {
-            values.clear();
-            for row in y..imprint.height().min(y + side) {
-                let pixels = &imprint.row(row)[x..imprint.width().min(x + side)];
-                values.extend(pixels.iter().copied().filter(|d| d.is_finite()));
-            }
-            if !values.is_empty() {
-                let middle = values.len() / 2;
-                medians.push(*values.select_nth_unstable_by(middle, f32::total_cmp).1);
-            }
-        }
-    }
-    let last = medians.len().checked_sub(1)?;
-    let mut at = |share: f64| *medians.select_nth_unstable_by((share * last as f64) as usize, f32::total_cmp).1;
-    Some([at(REST_SHARE), at(1.0 - TOP_SHARE)])
-}
-
-/// How far an imprint rises out of its rest, meters; 0 if nothing was measured.
-pub fn rise(imprint: &DepthMap) -> f32 {
-    rest_and_top(imprint).map_or(0.0, |[rest, top]| top - rest)
-}
 
 /// What a contact mask is made of in the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -213,7 +183,7 @@ pub fn settled(imprint: &DepthMap, mask: Mask) -> ContactMask {
 /// is clearly not flat, depth relative to that imprint's own rest and top decides.
 pub fn settled_model(imprint: &DepthMap, mask: Mask) -> ContactMask {
     match rest_and_top(imprint) {
-        Some([rest, top]) if top - rest >= CLEAR_M && !mask.as_slice().contains(&true) => {
+        Some([rest, top]) if rise(imprint) >= CLEAR_M && !mask.as_slice().contains(&true) => {
             let min_m = rest + CONTACT_SHARE * (top - rest);
             ContactMask { mask: threshold(imprint, min_m), basis: MaskBasis::Depth(min_m), unsure: None }
         }
@@ -314,7 +284,10 @@ mod tests {
         let mut dots = DepthMap::filled(175, 140, 0.0);
         // Flying pixels and holes are no contact either.
         (dots[(3, 3)], dots[(90, 70)], dots[(91, 70)]) = (0.05, 0.09, f32::NAN);
-        for flat in [DepthMap::filled(175, 140, 0.0), DepthMap::filled(175, 140, 0.004), bump(0.001, 0.0), dots] {
+        let noise = bump(0.0, 0.0);
+        // A ramp of 12 mm, as a bubble that is held askew gives.
+        let ramp = DepthMap::from_fn(175, 140, |x, y| 0.012 * (x as f32 / 349.0 + y as f32 / 279.0) + noise[(x, y)]);
+        for flat in [DepthMap::filled(175, 140, 0.0), DepthMap::filled(175, 140, 0.004), bump(0.001, 0.0), dots, ramp] {
             for found in [settled(&flat, all.clone()), settled_model(&flat, all.clone())] {
                 assert_eq!((count(&found.mask), found.basis), (0, MaskBasis::Flat), "{}", rise(&flat));
             }

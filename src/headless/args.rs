@@ -13,6 +13,7 @@ use strum::IntoEnumIterator;
 
 use super::Common;
 use crate::domain::pose::{Registration, RegistrationChoice};
+use crate::domain::read_as::{ReadAs, parse_list};
 use crate::domain::rig::{PadId, Rig};
 use crate::io::atomic;
 use crate::io::dataset::{Dataset, ToolScale};
@@ -27,6 +28,19 @@ pub(super) struct DatasetArgs {
     /// The same as PATH.
     #[arg(long, value_name = "PATH", conflicts_with = "path")]
     input: Option<PathBuf>,
+    /// Read the data otherwise than they are stored, for this run: what the doctor offers, such as swap-fingers, several with
+    /// commas. Without it, what read-as.txt in the data set says (verb read-as). An empty list reads them as they are stored.
+    #[arg(long, value_name = "LIST", value_parser = parse_readings)]
+    read_as: Option<Readings>,
+}
+
+/// Ways to read data otherwise than they are stored.
+#[derive(Debug, Clone)]
+pub(super) struct Readings(pub(super) Vec<ReadAs>);
+
+/// Reads a list of them.
+pub(super) fn parse_readings(text: &str) -> Result<Readings, String> {
+    parse_list(text).map(Readings)
 }
 
 impl DatasetArgs {
@@ -38,7 +52,11 @@ impl DatasetArgs {
 
     /// The folder's data set, or the built-in one of that name.
     pub(super) fn open(&self) -> anyhow::Result<Dataset> {
-        Dataset::open(self.path()).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))
+        let dataset = Dataset::open(self.path()).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
+        Ok(match &self.read_as {
+            Some(Readings(read_as)) => dataset.reading(read_as.clone()),
+            None => dataset,
+        })
     }
 
     /// [`Self::open`] with the unit of the CAD models as the command line has it.

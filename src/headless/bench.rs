@@ -2,6 +2,7 @@
 
 mod cases;
 mod dataset;
+mod doctor;
 pub(super) mod fan;
 mod figures;
 mod front;
@@ -31,6 +32,8 @@ pub(super) enum BenchVerb {
     Cases(cases::CasesArgs),
     /// What proposed contact masks are worth on simulated grasps, what a stroke costs, and what a mask takes a person.
     Labelling(labelling::LabellingArgs),
+    /// How many data sets that are stored wrongly the doctor names rightly, and how many sound ones it doubts.
+    Doctor(doctor::DoctorArgs),
     /// Seconds for a whole data set on all cores, on simulated pairs.
     Dataset(dataset::DatasetArgs),
 }
@@ -41,6 +44,7 @@ pub(super) fn run(verb: &BenchVerb) -> VerbResult {
         BenchVerb::Generator(args) => generator::run(args),
         BenchVerb::Cases(args) => cases::run(args),
         BenchVerb::Labelling(args) => labelling::run(args),
+        BenchVerb::Doctor(args) => doctor::run(args),
         BenchVerb::Dataset(args) => dataset::run(args),
     }
 }

@@ -1,14 +1,24 @@
-//! `touch2touch doctor PATH`: opens a data set, loads every pair and lists what is wrong.
+//! `touch2touch doctor PATH`: opens a data set, loads every pair and lists what is wrong, then tries on a handful of pairs
+//! which other reading would explain them better.
 
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
 
 use super::args::DatasetArgs;
 use super::{Common, Output, VerbResult};
-use crate::domain::findings::Finding;
+use crate::domain::doubt::Doubt;
+use crate::domain::findings::{Finding, Findings};
+use crate::infer::engine::EngineChoice;
+use crate::io::dataset::Dataset;
 use crate::io::doctor;
+use crate::work::bundles::{self, BundleKind};
+use crate::work::doubts::{self, examine_reading};
+use crate::work::job::JobCx;
+use crate::work::models::Models;
+use crate::work::predict::Generating;
 
 /// Arguments of `doctor`. Findings that differ only in file, finger or numbers are one entry, in the text and in the JSON
 /// (`problems`: `file`, `what`, `hint` of the first, `count`, `examples`).
@@ -16,6 +26,16 @@ use crate::io::doctor;
 pub(super) struct DoctorArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
+    /// Pairs on which other readings of the data are tried (fingers swapped, pictures mirrored, another tool's CAD model,
+    /// ...), spread over the tools. 0 tries nothing.
+    #[arg(long, value_name = "N", default_value_t = doubts::PAIRS)]
+    tried: usize,
+    /// Compare no predictions with what was measured: faster, but swapped GelSlims are not seen.
+    #[arg(long)]
+    no_predictions: bool,
+    /// The generator's bundle (default: the shipped one).
+    #[arg(long)]
+    bundle: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
@@ -26,17 +46,25 @@ pub(super) struct DoctorArgs {
 struct Report<'a> {
     pairs: usize,
     problems: &'a [Finding],
+    /// The readings that would set it right, for `--read-as`; `null` where there is none.
+    read_as: Option<String>,
 }
 
 /// Done means examined: problems found are the result, not a failure.
 pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let output = Output::new(args.common, "examining", dataset.index.pairs.len());
-    let report = doctor::examine(&dataset, &mut |done, total| {
+    let mut report = doctor::examine(&dataset, &mut |done, total| {
         output.set(done, total);
         ControlFlow::Continue(())
     });
-    output.finish(&Report { pairs: report.pairs, problems: &report.problems }, || {
+    let doubts = tried(args, &dataset);
+    let mut found = Findings::default();
+    found.extend(doubts::problems(&dataset, &doubts));
+    // What is wrong with all of it comes before what is wrong with single pairs.
+    report.problems.splice(0..0, found.into_list());
+    let read_as = doubts::remedy(&dataset, &doubts);
+    output.finish(&Report { pairs: report.pairs, problems: &report.problems, read_as }, || {
         let all: usize = report.problems.iter().map(|p| p.count).sum();
         let kinds = match report.problems.len() {
             kinds if kinds == all => String::new(),
@@ -53,6 +81,20 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         text
     })?;
     Ok(true)
+}
+
+/// What is found by trying; predictions are compared where a generator for these sensors is there.
+fn tried(args: &DoctorArgs, dataset: &Dataset) -> Vec<Doubt> {
+    let cx = JobCx::unwatched();
+    let bundle = (!args.no_predictions && args.tried > 0)
+        .then(|| bundles::find(&[]).take(BundleKind::Generator, args.bundle.as_deref(), &dataset.rig).ok())
+        .flatten();
+    let Some((bundle, info)) = bundle.as_ref().and_then(|bundle| Some((bundle, bundle.generator.as_ref()?))) else {
+        return examine_reading(dataset, args.tried, None, &cx);
+    };
+    let models = Models::new(super::cache::store());
+    let generating = Generating { bundle, engine: EngineChoice::Auto, config: &info.defaults };
+    examine_reading(dataset, args.tried, Some((&models, generating)), &cx)
 }
 
 /// The other examples, by the names of their files.

@@ -25,6 +25,7 @@ use crate::domain::{metrics, resample};
 use crate::io::dataset::Dataset;
 use crate::io::names::with_ending;
 use crate::work::compare;
+use crate::work::doubts;
 use crate::work::imprint::{self, imprint_of};
 use crate::work::job::JobCx;
 use crate::work::prediction::Prediction;
@@ -67,6 +68,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let begun = RunReport::begin(&args.out, "generate.json", ids.len())?;
     let mut pairs = Vec::new();
     let mut notes = Notes::default();
+    notes.take(&output, &doubts::notes(&dataset));
     let mut complete = !ids.is_empty();
     let mut scale = Scale::Measured;
     let mut unit = Unit::Meters;

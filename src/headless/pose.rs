@@ -19,6 +19,7 @@ use crate::domain::ambiguity::ambiguity;
 use crate::domain::dataset::PairId;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::pose::{RegistrationChoice, ToolModel};
+use crate::work::doubts;
 use crate::work::job::JobCx;
 use crate::work::labels::{ImprintSource, Labels};
 use crate::work::mask::MaskInputs;
@@ -48,6 +49,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
     let mut notes = Notes::default();
+    notes.take(&output, &doubts::notes(&dataset));
     let mut cases = Vec::new();
     let all_labels = Labels::of(&dataset);
     let mut complete = true;

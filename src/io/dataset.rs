@@ -13,6 +13,7 @@ mod grow;
 mod lab;
 mod pictures;
 mod plausible;
+mod read_as;
 mod tool_scale;
 
 use std::collections::BTreeMap;
@@ -22,6 +23,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use crate::domain::dataset::{Index, PairEntry, PairId, Problem};
 use crate::domain::grid::{DepthMap, Grid};
 use crate::domain::mesh::TriMesh;
+use crate::domain::read_as::ReadAs;
 use crate::domain::rig::{PerPad, Rig};
 use crate::domain::sample::{DepthCamera, Sample};
 use crate::domain::turn::Turn;
@@ -33,6 +35,7 @@ pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
 pub use grow::{Growth, RIG_FILE, cameras_of};
 pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_meters, rig_of};
+pub use read_as::{READ_AS_FILE, write_read_as};
 pub use tool_scale::{
     ToolFile, ToolScale, ToolUnit, UNIT_FILE, read_in_meters, read_tool, said_beside, tool_size, write_beside,
 };
@@ -106,6 +109,8 @@ pub struct Dataset {
     pub tool_scale: Option<ToolScale>,
     /// The sensors that its touches were felt with.
     pub rig: Arc<Rig>,
+    /// How it is read otherwise than it is stored.
+    read_as: Vec<ReadAs>,
     source: Source,
     /// The depth cameras of the rig, for touches that come without a depth picture; read when first needed.
     cameras: OnceLock<PerPad<Arc<DepthCamera>>>,
@@ -152,7 +157,8 @@ impl Dataset {
             .or_else(|| pictures::scan(&folder))
             .or_else(|| lab::scan_flat(&folder))
             .ok_or_else(|| OpenError::NothingFound { path: path.to_owned() })?;
-        Ok(Self::of(scan))
+        let read_as = read_as::of(&scan.root)?;
+        Ok(Self::of(scan).reading(read_as))
     }
 
     fn of(scan: Scan) -> Self {
@@ -168,6 +174,7 @@ impl Dataset {
             problems,
             tool_scale: None,
             rig: scan.rig,
+            read_as: Vec::new(),
             source: scan.source,
             cameras: OnceLock::new(),
             held_units: Arc::default(),
@@ -190,6 +197,7 @@ impl Dataset {
             problems: Vec::new(),
             tool_scale: None,
             rig: Rig::lab(),
+            read_as: Vec::new(),
             source: Source::BuiltIn(set),
             cameras: OnceLock::new(),
             held_units: Arc::default(),
@@ -228,10 +236,12 @@ impl Dataset {
                 Source::Lab(lab) => lab.load(id)?,
                 Source::Pictures(pictures) => pictures.load(id)?,
                 Source::BuiltIn(set) => {
-                    let sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
+                    let mut sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
+                    self.read_otherwise(&mut sample);
                     return Ok(Loaded { sample, invalid: Default::default() });
                 }
             };
+            self.read_otherwise(&mut loaded.sample);
             // The bubble's file is the last one.
             let file = self.pair_files(id).pop().unwrap_or_default();
             plausible::notes(&mut loaded, &file);
@@ -310,7 +320,10 @@ impl Dataset {
     /// As [`Dataset::load`].
     pub fn bubble_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
-            Source::Pictures(pictures) => self.caught(id, || pictures.tile(id, pictures::BUBBLE, laid)),
+            Source::Pictures(pictures) => self.caught(id, || {
+                let tile = pictures.tile(id, pictures::BUBBLE, laid)?;
+                Ok(tile.map(|tile| self.lays().fold(tile, |tile, lay| lay.apply(&tile))))
+            }),
             Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
         }
     }

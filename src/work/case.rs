@@ -31,7 +31,7 @@ use crate::domain::units::{angle_error, mm};
 use crate::infer::bundle::Origin;
 use crate::infer::engine::EngineChoice;
 use crate::io::case_file::{self, CaseContent};
-use crate::io::dataset::{BuiltIn, Dataset, UNIT_FILE};
+use crate::io::dataset::{BuiltIn, Dataset, READ_AS_FILE, UNIT_FILE};
 use crate::io::digest::sha256;
 use crate::io::{files, npz};
 
@@ -382,7 +382,7 @@ fn built_in_name(dataset: &Dataset) -> Option<String> {
     dataset.built_in_set().map(BuiltIn::name)
 }
 
-/// The files that a pair's results depend on: its own, its tool's model with the unit, and the sensors.
+/// The files that a pair's results depend on: its own, its tool's model with the unit, the sensors, and how it is read.
 fn inputs(dataset: &Dataset, pair: PairId) -> Vec<PathBuf> {
     let mut files = dataset.pair_files(pair);
     let tool = dataset.index.get(pair).and_then(|entry| entry.tool.as_deref());
@@ -390,7 +390,8 @@ fn inputs(dataset: &Dataset, pair: PairId) -> Vec<PathBuf> {
         files.push(model.to_owned());
         files.extend(model.parent().map(|folder| folder.join(UNIT_FILE)).filter(|file| file.is_file()));
     }
-    files.extend(dataset.root.as_ref().map(|root| root.join("rig.json")).filter(|file| file.is_file()));
+    let beside = dataset.root.iter().flat_map(|root| ["rig.json", READ_AS_FILE].map(|name| root.join(name)));
+    files.extend(beside.filter(|file| file.is_file()));
     files
 }
 

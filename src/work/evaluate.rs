@@ -25,6 +25,7 @@ use crate::domain::sample::Scale;
 use crate::infer::bundle::Origin;
 use crate::infer::engine::{EngineChoice, threads};
 use crate::io::dataset::Dataset;
+use crate::work::doubts;
 use crate::work::error::TaskError;
 use crate::work::job::JobCx;
 use crate::work::mask::MaskChoice;
@@ -170,6 +171,7 @@ pub fn evaluate(
     let mut skipped = Vec::new();
     let mut scores = models.empty_scores();
     let mut findings = Findings::default();
+    findings.extend(doubts::notes(dataset));
     let (mut done, mut scale) = (total - fresh, Scale::Measured);
     let mut whole = work.iter();
     load::ahead(dataset, setup, &todo, cx, |batch| {

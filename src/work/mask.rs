@@ -14,13 +14,16 @@ use super::error::TaskError;
 use super::labels::{HandMask, ImprintOf, MaskPlace, PairLabels};
 use crate::domain::bits::Bits;
 use crate::domain::contact::{self, ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
-use crate::domain::grid::DepthMap;
+use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::label::{CadPose, Provenance};
 use crate::domain::pose::ToolModel;
 use crate::domain::rig::{PadId, PerPad, Rig};
 use crate::domain::sample::{PadTouch, Sample};
+use crate::domain::units::text_mm;
 
 const WHAT: &str = "Contact mask";
+/// What is felt is pushed in by at least so much more than what lies around it, meters.
+const FELT_M: f32 = 0.000_5;
 
 /// Where a mask comes from when nobody drew one.
 #[derive(
@@ -248,8 +251,11 @@ pub fn without_model(
             let tool = inputs.tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
             let truth = inputs.sample.grasp_from_object;
             let truth = truth.ok_or_else(|| TaskError::new(WHAT, "the true pose is not known"))?;
-            contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), f64::from(limit_m.get()))
-                .map_err(|err| TaskError::from_error(WHAT, &err))?
+            let within_m = f64::from(limit_m.get());
+            let mask = contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), within_m)
+                .map_err(|err| TaskError::from_error(WHAT, &err))?;
+            felt(imprint, &mask)?;
+            mask
         }
         MaskRecipe::Truth => {
             let truth = touch
@@ -260,6 +266,19 @@ pub fn without_model(
         MaskRecipe::Unet(..) => return Err(TaskError::new(WHAT, "the mask model is needed")),
     };
     Ok(contact::settled(imprint, mask))
+}
+
+/// Refuses a mask of the CAD model at the true pose where nothing was felt: it would say the pose that it was made from.
+fn felt(imprint: &DepthMap, mask: &Mask) -> Result<(), TaskError> {
+    let above = contact::stands_out(imprint, mask).filter(|above| *above < FELT_M);
+    // A flat imprint has no contact, whatever the mask.
+    let Some(above) = above.filter(|_| contact::rise(imprint) >= contact::FLAT_M) else { return Ok(()) };
+    let why = format!(
+        "where the CAD model lies at the true pose the imprint is {} above what lies around it: nothing was felt there, and the \
+         mask would only repeat the pose",
+        text_mm(f64::from(above))
+    );
+    Err(TaskError::new(WHAT, why).with_hint("Check pose, CAD model and imprint, for instance with the doctor."))
 }
 
 /// What the masks of a pair are made of, from the keys of each pad in turn; see [`Contact::made_of`].
@@ -323,7 +342,6 @@ impl Contact {
 mod tests {
     use super::*;
     use crate::domain::diffusion::GenerateConfig;
-    use crate::domain::grid::Mask;
     use crate::domain::postprocess::ShiftMode;
     use crate::domain::rig::lab;
 

@@ -94,6 +94,8 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch bench cases", How::Run(&[("200", "4")], "", &[0])),
     ("touch2touch bench dataset", How::Run(&[], "--pairs 20 --grasps 1", &[0])),
     ("touch2touch cache", How::Run(&[], "", &[0])),
+    ("touch2touch read-as", How::Run(&[], "", &[0])),
+    ("touch2touch bench doctor", How::Run(&[], "--sets 1 --sound 1 --pairs 1 --only theta --no-generator", &[0])),
     ("touch2touch unit", How::Run(&[], "", &[0])),
     ("touch2touch doctor", How::Run(&[], "", &[0])),
     ("touch2touch bundle check", How::Run(&[], "", &[0])),

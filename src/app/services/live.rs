@@ -33,6 +33,7 @@ use crate::io::{atomic, files, folders, names};
 use crate::work::adapt::{self, AdaptSetup, Adapted};
 use crate::work::bundles::{self, BundleInfo};
 use crate::work::case::{self, Case, CaseSetup, Held};
+use crate::work::doubts;
 use crate::work::error::TaskError;
 use crate::work::evaluate::{self, Evaluation, Setup};
 use crate::work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
@@ -111,7 +112,8 @@ fn open_recovering(place: &Place, waiting: Option<&Path>) -> Result<LiveSource, 
         Place::Path(path) => Dataset::open(path)
             .map_err(|err| TaskError::from_error(format!("Open {place}"), &err).with_hint(err.hint()))?,
     };
-    let mut problems = dataset.problems.clone();
+    let mut problems = doubts::notes(&dataset);
+    problems.extend(dataset.problems.iter().cloned());
     let labels = Labels::of(&dataset);
     let recovered = waiting.map(|waiting| recover(&dataset, &labels, waiting)).unwrap_or_default();
     let mut reviews = labels.reviews();

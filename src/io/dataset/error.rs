@@ -24,6 +24,14 @@ pub enum OpenError {
         /// The folder.
         path: PathBuf,
     },
+    /// How it is to be read is not said so that it can be understood.
+    #[error("how the data are to be read is not understood: {reason} ({})", file.display())]
+    ReadAs {
+        /// The file that says it.
+        file: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
 }
 
 impl OpenError {
@@ -31,6 +39,7 @@ impl OpenError {
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Io { .. } => "check the path and its permissions",
+            Self::ReadAs { .. } => "correct that file, or remove it to read the data as they are stored",
             Self::NothingFound { .. } => {
                 "open the folder that holds train/, test/ and tools_stls/, a folder of GelSlim .pt files, of \
                  NAME_gelslim.png (with NAME_bubble.png), or of NAME_touch.png with reference.png"
@@ -40,7 +49,7 @@ impl OpenError {
 
     /// The same as an entry of a problem list.
     pub fn to_problem(&self) -> Problem {
-        let (Self::Io { path, .. } | Self::NothingFound { path }) = self;
+        let (Self::Io { path, .. } | Self::NothingFound { path } | Self::ReadAs { file: path, .. }) = self;
         Problem { file: path.clone(), what: self.to_string(), hint: self.hint().into() }
     }
 }

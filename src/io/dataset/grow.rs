@@ -56,6 +56,7 @@ impl Dataset {
         let known: BTreeMap<&str, usize> =
             self.index.pairs.iter().enumerate().map(|(at, entry)| (entry.name.as_str(), at)).collect();
         let mut dataset = Self { problems: fresh.problems.clone(), cameras: OnceLock::new(), ..self.clone() };
+        dataset.problems.extend(dataset.said_read_as());
         if let Some(cameras) = self.cameras.get().filter(|cameras| !cameras.is_empty()) {
             dataset.cameras.set(cameras.clone()).ok();
         }

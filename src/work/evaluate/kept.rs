@@ -18,6 +18,7 @@ use super::{Setup, ToolWork};
 use crate::domain::catalog::pattern_of;
 use crate::domain::dataset::{PairEntry, PairId, Problem};
 use crate::domain::evaluation::{GraspScore, Group};
+use crate::domain::read_as::list;
 use crate::domain::sample::Scale;
 use crate::infer::sheets::Sheets;
 use crate::io::dataset::{Dataset, SourceKind, UNIT_FILE};
@@ -239,7 +240,7 @@ fn tool_part(dataset: &Dataset, tool: Option<&str>, files: &Files) -> Option<Str
 fn key(dataset: &Dataset, id: PairId, tool: &str, labels: &Labeled, files: &Files) -> Option<String> {
     let entry = dataset.index.get(id)?;
     let found = dataset.scored_files(id);
-    let mut text = tool.to_owned();
+    let mut text = format!("{tool} {}", list(dataset.read_as()));
     if found.is_empty() {
         // Built in: the program and the name say it all.
         write!(text, "\n{}\n{}", dataset.title, entry.name).ok()?;

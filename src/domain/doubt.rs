@@ -1,0 +1,204 @@
+//! What is wrong with data that look right, found by trying: [`judge`].
+//!
+//! Fingers swapped, pictures mirrored, another tool's CAD model, the untouched image in place of the touched one: nothing
+//! in a file shows it, and every figure that is computed from it looks like one. Each leaves a trace in a handful of pairs
+//! together: read otherwise ([`ReadAs`]), the imprints lie on the CAD model at the true pose, the image without contact
+//! stays the same from pair to pair, the light comes from where it does, the prediction looks like the measurement. A
+//! reading is said where it explains the pairs and what is stored does not.
+//!
+//! * `fit`, `imprints`: what was pushed in against the tool's outline at the true pose, or where that is not known at the
+//!   registered one;
+//! * `images`: touched against untouched images, over all pairs;
+//! * `predictions`: what a generator makes of the images against what was measured.
+
+mod fit;
+mod images;
+mod imprints;
+mod predictions;
+
+use std::collections::BTreeMap;
+
+use super::mesh::TriMesh;
+use super::read_as::ReadAs;
+use super::rig::PerPad;
+use super::sample::{PadTouch, Reading, Sample};
+
+pub use imprints::Axes;
+pub use predictions::{Placed, likeness};
+
+/// A pair that is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct Felt<'a> {
+    /// Its tool, where known.
+    pub tool: Option<&'a str>,
+    /// What was felt, as it is stored.
+    pub sample: &'a Sample,
+}
+
+/// What is wrong.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cause {
+    /// It is stored so that it must be read otherwise.
+    Stored(ReadAs),
+    /// CAD models are those of other tools: the tool, and whose model it has.
+    OtherTool(Vec<(String, String)>),
+    /// CAD models have other axes: the tools, and how they are to be turned.
+    Axes(Vec<String>, Axes),
+    /// CAD models of these tools are not theirs, and no other one is.
+    NotItsModel(Vec<String>),
+    /// The touched image is the untouched one, pixel by pixel.
+    SameImages,
+    /// The untouched image is a single color.
+    NoReference,
+    /// The color images are gray.
+    Gray,
+    /// Imprints do not lie on their CAD models, and nothing that was tried explains it.
+    Unexplained,
+}
+
+impl Cause {
+    /// A word for tables.
+    pub fn key(&self) -> String {
+        match self {
+            Self::Stored(read_as) => read_as.to_string(),
+            Self::OtherTool(_) => "other-tool".into(),
+            Self::Axes(..) => "tool-axes".into(),
+            Self::NotItsModel(_) => "not-its-model".into(),
+            Self::SameImages => "same-images".into(),
+            Self::NoReference => "no-reference".into(),
+            Self::Gray => "gray".into(),
+            Self::Unexplained => "unexplained".into(),
+        }
+    }
+}
+
+/// A doubt about a data set: what seems wrong, by which figures, and what to do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Doubt {
+    /// What it is.
+    pub cause: Cause,
+    /// In words, with the figures that speak for it.
+    pub what: String,
+    /// What to do.
+    pub hint: String,
+}
+
+impl Doubt {
+    /// The reading that makes it right, where there is one.
+    pub fn read_as(&self) -> Option<ReadAs> {
+        match self.cause {
+            Cause::Stored(read_as) => Some(read_as),
+            _ => None,
+        }
+    }
+
+    fn stored(read_as: ReadAs, figures: &str) -> Self {
+        Self {
+            cause: Cause::Stored(read_as),
+            what: format!("{}: {figures}", read_as.mistake()),
+            hint: format!("correct what writes the files, or read them so with --read-as {read_as}"),
+        }
+    }
+}
+
+/// Predictions of the images of some pairs; see [`Placed`]. One for each sample, in order; none where there is no
+/// generator.
+pub type Predict<'a> = &'a mut dyn FnMut(&[&Sample]) -> Option<Vec<Placed>>;
+
+/// What is wrong with data of which these pairs are a handful. `tools` has the CAD models by tool, in meters.
+///
+/// A doubt of the imprints is taken for true before the images are looked at, and so on.
+pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Option<Predict<'_>>) -> Vec<Doubt> {
+    let mut doubts = Vec::new();
+    let depths: Vec<Sample> = felt.iter().map(|felt| only(felt.sample, false)).collect();
+    let named: Vec<Option<&str>> = felt.iter().map(|felt| felt.tool).collect();
+    doubts.extend(imprints::judge(&depths, &named, tools));
+    let images = images::judge(felt);
+    let sound = images.is_none();
+    doubts.extend(images);
+    // Without images to go by a prediction says nothing.
+    let readable = sound || doubts.iter().all(|doubt| doubt.read_as().is_some());
+    let imprints_known = doubts.iter().all(|doubt| doubt.cause != Cause::Unexplained);
+    if let Some(predict) = predict.filter(|_| readable && imprints_known) {
+        let readings: Vec<ReadAs> = doubts.iter().filter_map(Doubt::read_as).collect();
+        let read: Vec<Sample> = felt.iter().map(|felt| ReadAs::all(&readings, felt.sample)).collect();
+        doubts.extend(predictions::judge(&read, sound, predict));
+    }
+    doubts
+}
+
+/// A sample with the readings of one kind of sensor alone: what is tried on it need not copy the other's pictures.
+fn only(sample: &Sample, color: bool) -> Sample {
+    let pads: PerPad<PadTouch> = sample
+        .pads
+        .iter()
+        .map(|touch| {
+            let touch = touch.as_ref()?;
+            let mut kept = PadTouch::default();
+            kept.lent.clone_from(&touch.lent);
+            for (sensor, reading) in touch.readings() {
+                if matches!(reading, Reading::Color(_)) == color {
+                    kept.set(*sensor, reading.clone());
+                }
+            }
+            Some(kept)
+        })
+        .collect();
+    let Sample { rig, grasp_from_object, scale, laid, reading, .. } = sample;
+    Sample {
+        rig: rig.clone(),
+        pads,
+        grasp_from_object: *grasp_from_object,
+        scale: *scale,
+        laid: *laid,
+        reading: *reading,
+        notes: Vec::new(),
+    }
+}
+
+/// The value in the middle; `None` of nothing.
+fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
+    let mut values: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// How much better pairs are under a reading than as they are stored.
+struct Gain {
+    /// Mean of the score when read so.
+    read: f64,
+    /// Mean by which that is more.
+    mean: f64,
+    /// Pairs where it is clearly more.
+    better: usize,
+    /// Pairs where it is clearly more or less.
+    decided: usize,
+}
+
+/// Scores that differ by no more are the same.
+const SAME: f64 = 0.03;
+/// Share of the pairs that tell anything, which must tell the same.
+const AGREED: f64 = 0.8;
+
+impl Gain {
+    /// Between the scores of the same pairs as stored and read otherwise.
+    fn between(stored: &[f64], read: &[f64]) -> Self {
+        let gains: Vec<f64> = read.iter().zip(stored).map(|(read, stored)| read - stored).collect();
+        let n = gains.len().max(1) as f64;
+        Self {
+            read: read.iter().sum::<f64>() / n,
+            mean: gains.iter().sum::<f64>() / n,
+            better: gains.iter().filter(|gain| **gain > SAME).count(),
+            decided: gains.iter().filter(|gain| gain.abs() > SAME).count(),
+        }
+    }
+
+    /// Whether the reading explains the pairs: a mean score of at least `score`, by `gain` more than as stored, and nearly
+    /// all pairs agree.
+    fn explains(&self, score: f64, gain: f64) -> bool {
+        self.read >= score && self.mean >= gain && self.better as f64 >= AGREED * self.decided as f64
+    }
+}
+
+#[cfg(test)]
+mod tests;

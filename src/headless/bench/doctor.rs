@@ -1,0 +1,213 @@
+//! `touch2touch bench doctor`: how surely a data set that is stored wrongly is told from a sound one, and what is wrong with
+//! it.
+
+mod kinds;
+
+use clap::Args;
+use rayon::prelude::*;
+use serde::Serialize;
+use strum::IntoEnumIterator as _;
+
+use self::kinds::{Kind, Set, kinds};
+use super::Machine;
+use crate::domain::catalog::{ToolSpec, tools};
+use crate::domain::doubt::{Doubt, Felt, judge};
+use crate::domain::rig::Rig;
+use crate::domain::sim::{Condition, SimConfig, random_grasp};
+use crate::headless::args::JsonArgs;
+use crate::headless::predict::RuntimeArg;
+use crate::headless::{Output, VerbResult};
+use crate::work::bundles::{self, BundleKind};
+use crate::work::doubts::{Generator, PAIRS, placed};
+use crate::work::job::JobCx;
+use crate::work::models::Models;
+use crate::work::predict::Generating;
+
+/// Arguments of `bench doctor`.
+#[derive(Debug, Args)]
+pub(in crate::headless) struct DoctorArgs {
+    /// Pairs in a data set.
+    #[arg(long, default_value_t = PAIRS as u32, value_parser = clap::value_parser!(u32).range(1..=200))]
+    pairs: u32,
+    /// Data sets that are spoilt in each way, each of other tools and grasps.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    sets: u32,
+    /// Sound data sets of each condition.
+    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    sound: u32,
+    /// Only ways with this in their name.
+    #[arg(long, value_name = "TEXT")]
+    only: Option<String>,
+    /// Seed of grasps, noise and sensors.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Without predictions.
+    #[arg(long)]
+    no_generator: bool,
+    /// Poses are not known.
+    #[arg(long)]
+    no_poses: bool,
+    /// Which engine runs the generator.
+    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    runtime: RuntimeArg,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Serialize)]
+struct Row {
+    /// How it was stored.
+    kind: String,
+    sets: usize,
+    /// Sets where that was said, and nothing else.
+    named: usize,
+    /// Sets where something was said.
+    noticed: usize,
+    /// What was said otherwise.
+    otherwise: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Report {
+    machine: Machine,
+    pairs: u32,
+    spoilt: Vec<Row>,
+    sound: Vec<Row>,
+    /// Of all spoilt sets, those that were named rightly, and those noticed.
+    named_share: f64,
+    noticed_share: f64,
+    /// Sound sets, and those of which something was said.
+    sound_sets: usize,
+    false_alarms: usize,
+}
+
+pub(in crate::headless) fn run(args: &DoctorArgs) -> VerbResult {
+    let machine = Machine::now();
+    let kinds: Vec<Kind> =
+        kinds().into_iter().filter(|kind| args.only.as_ref().is_none_or(|text| kind.name.contains(text))).collect();
+    let conditions = Condition::iter().count() * args.sound as usize;
+    let output = Output::new(args.json.common(), "judging", kinds.len() * args.sets as usize + conditions);
+    let models = Models::new(None);
+    let found = (!args.no_generator).then(|| bundles::find(&[]).take(BundleKind::Generator, None, &Rig::lab()));
+    let bundle = found.transpose()?;
+    let config = bundle.as_ref().and_then(|bundle| Some(bundle.generator.as_ref()?.defaults));
+    let generator: Option<Generator<'_>> = bundle
+        .as_ref()
+        .zip(config.as_ref())
+        .map(|(bundle, config)| (&models, Generating { bundle, engine: args.runtime.choice(), config }));
+    let mut spoilt: Vec<Row> = kinds.iter().map(|kind| Row::new(&kind.name)).collect();
+    for number in 0..args.sets {
+        let sound = sound_set(args, Condition::Plain, number);
+        let judged: Vec<Vec<Doubt>> = kinds
+            .par_iter()
+            .map(|kind| {
+                let doubts = doubts(&kind.of(&sound), generator);
+                output.step(&kind.name);
+                doubts
+            })
+            .collect();
+        for ((row, kind), doubts) in spoilt.iter_mut().zip(&kinds).zip(judged) {
+            row.add(&doubts, |doubt| kind.is(&doubt.cause));
+        }
+    }
+    let mut sound: Vec<Row> = Vec::new();
+    for condition in Condition::iter() {
+        let mut row = Row::new(condition.key());
+        let judged: Vec<Vec<Doubt>> = (0..args.sound)
+            .into_par_iter()
+            .map(|number| {
+                let doubts = doubts(&sound_set(args, condition, number), generator);
+                output.step(condition.key());
+                doubts
+            })
+            .collect();
+        judged.iter().for_each(|doubts| row.add(doubts, |_| false));
+        sound.push(row);
+    }
+    let share = |of: fn(&Row) -> usize| {
+        spoilt.iter().map(of).sum::<usize>() as f64 / spoilt.iter().map(|row| row.sets).sum::<usize>().max(1) as f64
+    };
+    let report = Report {
+        machine,
+        pairs: args.pairs,
+        named_share: share(|row| row.named),
+        noticed_share: share(|row| row.noticed),
+        sound_sets: sound.iter().map(|row| row.sets).sum(),
+        false_alarms: sound.iter().map(|row| row.noticed).sum(),
+        spoilt,
+        sound,
+    };
+    args.json.write(&report)?;
+    output.finish(&report, || text(&report))?;
+    Ok(true)
+}
+
+impl Row {
+    fn new(kind: &str) -> Self {
+        Self { kind: kind.to_owned(), sets: 0, named: 0, noticed: 0, otherwise: Vec::new() }
+    }
+
+    fn add(&mut self, doubts: &[Doubt], right: impl Fn(&Doubt) -> bool) {
+        self.sets += 1;
+        self.noticed += usize::from(!doubts.is_empty());
+        self.named += usize::from(!doubts.is_empty() && doubts.iter().all(&right));
+        self.otherwise.extend(doubts.iter().filter(|doubt| !right(doubt)).map(|doubt| doubt.cause.key()));
+    }
+}
+
+/// A sound data set: every other one of other sensors than the nominal ones, each of other tools.
+fn sound_set(args: &DoctorArgs, condition: Condition, number: u32) -> Set {
+    let config =
+        if number % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(args.seed + u64::from(number)) };
+    let all = tools();
+    let mut set = Set { pairs: Vec::new(), tools: Default::default() };
+    for at in 0..u64::from(args.pairs) {
+        let pick = (at + u64::from(number) * u64::from(args.pairs)) as usize % all.len();
+        let spec: ToolSpec = condition.tool(&all[pick], at);
+        let seed = args.seed.wrapping_mul(0x9e37_79b9) ^ (u64::from(number) << 32) ^ at;
+        let mut sample = condition.simulate(&spec, random_grasp(seed), seed, &config);
+        if args.no_poses {
+            sample.grasp_from_object = None;
+        }
+        set.tools.entry(spec.name.clone()).or_insert_with(|| spec.mesh());
+        set.pairs.push((spec.name, sample));
+    }
+    set
+}
+
+fn doubts(set: &Set, generator: Option<Generator<'_>>) -> Vec<Doubt> {
+    let felt: Vec<Felt<'_>> = set.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample }).collect();
+    match generator {
+        Some(generator) => {
+            judge(&felt, &set.tools, Some(&mut |samples| placed(samples, generator, &JobCx::unwatched())))
+        }
+        None => judge(&felt, &set.tools, None),
+    }
+}
+
+fn text(report: &Report) -> String {
+    let mut text = format!("{}\n{} pairs in each data set\n\n", report.machine.text(), report.pairs);
+    let rows = |text: &mut String, rows: &[Row]| {
+        for row in rows {
+            let mut otherwise = row.otherwise.clone();
+            otherwise.sort();
+            otherwise.dedup();
+            let said = if otherwise.is_empty() { String::new() } else { format!("  also: {}", otherwise.join(", ")) };
+            *text += &format!(
+                "{:<66} {:>2} of {:>2} named, {:>2} noticed{said}\n",
+                row.kind, row.named, row.sets, row.noticed
+            );
+        }
+    };
+    rows(&mut text, &report.spoilt);
+    text += "\nsound, by condition\n";
+    rows(&mut text, &report.sound);
+    text += &format!(
+        "\n{:.1} % of the spoilt sets are named rightly, {:.1} % noticed; {} of {} sound ones are doubted\n",
+        100.0 * report.named_share,
+        100.0 * report.noticed_share,
+        report.false_alarms,
+        report.sound_sets
+    );
+    text
+}

@@ -1,0 +1,215 @@
+//! Ways in which a data set is stored wrongly and still looks right: [`kinds`].
+
+use std::collections::BTreeMap;
+
+use crate::domain::doubt::Cause;
+use crate::domain::grid::RgbGrid;
+use crate::domain::mesh::TriMesh;
+use crate::domain::read_as::{Depths, Images, Lay, ReadAs, Stored};
+use crate::domain::sample::{ColorTouch, PadTouch, Sample};
+
+/// Pairs with their tools, and the tools' CAD models.
+#[derive(Clone)]
+pub(super) struct Set {
+    pub(super) pairs: Vec<(String, Sample)>,
+    pub(super) tools: BTreeMap<String, TriMesh>,
+}
+
+/// One way to store a data set wrongly.
+pub(super) struct Kind {
+    pub(super) name: String,
+    spoil: Box<dyn Fn(&mut Set) + Send + Sync>,
+    /// The causes that name it.
+    named: Vec<String>,
+}
+
+impl Kind {
+    /// A copy of a sound set, stored so.
+    pub(super) fn of(&self, sound: &Set) -> Set {
+        let mut set = sound.clone();
+        (self.spoil)(&mut set);
+        set
+    }
+
+    /// Whether this is what is wrong.
+    pub(super) fn is(&self, cause: &Cause) -> bool {
+        self.named.contains(&cause.key())
+    }
+}
+
+fn kind(name: &str, named: &[&str], spoil: impl Fn(&mut Set) + Send + Sync + 'static) -> Kind {
+    let named = named.iter().map(|&name| name.to_owned()).collect();
+    Kind { name: name.to_owned(), spoil: Box::new(spoil), named }
+}
+
+/// What a reading undoes, by its opposite.
+fn stored(name: &str, undone_by: &[&str], mistake: ReadAs) -> Kind {
+    kind(name, undone_by, move |set| set.pairs.iter_mut().for_each(|(_, sample)| mistake.apply(sample)))
+}
+
+/// All ways.
+pub(super) fn kinds() -> Vec<Kind> {
+    imprints().into_iter().chain(models()).chain(images()).collect()
+}
+
+fn imprints() -> Vec<Kind> {
+    let mut all = vec![stored("theta negated", &["negate-theta"], ReadAs::NegateTheta)];
+    for (depths, of) in [(Depths::Imprints, "imprints"), (Depths::Whole, "imprints and references")] {
+        let swap = ["swap-fingers", "whole-swap-fingers"];
+        all.push(stored(&format!("{of} of the fingers swapped"), &swap, ReadAs::SwapFingers(depths)));
+        for (lay, key) in
+            [(Lay::MirrorColumns, "mirror-columns"), (Lay::MirrorRows, "mirror-rows"), (Lay::Turn, "turn")]
+        {
+            let whole = format!("whole-{key}");
+            all.push(stored(&format!("{of}: {key}"), &[key, &whole], ReadAs::Lay(depths, lay)));
+        }
+        for (factor, undone) in [(0.1, "10"), (0.5, "2"), (2.0, "0.5"), (10.0, "0.1")] {
+            let named = [format!("scale-depth={undone}"), format!("whole-scale-depth={undone}")];
+            all.push(stored(&format!("{of} x {factor}"), &[&named[0], &named[1]], ReadAs::Scale(depths, factor)));
+        }
+    }
+    for (factor, undone) in [(0.5, "2"), (0.8, "1.25"), (1.25, "0.8"), (2.0, "0.5")] {
+        let named = format!("scale-camera={undone}");
+        all.push(stored(&format!("K x {factor}"), &[&named], ReadAs::ScaleCamera(factor)));
+    }
+    all
+}
+
+fn models() -> Vec<Kind> {
+    let mut all = Vec::new();
+    for step in [1usize, 2, 3] {
+        all.push(kind(&format!("CAD models of other tools, {step} further"), &["other-tool"], move |set| {
+            let meshes: Vec<TriMesh> = set.tools.values().cloned().collect();
+            let count = meshes.len();
+            set.tools.values_mut().enumerate().for_each(|(i, mesh)| *mesh = meshes[(i + step) % count].clone());
+        }));
+    }
+    all.push(kind("two CAD models exchanged", &["other-tool"], |set| {
+        let names: Vec<String> = set.tools.keys().take(2).cloned().collect();
+        if let [a, b] = &names[..] {
+            let (first, second) = (set.tools[a].clone(), set.tools[b].clone());
+            set.tools.insert(a.clone(), second);
+            set.tools.insert(b.clone(), first);
+        }
+    }));
+    all.push(kind("one CAD model over another", &["other-tool", "not-its-model"], |set| {
+        let meshes: Vec<TriMesh> = set.tools.values().take(2).cloned().collect();
+        if let (Some(first), [_, other]) = (set.tools.values_mut().next(), &meshes[..]) {
+            *first = other.clone();
+        }
+    }));
+    let axes: [(&str, fn(glam::DVec3) -> glam::DVec3); 9] = [
+        ("mirrored along y", |p| glam::DVec3::new(p.x, -p.y, p.z)),
+        ("mirrored along z", |p| glam::DVec3::new(p.x, p.y, -p.z)),
+        ("turned by 180 degrees about x", |p| glam::DVec3::new(p.x, -p.y, -p.z)),
+        ("turned by 90 degrees about x", |p| glam::DVec3::new(p.x, -p.z, p.y)),
+        ("y and z exchanged", |p| glam::DVec3::new(p.x, p.z, p.y)),
+        ("x and y exchanged", |p| glam::DVec3::new(p.y, p.x, p.z)),
+        ("x and z exchanged", |p| glam::DVec3::new(p.z, p.y, p.x)),
+        ("z, x, y", |p| glam::DVec3::new(p.z, p.x, p.y)),
+        ("y, z, x", |p| glam::DVec3::new(p.y, p.z, p.x)),
+    ];
+    for (name, turn) in axes {
+        all.push(kind(&format!("CAD models: {name}"), &["tool-axes"], move |set| {
+            for vertex in set.tools.values_mut().flat_map(|mesh| &mut mesh.vertices) {
+                *vertex = turn(*vertex);
+            }
+        }));
+    }
+    all
+}
+
+/// A way to store the color images of all touches wrongly, from touched and untouched image.
+fn images_of(name: &str, named: &[&str], change: fn(&RgbGrid, &RgbGrid) -> (RgbGrid, RgbGrid)) -> Kind {
+    kind(name, named, move |set| {
+        for color in set.pairs.iter_mut().flat_map(|(_, sample)| sample.pads.iter_mut().flatten()) {
+            let Some(color) = PadTouch::color_mut(color) else { continue };
+            let Some(images) = &color.images else { continue };
+            let (raw, reference) = change(&images.raw, &images.reference);
+            if let Some(changed) = ColorTouch::from_images(raw, reference) {
+                *color = changed;
+            }
+        }
+    })
+}
+
+fn each(image: &RgbGrid, change: impl Fn(f32) -> f32) -> RgbGrid {
+    image.map(|pixel| pixel.map(&change))
+}
+
+fn difference(a: &RgbGrid, b: &RgbGrid, change: impl Fn(f32) -> f32) -> RgbGrid {
+    RgbGrid::from_fn(a.width(), a.height(), |x, y| std::array::from_fn(|c| change(a[(x, y)][c] - b[(x, y)][c])))
+}
+
+fn gray(image: &RgbGrid) -> RgbGrid {
+    image.map(|p| [0.299 * p[0] + 0.587 * p[1] + 0.114 * p[2]; 3])
+}
+
+fn black(image: &RgbGrid) -> RgbGrid {
+    each(image, |_| 0.0)
+}
+
+/// As 8 bits with a sign hold it.
+fn signed(v: f32) -> f32 {
+    (v + 128.0).rem_euclid(256.0) - 128.0
+}
+
+fn images() -> Vec<Kind> {
+    let gelslims = |name: &str, mistake: ReadAs| stored(&format!("GelSlims: {name}"), &[&mistake.to_string()], mistake);
+    let signs = ReadAs::ImageIsDifference(Stored::Signed).to_string();
+    let grays = ReadAs::ImageIsDifference(Stored::Gray).to_string();
+    let wraps = ReadAs::ImageIsDifference(Stored::Wrapped).to_string();
+    let scale = |which| ReadAs::Image255(which).to_string();
+    let mut all = vec![
+        gelslims("fingers swapped", ReadAs::ImageSwapFingers),
+        gelslims("mirrored left to right", ReadAs::ImageLay(Lay::MirrorColumns)),
+        gelslims("mirrored top to bottom", ReadAs::ImageLay(Lay::MirrorRows)),
+        gelslims("turned by 180 degrees", ReadAs::ImageLay(Lay::Turn)),
+        gelslims("both BGR", ReadAs::ImageBgr(Images::Both)),
+        gelslims("touched ones BGR", ReadAs::ImageBgr(Images::Touch)),
+        gelslims("untouched ones BGR", ReadAs::ImageBgr(Images::Reference)),
+        gelslims("touched and untouched swapped", ReadAs::ImageSwapReference),
+        images_of("GelSlims: both 0..1", &[&scale(Images::Both)], |a, b| {
+            (each(a, |v| v / 255.0), each(b, |v| v / 255.0))
+        }),
+        images_of("GelSlims: touched ones 0..1", &[&scale(Images::Touch)], |a, b| (each(a, |v| v / 255.0), b.clone())),
+        images_of("GelSlims: untouched ones 0..1", &[&scale(Images::Reference)], |a, b| {
+            (a.clone(), each(b, |v| v / 255.0))
+        }),
+        images_of("GelSlims: untouched is touched", &["same-images"], |a, _| (a.clone(), a.clone())),
+        images_of("GelSlims: touched is untouched", &["same-images"], |_, b| (b.clone(), b.clone())),
+        images_of("GelSlims: no untouched image", &["no-reference"], |a, b| (a.clone(), black(b))),
+        images_of("GelSlims: white untouched image", &["no-reference"], |a, b| (a.clone(), each(b, |_| 255.0))),
+        images_of("GelSlims: gray", &["gray"], |a, b| (gray(a), gray(b))),
+    ];
+    let differences: [(&str, &str, fn(f32) -> f32); 3] = [
+        ("signed", &signs, |v| v),
+        ("gray added", &grays, |v| (v + 128.0).clamp(0.0, 255.0)),
+        ("wrapped", &wraps, |v| v.rem_euclid(256.0)),
+    ];
+    for (name, key, store) in differences {
+        for (beside, reference) in [("untouched image kept", 1.0), ("no untouched image", 0.0)] {
+            all.push(kind(&format!("GelSlims: differences stored, {name}, {beside}"), &[key], move |set| {
+                for color in set.pairs.iter_mut().flat_map(|(_, sample)| sample.pads.iter_mut().flatten()) {
+                    let Some(color) = PadTouch::color_mut(color) else { continue };
+                    let Some(images) = &color.images else { continue };
+                    let stored = difference(&images.raw, &images.reference, store);
+                    let untouched = each(&images.reference, |v| v * reference);
+                    if let Some(changed) = ColorTouch::from_images(stored, untouched) {
+                        *color = changed;
+                    }
+                }
+            }));
+        }
+    }
+    let unwrap = ReadAs::ImageUnwrap.to_string();
+    all.extend([
+        images_of("GelSlims: 8 bits with a sign", &[&unwrap], |a, b| (each(a, signed), each(b, signed))),
+        images_of("GelSlims: touched ones in 8 bits with a sign", &[&unwrap], |a, b| (each(a, signed), b.clone())),
+        images_of("GelSlims: brightened by 90 and wrapped", &[&unwrap], |a, b| {
+            let brighter = |v: f32| (v + 90.0).rem_euclid(256.0);
+            (each(a, brighter), each(b, brighter))
+        }),
+    ]);
+    all
+}
