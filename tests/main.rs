@@ -20,6 +20,7 @@ mod kill;
 mod layers;
 mod models;
 mod pose;
+mod rigs;
 mod rules;
 mod sim;
 mod stability;

@@ -15,7 +15,7 @@ use super::Common;
 use crate::domain::pose::{Registration, RegistrationChoice};
 use crate::domain::rig::{PadId, Rig};
 use crate::io::atomic;
-use crate::io::dataset::{Dataset, ToolScale};
+use crate::io::dataset::{Dataset, OpenError, ToolScale};
 
 /// The data set that a verb reads.
 #[derive(Debug, Clone, Args)]
@@ -36,9 +36,16 @@ impl DatasetArgs {
         self.path.as_deref().or(self.input.as_deref()).unwrap_or(Path::new(""))
     }
 
-    /// The folder's data set, or the built-in one of that name.
+    /// The folder's data set, or the built-in one of that name; says first what is wrong with it.
     pub(super) fn open(&self) -> anyhow::Result<Dataset> {
-        Dataset::open(self.path()).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))
+        let dataset = self.open_unsaid().map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
+        super::notes::say_problems(&dataset);
+        Ok(dataset)
+    }
+
+    /// [`Self::open`] for a verb that says itself what is wrong.
+    pub(super) fn open_unsaid(&self) -> Result<Dataset, OpenError> {
+        Dataset::open(self.path())
     }
 
     /// [`Self::open`] with the unit of the CAD models as the command line has it.

@@ -8,7 +8,8 @@ use serde::Serialize;
 use super::args::DatasetArgs;
 use super::{Common, Output, VerbResult};
 use crate::domain::findings::Finding;
-use crate::io::doctor;
+use crate::io::dataset::OpenError;
+use crate::io::doctor::{self, DoctorReport};
 
 /// Arguments of `doctor`. Findings that differ only in file, finger or numbers are one entry, in the text and in the JSON
 /// (`problems`: `file`, `what`, `hint` of the first, `count`, `examples`).
@@ -30,19 +31,28 @@ struct Report<'a> {
 
 /// Done means examined: problems found are the result, not a failure.
 pub(super) fn run(args: &DoctorArgs) -> VerbResult {
-    let dataset = args.dataset.open()?;
-    let output = Output::new(args.common, "examining", dataset.index.pairs.len());
-    let report = doctor::examine(&dataset, &mut |done, total| {
-        output.set(done, total);
-        ControlFlow::Continue(())
-    });
+    let output = Output::new(args.common, "examining", 0);
+    // Without knowing the sensors, none of its pairs can be examined.
+    let (title, report, examined) = match args.dataset.open_unsaid() {
+        Ok(dataset) => {
+            let report = doctor::examine(&dataset, &mut |done, total| {
+                output.set(done, total);
+                ControlFlow::Continue(())
+            });
+            (dataset.title, report, true)
+        }
+        Err(err @ OpenError::Rig { .. }) => {
+            (args.dataset.path().display().to_string(), DoctorReport::refused(&err), false)
+        }
+        Err(err) => anyhow::bail!("{err}; {}", err.hint()),
+    };
     output.finish(&Report { pairs: report.pairs, problems: &report.problems }, || {
         let all: usize = report.problems.iter().map(|p| p.count).sum();
         let kinds = match report.problems.len() {
             kinds if kinds == all => String::new(),
             kinds => format!(" of {kinds} kinds"),
         };
-        let mut text = format!("{}: {} pairs, {all} problems{kinds}\n", dataset.title, report.pairs);
+        let mut text = format!("{title}: {} pairs, {all} problems{kinds}\n", report.pairs);
         for p in &report.problems {
             text += &format!("\n{}\n  {}\n  {}\n", p.file.display(), p.what, p.hint);
             if p.count > 1 {
@@ -52,7 +62,7 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         }
         text
     })?;
-    Ok(true)
+    Ok(examined)
 }
 
 /// The other examples, by the names of their files.

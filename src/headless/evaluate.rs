@@ -11,6 +11,7 @@ use super::predict::{RuntimeArg, ShiftArg};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Row, paper_rows};
+use crate::domain::findings::Finding;
 use crate::domain::pose::RegistrationChoice;
 use crate::infer::bundle::{Bundle, Found, Origin, find_all};
 use crate::io::atomic;
@@ -106,7 +107,9 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let output = Output::new(args.common, "evaluating", 0);
     let models = Models::new(if args.no_cache { None } else { super::cache::store() });
     let evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
-    for odd in &evaluation.findings {
+    // What is wrong with the data set as a whole was said when it was opened.
+    let said = |odd: &Finding| dataset.problems.iter().any(|p| (&p.file, &p.what) == (&odd.file, &odd.what));
+    for odd in evaluation.findings.iter().filter(|odd| !said(odd)) {
         let (file, times) = (odd.file.display(), odd.count);
         output.note(&format!("note: {file}: {} ({}); {times} like this", odd.what, odd.hint));
     }

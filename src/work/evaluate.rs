@@ -170,6 +170,7 @@ pub fn evaluate(
     let mut skipped = Vec::new();
     let mut scores = models.empty_scores();
     let mut findings = Findings::default();
+    findings.extend(dataset.problems.iter().cloned());
     let (mut done, mut scale) = (total - fresh, Scale::Measured);
     let mut whole = work.iter();
     load::ahead(dataset, setup, &todo, cx, |batch| {
