@@ -41,3 +41,5 @@ mod sweep;
 mod training;
 #[cfg(feature = "ui-test")]
 mod ui;
+#[cfg(feature = "onnx")]
+mod unsound;

@@ -11,7 +11,6 @@ use super::predict::{RuntimeArg, ShiftArg};
 use super::{Common, Output, ToolArgs, VerbResult};
 use crate::domain::diffusion::Sampler;
 use crate::domain::evaluation::{self, Row, paper_rows};
-use crate::domain::findings::Finding;
 use crate::domain::pose::RegistrationChoice;
 use crate::infer::bundle::{Bundle, Found, Origin, find_all};
 use crate::io::atomic;
@@ -107,12 +106,7 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let output = Output::new(args.common, "evaluating", 0);
     let models = Models::new(if args.no_cache { None } else { super::cache::store() });
     let evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
-    // What is wrong with the data set as a whole was said when it was opened.
-    let said = |odd: &Finding| dataset.problems.iter().any(|p| (&p.file, &p.what) == (&odd.file, &odd.what));
-    for odd in evaluation.findings.iter().filter(|odd| !said(odd)) {
-        let (file, times) = (odd.file.display(), odd.count);
-        output.note(&format!("note: {file}: {} ({}); {times} like this", odd.what, odd.hint));
-    }
+    super::notes::say_found(&output, &dataset, &evaluation.findings);
     for skipped in &evaluation.skipped {
         let by = if skipped.method.is_empty() { String::new() } else { format!(" ({})", skipped.method) };
         output.note(&format!("{}{by}: {}", skipped.what, skipped.why));

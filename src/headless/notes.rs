@@ -52,6 +52,17 @@ pub(super) fn say_problems(dataset: &Dataset) {
     }
 }
 
+/// Says what a job found, but for what [`say_problems`] said.
+pub(super) fn say_found(output: &Output, dataset: &Dataset, found: &[Finding]) {
+    let said = |odd: &&Finding| !dataset.problems.iter().any(|p| (&p.file, &p.what) == (&odd.file, &odd.what));
+    for odd in found.iter().filter(said) {
+        output.note(&format!("note: {}: {} ({})", odd.file.display(), odd.what, odd.hint));
+        if odd.count > 1 {
+            output.note(&times(odd));
+        }
+    }
+}
+
 fn problems(dataset: &Dataset) -> Findings {
     let mut findings = Findings::default();
     findings.extend(dataset.problems.iter().cloned());
