@@ -449,6 +449,7 @@ draws! {
         1 Tune(any::<bool>()),
         1 Steps(any::<u32>()),
         1 Start,
+        1 Keep,
         1 Use,
     }
     train: TrainCommand {
