@@ -40,6 +40,7 @@ pub mod rig;
 pub mod sample;
 pub mod sensor;
 pub mod sim;
+pub mod text;
 pub mod tool;
 pub mod turn;
 pub mod units;

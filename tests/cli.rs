@@ -23,8 +23,8 @@ mod hostile;
 #[cfg(feature = "onnx")]
 mod outputs;
 mod queue;
-mod refused;
 mod read_as;
+mod refused;
 mod training_data;
 mod unit;
 #[cfg(feature = "onnx")]

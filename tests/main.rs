@@ -23,6 +23,7 @@ mod layers;
 mod models;
 mod pose;
 mod recovery;
+mod rigs;
 mod rules;
 mod sim;
 mod stability;
@@ -43,3 +44,5 @@ mod sweep;
 mod training;
 #[cfg(feature = "ui-test")]
 mod ui;
+#[cfg(feature = "onnx")]
+mod unsound;

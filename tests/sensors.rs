@@ -193,17 +193,3 @@ fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
     assert_eq!((state.finger_name(thumb).as_ref(), state.fingers()), ("thumb", vec![thumb]));
     assert_eq!(state.imprint(ImprintSource::Predicted, thumb).ready().unwrap().size(), [175, 140]);
 }
-
-#[test]
-fn a_rig_that_makes_no_sense_is_a_problem_of_the_folder() {
-    let dir = tempfile::tempdir().unwrap();
-    digit_folder(dir.path());
-    for bad in ["{", "{}", r#"{"name": "x", "sensors": [], "pads": []}"#] {
-        std::fs::write(dir.path().join(RIG_JSON), bad).unwrap();
-        let dataset = Dataset::open(dir.path()).unwrap();
-        assert!(dataset.problems.iter().any(|p| p.file.ends_with(RIG_JSON)), "{bad}: {:?}", dataset.problems);
-        assert_eq!(*dataset.rig, *Rig::lab());
-        let watched = run(&["watch", dir.path().to_str().unwrap(), "--once"], dir.path());
-        assert!(text(&watched).contains(RIG_JSON) && watched.stdout.is_empty(), "{bad}: {}", text(&watched));
-    }
-}

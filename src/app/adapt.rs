@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::effect::Effect;
 use super::settings::{self, SettingsCommand, state::GenerateSettings};
 use super::state::State;
-use super::tasks::state::Ticket;
+use super::tasks::state::{Level, Ticket};
 use crate::work::adapt::Adapted;
 use crate::work::bundles::BundleInfo;
 
@@ -24,6 +24,8 @@ pub enum AdaptCommand {
     Steps(u32),
     /// Fits the chosen generator to them, and scores it on pairs that were left out.
     Start,
+    /// Keeps the fit that was refused, in the place of whatever is there.
+    Keep,
     /// Predicts with the fitted model from now on.
     Use,
 }
@@ -45,6 +47,12 @@ pub(super) fn step(state: &mut State, command: AdaptCommand, effects: &mut Vec<E
             state.adapt.running = Some(ticket);
             effects.push(Effect::Adapt { ticket, source, setup: Box::new(setup) });
         }
+        AdaptCommand::Keep => {
+            let Some(adapted) = state.refused_fit().filter(|_| state.adapting().is_none()).cloned() else { return };
+            let ticket = state.tasks.start("Keep the fit".to_owned(), Vec::new());
+            state.adapt.running = Some(ticket);
+            effects.push(Effect::KeepFit { ticket, adapted });
+        }
         AdaptCommand::Use => {
             let Some(name) = state.fitted().map(|bundle| bundle.name.clone()) else { return };
             let generate = GenerateSettings { bundle: Some(name), ..state.settings.generate.clone() };
@@ -64,6 +72,9 @@ pub(super) fn arrived(state: &mut State, ticket: Ticket, adapted: Arc<Adapted>, 
         // A fit that was made again takes the place of the one before.
         state.library.bundles.retain(|known| known.origin != bundle.origin);
         state.library.bundles.push(bundle);
+    }
+    for reason in adapted.refused() {
+        state.log.push(Level::Warning, "The fit was not kept".to_owned(), Some(reason.to_owned()), None);
     }
     state.adapt.result = Some(adapted);
 }

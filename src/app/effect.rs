@@ -14,7 +14,7 @@ use super::tasks::state::Ticket;
 use super::view::state::UiRequest;
 use crate::domain::sample::Sample;
 use crate::io::dataset::ToolUnit;
-use crate::work::adapt::AdaptSetup;
+use crate::work::adapt::{AdaptSetup, Adapted};
 use crate::work::bundles::BundleInfo;
 use crate::work::case::CaseSetup;
 use crate::work::error::TaskError;
@@ -191,6 +191,13 @@ pub enum Effect {
         /// What to what.
         setup: Box<AdaptSetup>,
     },
+    /// Write a fit that was refused.
+    KeepFit {
+        /// The job.
+        ticket: Ticket,
+        /// The fit.
+        adapted: Arc<Adapted>,
+    },
     /// Train a mask model, and keep the new one where the program keeps models.
     Train {
         /// The job.
@@ -278,6 +285,7 @@ impl std::fmt::Debug for Effect {
             Self::Sweep { ticket, .. } => write!(f, "Sweep({ticket:?})"),
             Self::ProposeAll { ticket, .. } => write!(f, "ProposeAll({ticket:?})"),
             Self::Adapt { ticket, .. } => write!(f, "Adapt({ticket:?})"),
+            Self::KeepFit { ticket, .. } => write!(f, "KeepFit({ticket:?})"),
             Self::Train { ticket, .. } => write!(f, "Train({ticket:?})"),
             Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),
             Self::Figure { setup, file, .. } => write!(f, "Figure({:?}, {})", setup.pairs, file.display()),

@@ -9,6 +9,7 @@ mod doubts;
 mod fitted;
 mod offset;
 mod response;
+pub mod sound;
 mod validate;
 
 use std::sync::Arc;

@@ -3,6 +3,7 @@
 //! Sensors are data: loader, simulator, generator, metrics and panes read sizes, scales and windows from the rig of the
 //! data set. The lab's GelSlim and Soft Bubble are one value of it, [`Rig::lab`].
 
+mod declared;
 pub mod lab;
 mod per_pad;
 
@@ -149,42 +150,6 @@ impl Rig {
     pub fn lab() -> Arc<Self> {
         static LAB: LazyLock<Arc<Rig>> = LazyLock::new(|| Arc::new(lab::rig()));
         LAB.clone()
-    }
-
-    /// A rig declared in JSON.
-    ///
-    /// # Errors
-    /// What is wrong with it.
-    pub fn parse(json: &[u8]) -> Result<Self, String> {
-        let rig: Self = serde_json::from_slice(json).map_err(|err| err.to_string())?;
-        let twice = |keys: Vec<&Text>| (1..keys.len()).any(|at| keys[..at].contains(&keys[at]));
-        let plain = |key: &Text| !key.is_empty() && key.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit());
-        let sensors: Vec<&Text> = rig.sensors.iter().map(|sensor| &sensor.key).collect();
-        let pads: Vec<&Text> = rig.pads.iter().map(|pad| &pad.key).collect();
-        if sensors.is_empty() || pads.is_empty() || sensors.len() > 100 || pads.len() > 100 {
-            return Err("it needs 1 to 100 sensors and 1 to 100 pads".into());
-        }
-        if !sensors.iter().chain(&pads).all(|key| plain(key)) || twice(sensors) || twice(pads) {
-            return Err("each key must be its own, of small letters and digits".into());
-        }
-        let fine = |s: &Sensor| {
-            s.size().iter().all(|n| (1..=4096).contains(n))
-                && s.px_per_m > 0.0
-                && s.px_per_m.is_finite()
-                && matches!(s.rotation_deg, 0 | 180)
-        };
-        if let Some(sensor) = rig.sensors.iter().find(|sensor| !fine(sensor)) {
-            return Err(format!(
-                "sensor {}: width and height must be 1 to 4096, px_per_m positive, rotation_deg 0 or 180",
-                sensor.key
-            ));
-        }
-        let known =
-            |w: &Window| w.pad.index() < rig.pads.len() && [w.of, w.within].iter().all(|id| rig.sensor(*id).is_some());
-        if !rig.windows.iter().all(known) {
-            return Err("a window names a pad or a sensor that is not there; they count from 0".into());
-        }
-        Ok(rig)
     }
 
     /// The pads in order.

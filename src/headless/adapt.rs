@@ -21,6 +21,12 @@ pub(super) struct AdaptArgs {
     /// The folder of the new bundle. Without it the fit is only tried.
     #[arg(long)]
     out: Option<PathBuf>,
+    /// Write the new bundle even where its figures or the data speak against the fit.
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Replace a fit to other data in that folder.
+    #[arg(long, requires = "out")]
+    replace: bool,
     /// Only these pairs: their names, separated by commas.
     #[arg(long, value_name = "NAME,NAME", value_delimiter = ',')]
     pairs: Vec<String>,
@@ -80,8 +86,12 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
         tuning: args.minutes.map(Tuning::Within).or((args.tune > 0).then_some(Tuning::Steps(args.tune))),
         unfinished: predictor.unfinished(),
         out: args.out.clone(),
+        force: args.force,
+        replace: args.replace,
+        findings: Vec::new(),
     };
     let adapted = adapt(&dataset, &setup, predictor.models(), &output.job())?;
+    super::notes::say_found(&output, &dataset, &adapted.notes);
     for remark in &adapted.left_out {
         output.note(&format!("left out: {}: {}", remark.name, remark.why));
     }
@@ -91,7 +101,10 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
     for warning in &adapted.warnings {
         output.note(&format!("note: {warning}"));
     }
-    let complete = adapted.left_out.is_empty();
+    for objection in &adapted.objections {
+        output.note(&format!("against this fit: {objection}"));
+    }
+    let complete = adapted.left_out.is_empty() && adapted.unwritten.is_none();
     let report = Report { adapted, from: setup.bundle.name.clone(), engine: predictor.engine_label()? };
     output.finish(&report, || text(&report))?;
     Ok(complete)
@@ -143,8 +156,14 @@ fn text(report: &Report) -> String {
         a.fit_seconds,
         report.engine
     );
-    match &a.bundle {
-        Some(bundle) => text + &format!("{} was fitted: the new bundle is {}\n", report.from, bundle.display()),
-        None => text + "tried only: name a folder with --out to keep the fit\n",
+    match (&a.bundle, &a.in_place_of) {
+        (Some(bundle), _) => text + &format!("{} was fitted: the new bundle is {}\n", report.from, bundle.display()),
+        (None, Some(other)) => {
+            text + &format!("not written: {other}; --replace writes over it, or name a new folder\n")
+        }
+        (None, None) if a.unwritten.is_some() => {
+            text + "not written, because of what is said against this fit; --force writes it all the same\n"
+        }
+        (None, None) => text + "tried only: name a folder with --out to keep the fit\n",
     }
 }

@@ -16,7 +16,7 @@ use crate::domain::pose::{Registration, RegistrationChoice};
 use crate::domain::read_as::{ReadAs, parse_list};
 use crate::domain::rig::{PadId, Rig};
 use crate::io::atomic;
-use crate::io::dataset::{Dataset, ToolScale};
+use crate::io::dataset::{Dataset, OpenError, ToolScale};
 
 /// The data set that a verb reads.
 #[derive(Debug, Clone, Args)]
@@ -50,9 +50,16 @@ impl DatasetArgs {
         self.path.as_deref().or(self.input.as_deref()).unwrap_or(Path::new(""))
     }
 
-    /// The folder's data set, or the built-in one of that name.
+    /// The folder's data set, or the built-in one of that name; says first what is wrong with it.
     pub(super) fn open(&self) -> anyhow::Result<Dataset> {
-        let dataset = Dataset::open(self.path()).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
+        let dataset = self.open_unsaid().map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
+        super::notes::say_problems(&dataset);
+        Ok(dataset)
+    }
+
+    /// [`Self::open`] for a verb that says itself what is wrong.
+    pub(super) fn open_unsaid(&self) -> Result<Dataset, OpenError> {
+        let dataset = Dataset::open(self.path())?;
         Ok(match &self.read_as {
             Some(Readings(read_as)) => dataset.reading(read_as.clone()),
             None => dataset,

@@ -99,7 +99,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let imprints = predictor.imprints(&sample, args.imprint, &JobCx::unwatched())?;
     let of = predictor.of(args.imprint)?;
-    let mut notes = Notes::default();
+    let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
     notes.take(&output, &odd);
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);

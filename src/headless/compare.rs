@@ -204,7 +204,7 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
     let entry = &dataset.index.pairs[id.0 as usize];
     let output = Output::new(args.json.common(), "comparing", 1);
     let sample = dataset.load(id)?;
-    let mut notes = Notes::default();
+    let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
     let found = [find(args, &args.a, &dataset, id, &sample)?, find(args, &args.b, &dataset, id, &sample)?];
     let measured = find(args, &Subject::Measured, &dataset, id, &sample)?;

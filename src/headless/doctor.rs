@@ -12,8 +12,8 @@ use super::{Common, Output, VerbResult};
 use crate::domain::doubt::Doubt;
 use crate::domain::findings::{Finding, Findings};
 use crate::infer::engine::EngineChoice;
-use crate::io::dataset::Dataset;
-use crate::io::doctor;
+use crate::io::dataset::{Dataset, OpenError};
+use crate::io::doctor::{self, DoctorReport};
 use crate::work::bundles::{self, BundleKind};
 use crate::work::doubts::{self, examine_reading};
 use crate::work::job::JobCx;
@@ -52,25 +52,25 @@ struct Report<'a> {
 
 /// Done means examined: problems found are the result, not a failure.
 pub(super) fn run(args: &DoctorArgs) -> VerbResult {
-    let dataset = args.dataset.open()?;
-    let output = Output::new(args.common, "examining", dataset.index.pairs.len());
-    let mut report = doctor::examine(&dataset, &mut |done, total| {
-        output.set(done, total);
-        ControlFlow::Continue(())
-    });
-    let doubts = tried(args, &dataset);
-    let mut found = Findings::default();
-    found.extend(doubts::problems(&dataset, &doubts));
-    // What is wrong with all of it comes before what is wrong with single pairs.
-    report.problems.splice(0..0, found.into_list());
-    let read_as = doubts::remedy(&dataset, &doubts);
+    let output = Output::new(args.common, "examining", 0);
+    // Without knowing the sensors, none of its pairs can be examined.
+    let (title, report, read_as, opened) = match args.dataset.open_unsaid() {
+        Ok(dataset) => {
+            let (report, read_as) = examined(args, &dataset, &output);
+            (dataset.title, report, read_as, true)
+        }
+        Err(err @ OpenError::Rig { .. }) => {
+            (args.dataset.path().display().to_string(), DoctorReport::refused(&err), None, false)
+        }
+        Err(err) => anyhow::bail!("{err}; {}", err.hint()),
+    };
     output.finish(&Report { pairs: report.pairs, problems: &report.problems, read_as }, || {
         let all: usize = report.problems.iter().map(|p| p.count).sum();
         let kinds = match report.problems.len() {
             kinds if kinds == all => String::new(),
             kinds => format!(" of {kinds} kinds"),
         };
-        let mut text = format!("{}: {} pairs, {all} problems{kinds}\n", dataset.title, report.pairs);
+        let mut text = format!("{title}: {} pairs, {all} problems{kinds}\n", report.pairs);
         for p in &report.problems {
             text += &format!("\n{}\n  {}\n  {}\n", p.file.display(), p.what, p.hint);
             if p.count > 1 {
@@ -80,7 +80,20 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         }
         text
     })?;
-    Ok(true)
+    Ok(opened)
+}
+
+/// What is wrong with single files, and before it what is wrong with all of them, with the readings that would mend that.
+fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> (DoctorReport, Option<String>) {
+    let mut report = doctor::examine(dataset, &mut |done, total| {
+        output.set(done, total);
+        ControlFlow::Continue(())
+    });
+    let doubts = tried(args, dataset);
+    let mut found = Findings::default();
+    found.extend(doubts::problems(dataset, &doubts));
+    report.problems.splice(0..0, found.into_list());
+    (report, doubts::remedy(dataset, &doubts))
 }
 
 /// What is found by trying; predictions are compared where a generator for these sensors is there.

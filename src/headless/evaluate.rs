@@ -106,10 +106,7 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let output = Output::new(args.common, "evaluating", 0);
     let models = Models::new(if args.no_cache { None } else { super::cache::store() });
     let evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
-    for odd in &evaluation.findings {
-        let (file, times) = (odd.file.display(), odd.count);
-        output.note(&format!("note: {file}: {} ({}); {times} like this", odd.what, odd.hint));
-    }
+    super::notes::say_found(&output, &dataset, &evaluation.findings);
     for skipped in &evaluation.skipped {
         let by = if skipped.method.is_empty() { String::new() } else { format!(" ({})", skipped.method) };
         output.note(&format!("{}{by}: {}", skipped.what, skipped.why));

@@ -76,7 +76,7 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
     let id = super::find_pair(&dataset, &args.pair)?;
     let entry = &dataset.index.pairs[id.0 as usize];
     let output = Output::new(args.common, "exporting", 1);
-    let mut notes = Notes::default();
+    let mut notes = Notes::of(&dataset);
     let sample = dataset.load(id)?;
     notes.take(&output, &sample.notes);
     let tool = entry.tool.as_deref().map(|name| load_tool(&dataset, name)).transpose();

@@ -67,7 +67,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let stems = output_stems(&args.out, &dataset, &ids)?;
     let begun = RunReport::begin(&args.out, "generate.json", ids.len())?;
     let mut pairs = Vec::new();
-    let mut notes = Notes::default();
+    let mut notes = Notes::of(&dataset);
     notes.take(&output, &doubts::notes(&dataset));
     let mut complete = !ids.is_empty();
     let mut scale = Scale::Measured;

@@ -123,7 +123,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let touch = sample.pad(finger).ok_or_else(|| anyhow::anyhow!("{name}: there is no {key} finger"))?;
 
     let output = Output::new(args.common, "generating", 1);
-    let mut notes = Notes::default();
+    let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let config = predictor.config()?;

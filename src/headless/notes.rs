@@ -1,18 +1,30 @@
-//! What is odd about the files of a run: on standard error when it is met, and in the JSON.
+//! What is odd about the files of a run: on standard error when it is met, and in the JSON. What is wrong with the data set
+//! as a whole comes first.
 
-use super::Output;
+use super::{Output, output};
 use crate::domain::dataset::Problem;
 use crate::domain::findings::{Finding, Findings};
+use crate::io::dataset::Dataset;
 
-/// The notes of the pairs and CAD models that a verb answers from.
-#[derive(Debug, Default)]
-pub(super) struct Notes(Findings);
+/// The notes of the data set, its pairs and CAD models that a verb answers from.
+#[derive(Debug)]
+pub(super) struct Notes {
+    findings: Findings,
+    /// How often each kind was found in the data set itself, which was said when it was opened.
+    said: Vec<usize>,
+}
 
 impl Notes {
+    /// Begins with the problems of the data set, which [`say_problems`] said.
+    pub(super) fn of(dataset: &Dataset) -> Self {
+        let findings = problems(dataset);
+        Self { said: findings.list().iter().map(|kind| kind.count).collect(), findings }
+    }
+
     /// Takes notes; the first of each kind is said at once.
     pub(super) fn take(&mut self, output: &Output, notes: &[Problem]) {
         for note in notes {
-            if self.0.add(note.clone()) {
+            if self.findings.add(note.clone()) {
                 output.note(&line(note));
             }
         }
@@ -20,12 +32,45 @@ impl Notes {
 
     /// All kinds of notes; how often there were more of one is said now.
     pub(super) fn into_list(self, output: &Output) -> Vec<Finding> {
-        let list = self.0.into_list();
-        for note in list.iter().filter(|note| note.count > 1) {
-            output.note(&format!("{} times, but for file, finger and numbers: {}", note.count, note.what));
+        let list = self.findings.into_list();
+        for (at, kind) in list.iter().enumerate() {
+            if kind.count > *self.said.get(at).unwrap_or(&1) {
+                output.note(&times(kind));
+            }
         }
         list
     }
+}
+
+/// Says what is wrong with a data set as a whole.
+pub(super) fn say_problems(dataset: &Dataset) {
+    for kind in problems(dataset).into_list() {
+        output::note(&format!("note: {}: {} ({})", kind.file.display(), kind.what, kind.hint));
+        if kind.count > 1 {
+            output::note(&times(&kind));
+        }
+    }
+}
+
+/// Says what a job found, but for what [`say_problems`] said.
+pub(super) fn say_found(output: &Output, dataset: &Dataset, found: &[Finding]) {
+    let said = |odd: &&Finding| !dataset.problems.iter().any(|p| (&p.file, &p.what) == (&odd.file, &odd.what));
+    for odd in found.iter().filter(said) {
+        output.note(&format!("note: {}: {} ({})", odd.file.display(), odd.what, odd.hint));
+        if odd.count > 1 {
+            output.note(&times(odd));
+        }
+    }
+}
+
+fn problems(dataset: &Dataset) -> Findings {
+    let mut findings = Findings::default();
+    findings.extend(dataset.problems.iter().cloned());
+    findings
+}
+
+fn times(kind: &Finding) -> String {
+    format!("{} times, but for file, finger and numbers: {}", kind.count, kind.what)
 }
 
 /// A note as a line of its own.

@@ -9,6 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use super::Common;
+use crate::domain::text::printable;
 use crate::work::job::{Cancel, JobCx, Progress};
 
 /// Where a verb reports to.
@@ -30,7 +31,7 @@ impl Output {
 
     /// One step is done; `item` says on what.
     pub fn step(&self, item: &str) {
-        self.bar.set_message(item.to_owned());
+        self.message(item);
         self.bar.inc(1);
     }
 
@@ -42,7 +43,7 @@ impl Output {
 
     /// What is being done now.
     pub fn message(&self, text: &str) {
-        self.bar.set_message(text.to_owned());
+        self.bar.set_message(printable(text).into_owned());
     }
 
     /// A job whose progress moves the bar.
@@ -51,7 +52,7 @@ impl Output {
         let show = move |p: Progress| {
             bar.set_length(p.total);
             bar.set_position(p.done);
-            bar.set_message(p.text);
+            bar.set_message(printable(&p.text).into_owned());
         };
         JobCx::new(Cancel::default(), Arc::new(show))
     }
@@ -91,18 +92,18 @@ pub(super) enum PrintError {
     Failed(io::Error),
 }
 
-/// A text and a line break on standard output, now.
+/// A text and a line break on standard output, now. Names from files are shown, never obeyed by the terminal.
 pub(super) fn print(text: &str) -> Result<(), PrintError> {
     let mut out = io::stdout().lock();
-    writeln!(out, "{text}").and_then(|()| out.flush()).map_err(|err| match err.kind() {
+    writeln!(out, "{}", printable(text)).and_then(|()| out.flush()).map_err(|err| match err.kind() {
         io::ErrorKind::BrokenPipe => PrintError::Closed,
         _ => PrintError::Failed(err),
     })
 }
 
-/// A line on standard error; there is nowhere to say that it took none.
+/// A line on standard error, as [`print`] has it; there is nowhere to say that it took none.
 pub(super) fn note(text: &str) {
-    writeln!(io::stderr().lock(), "{text}").ok();
+    writeln!(io::stderr().lock(), "{}", printable(text)).ok();
 }
 
 /// An error with its causes, each said once.

@@ -48,7 +48,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let output = Output::new(args.common, "aligning", ids.len());
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
-    let mut notes = Notes::default();
+    let mut notes = Notes::of(&dataset);
     notes.take(&output, &doubts::notes(&dataset));
     let mut cases = Vec::new();
     let all_labels = Labels::of(&dataset);

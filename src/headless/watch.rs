@@ -112,8 +112,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
     };
     let mut follower = Follower::new(args.dataset.path(), config)?;
     // The models are chosen for the sensors before the first touch is there.
-    let rig = rig_of(args.dataset.path())
-        .map_err(|wrong| anyhow::anyhow!("{}: {} ({})", wrong.file.display(), wrong.what, wrong.hint))?;
+    let rig = rig_of(args.dataset.path()).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
     let mut worker = Worker::new(args, Predictor::new(&args.model, &rig), stop.clone())?;
     let ready = json!({
         "event": "ready", "folder": args.dataset.path(), "recipe": worker.recipe(None, &PairLabels::default())?, "period_ms": PERIOD.as_secs_f64() * 1e3,
@@ -123,6 +122,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
         format!("following {} (models warm after {:.1} s); Ctrl-C ends", args.dataset.path().display(), worker.warm_s)
     })?;
 
+    follower.dataset().into_iter().for_each(|dataset| super::notes::say_problems(dataset));
     let mut summary = Summary::default();
     let mut said = Vec::new();
     while !stop.is_cancelled() {

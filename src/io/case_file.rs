@@ -112,14 +112,10 @@ pub fn write(file: &Path, content: &CaseContent) -> Result<(), CaseFileError> {
             zip.start_file(format!("data/{name}"), options)?;
             zip.write_all(bytes)?;
         }
-<<<<<<< HEAD
         for (name, bytes) in &content.beside {
             zip.start_file(name.as_str(), options)?;
             zip.write_all(bytes)?;
         }
-        zip.finish()?;
-=======
->>>>>>> doors
         Ok(())
     })
     .map_err(|source| CaseFileError::Io { file: file.to_owned(), source })

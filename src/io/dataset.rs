@@ -153,10 +153,15 @@ impl Dataset {
         let absolute = path.canonicalize().map_err(io)?;
         let folder = if absolute.is_dir() { absolute } else { absolute.parent().unwrap_or(&absolute).to_owned() };
         drop(std::fs::read_dir(&folder).map_err(io)?);
-        let scan = lab::scan(&folder)
-            .or_else(|| pictures::scan(&folder))
-            .or_else(|| lab::scan_flat(&folder))
-            .ok_or_else(|| OpenError::NothingFound { path: path.to_owned() })?;
+        let found = match lab::scan(&folder) {
+            Some(scan) => Some(scan),
+            None => pictures::scan(&folder)?.or_else(|| lab::scan_flat(&folder)),
+        };
+        let mut scan = found.ok_or_else(|| OpenError::NothingFound { path: path.to_owned() })?;
+        if *rig_of(&scan.root)? != *scan.rig {
+            let what = format!("{RIG_JSON} declares other sensors, but .pt files are always read as the lab's");
+            scan.problems.push(problem(scan.root.join(RIG_JSON), what, "remove it, or save the touches as pictures"));
+        }
         let read_as = read_as::of(&scan.root)?;
         Ok(Self::of(scan).reading(read_as))
     }

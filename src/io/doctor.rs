@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
-use super::dataset::{Dataset, Loaded};
+use super::dataset::{Dataset, Loaded, OpenError};
 use crate::domain::dataset::{PairId, Problem};
 use crate::domain::findings::{Finding, Findings};
 use crate::domain::turn::Turn;
@@ -20,6 +20,15 @@ pub struct DoctorReport {
     /// Everything wrong, data set first, then CAD models, then pairs in the order of the index. What differs only in file,
     /// finger or numbers is one entry.
     pub problems: Vec<Finding>,
+}
+
+impl DoctorReport {
+    /// Of a data set whose pairs cannot be read at all.
+    pub fn refused(why: &OpenError) -> Self {
+        let mut findings = Findings::default();
+        findings.add(why.to_problem());
+        Self { pairs: 0, examined: 0, problems: findings.into_list() }
+    }
 }
 
 /// Pairs loaded between two reports of progress.

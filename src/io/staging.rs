@@ -65,6 +65,67 @@ impl Staging {
     }
 }
 
+/// How the file begins that keeps a folder for one program.
+const CLAIM: &str = ".touch2touch-claim-";
+
+/// A folder that is kept for this run until it is dropped, from before its content is computed.
+#[derive(Debug)]
+pub(crate) struct Claim {
+    file: PathBuf,
+    /// Held locked.
+    _lock: File,
+}
+
+impl Claim {
+    /// Keeps `target` for this run; `None` where another one has it. The folder above it must be there.
+    pub(crate) fn of(target: &Path) -> io::Result<Option<Self>> {
+        let mut name = std::ffi::OsString::from(CLAIM);
+        name.push(target.file_name().unwrap_or_default());
+        let file = target.with_file_name(name);
+        loop {
+            match File::create_new(&file) {
+                Err(err) if err.kind() != io::ErrorKind::AlreadyExists => return Err(err),
+                _ => {}
+            }
+            // An ordinary file only: neither a link, which would lead elsewhere, nor a pipe, which would hold this up.
+            if file.symlink_metadata().is_ok_and(|there| there.is_symlink()) {
+                let what = format!("it is a link, not an ordinary file: {}", file.display());
+                return Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+            }
+            let lock = match files::open(&file) {
+                Err(err) if err.kind() == io::ErrorKind::NotFound => continue,
+                opened => opened?,
+            };
+            match lock.try_lock() {
+                Err(std::fs::TryLockError::WouldBlock) => return Ok(None),
+                // Where the disk knows no locks nothing is kept out.
+                Err(std::fs::TryLockError::Error(_)) | Ok(()) => {}
+            }
+            // Whoever had it may have taken the file away since it was opened.
+            if file.symlink_metadata().is_ok_and(|there| same_file(&there, &lock)) {
+                return Ok(Some(Self { file, _lock: lock }));
+            }
+        }
+    }
+}
+
+#[cfg(unix)]
+fn same_file(there: &std::fs::Metadata, open: &File) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    open.metadata().is_ok_and(|open| (open.dev(), open.ino()) == (there.dev(), there.ino()))
+}
+
+#[cfg(not(unix))]
+fn same_file(_there: &std::fs::Metadata, _open: &File) -> bool {
+    true
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        std::fs::remove_file(&self.file).ok();
+    }
+}
+
 /// Removes what killed runs left in `parent`. A run that was killed between moving the previous export away and putting
 /// the new one in its place gets the previous one back.
 pub(crate) fn sweep(parent: &Path) {
@@ -133,6 +194,43 @@ mod tests {
         assert!(Staging::new(&target).unwrap().put(&target).is_err());
         assert_eq!(std::fs::read_to_string(target.join("mask")).unwrap(), "two");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_folder_is_kept_for_one_run_at_a_time() {
+        let dir = tempfile::tempdir().unwrap();
+        let target = dir.path().join("fitted");
+        let first = Claim::of(&target).unwrap().unwrap();
+        assert!(Claim::of(&target).unwrap().is_none());
+        assert!(Claim::of(&dir.path().join("other")).unwrap().is_some());
+        drop(first);
+        let again = Claim::of(&target).unwrap().unwrap();
+        assert!(again.file.is_file());
+        drop(again);
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0, "nothing is left");
+        // What a killed run left is nobody's.
+        std::fs::write(dir.path().join(format!("{CLAIM}fitted")), "").unwrap();
+        assert!(Claim::of(&target).unwrap().is_some());
+        // Many at once: never two together.
+        let holders = std::sync::atomic::AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..8 {
+                scope.spawn(|| {
+                    for _ in 0..200 {
+                        if let Some(claim) = Claim::of(&target).unwrap() {
+                            assert_eq!(holders.fetch_add(1, std::sync::atomic::Ordering::SeqCst), 0);
+                            holders.fetch_sub(1, std::sync::atomic::Ordering::SeqCst);
+                            drop(claim);
+                        }
+                    }
+                });
+            }
+        });
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(dir.path().join("nowhere"), dir.path().join(format!("{CLAIM}link"))).unwrap();
+            assert!(Claim::of(&dir.path().join("link")).is_err(), "a link is not followed");
+        }
     }
 
     #[test]

@@ -34,6 +34,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         }
         ScrollArea::vertical().auto_shrink(false).id_salt("fit").show(ui, |ui| {
             if let Some(found) = &found {
+                refusal(cx, ui, found);
                 scores(cx, ui, found);
             }
             tuning(cx, ui);
@@ -59,6 +60,26 @@ fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
     if empty::show(ui, what, why, action) {
         cx.act(Action::FitPairs);
     }
+}
+
+/// What speaks against the fit, and a way to keep it all the same.
+fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, found: &Adapted) {
+    let refused = found.unwritten.is_some();
+    if !refused && found.objections.is_empty() {
+        return;
+    }
+    let heading = if refused { "The fit was not kept" } else { "Kept, though this speaks against the fit" };
+    ui.label(RichText::new(heading).strong().color(cx.p.wrong));
+    for reason in found.objections.iter().chain(&found.in_place_of) {
+        ui.add(egui::Label::new(RichText::new(reason).color(cx.p.wrong)).wrap());
+    }
+    if refused && cx.state.adapting().is_none() {
+        let tip = "Writes the fitted model all the same, over whatever fit is in its folder";
+        if ui.button("Keep it all the same").on_hover_text(tip).clicked() {
+            cx.push(AdaptCommand::Keep);
+        }
+    }
+    ui.add_space(8.0);
 }
 
 /// How the tuning goes, or went.

@@ -2,6 +2,7 @@
 
 mod adapted;
 mod gather;
+mod judge;
 mod pose;
 mod score;
 #[cfg(feature = "tune")]
@@ -9,7 +10,8 @@ mod tune;
 mod write;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::bundles::BundleInfo;
@@ -18,7 +20,7 @@ use super::job::{Curve, JobCx};
 use super::mask::MaskChoice;
 use super::models::Models;
 use super::tool::Tools;
-use crate::domain::dataset::PairId;
+use crate::domain::dataset::{PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::fit::{FitError, FitSource, Fitted, PadFit, closed_form, doubts, folds, left_out};
 use crate::domain::grid::{DepthMap, Grid};
@@ -28,8 +30,10 @@ use crate::domain::rig::PerPad;
 #[cfg(not(feature = "tune"))]
 use crate::domain::rig::Rig;
 use crate::domain::sample::Scale;
+use crate::domain::units::counted;
 use crate::infer::bundle::Role;
 use crate::infer::engine::EngineChoice;
+use crate::infer::recipe::input_digest;
 use crate::io::dataset::Dataset;
 use crate::io::memory::peak_mib;
 
@@ -40,6 +44,7 @@ use gather::{Touch, gather};
 pub use score::Scored;
 #[cfg(feature = "tune")]
 use tune::tune;
+pub use write::Unwritten;
 
 const WHAT: &str = "Fit the model to pairs";
 /// Fewer pairs leave ghosts of the training shapes in the predictions.
@@ -50,6 +55,8 @@ const ENOUGH_STEPS: u32 = 30;
 const LEAST_GAIN_DB: f64 = 0.2;
 /// Most touches that a closed form takes; more change nothing and fill the memory.
 const MOST_TOUCHES: usize = 1500;
+/// Hex digits of a picture's digest that are kept: enough to tell any two apart.
+const DIGITS: usize = 16;
 
 /// What is fitted, to what, and how it is tried.
 #[derive(Clone, Debug)]
@@ -73,6 +80,12 @@ pub struct AdaptSetup {
     pub unfinished: Option<PathBuf>,
     /// The folder of the new bundle; `None` only tries.
     pub out: Option<PathBuf>,
+    /// Write it whatever speaks against the fit.
+    pub force: bool,
+    /// Replace a fit to other data in that folder.
+    pub replace: bool,
+    /// What an examination of the data found wrong with them: each speaks against the fit.
+    pub findings: Vec<Problem>,
 }
 
 /// Predicts the pairs, fits the closed form, tries it on what was left out, and writes the new bundle.
@@ -87,10 +100,15 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         return Err(TaskError::new(WHAT, format!("{} was fitted already", setup.bundle.name))
             .with_hint(format!("Fit the bundle that it was made from, {}, to all your pairs.", fit.from)));
     }
-    if let Some(out) = &setup.out {
-        write::check_folder(out, &setup.bundle)?;
+    let _claim = setup.out.as_deref().map(|out| write::claim(out, &setup.bundle)).transpose()?;
+    let gather::Gathered { touches, mut left_out, grouped, mut notes } = gather(dataset, setup, models, cx)?;
+    let source = source(dataset, setup, &touches);
+    let other = setup.out.as_deref().filter(|_| !setup.replace).and_then(|out| write::of_other_data(out, &source));
+    if let (Some(other), Some(_)) = (&other, &setup.tuning) {
+        // Before the long part.
+        let hint = "Name a new folder, or replace it (--replace; in the studio, keep a fit without tuning first).";
+        return Err(TaskError::new(WHAT, other).with_hint(hint));
     }
-    let gather::Gathered { touches, mut left_out, grouped } = gather(dataset, setup, models, cx)?;
     cx.progress(0, 0, "fitting");
     let fitting = Instant::now();
     let cases: Vec<_> = touches.iter().map(Touch::case).collect();
@@ -132,7 +150,7 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
     let warnings = warnings(setup, names.len(), &before, closed.as_ref(), grouped, steps);
     let held_back = touches.iter().zip(&unseen).filter_map(|(touch, after)| Some(shown(touch, after.as_ref()?)));
     let held_back = held_back.take(MOST_SHOWN).collect();
-    let fitted = Fitted { source: source(dataset, setup, &touches), pads: with_lattices(&touches, corrections) };
+    let fitted = Fitted { source, pads: with_lattices(&touches, corrections) };
     let summary = fitted.pads.entries().map(|(pad, fit)| PadSummary {
         pad: dataset.rig.pad_key(pad).into_owned(),
         touches: touches.iter().filter(|t| t.pad == pad).count(),
@@ -141,13 +159,9 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         offset_m: fit.correction.line[1],
     });
     let pads = summary.collect();
-    let bundle = setup
-        .out
-        .as_deref()
-        .map(|out| write::bundle(out, &setup.bundle, &dataset.rig, &fitted, &graphs))
-        .transpose()?;
+    notes.extend(tools.into_notes());
     left_out.sort_by(|a, b| a.name.cmp(&b.name));
-    Ok(Adapted {
+    let mut adapted = Adapted {
         pairs: names.len(),
         touches: touches.len(),
         left_out,
@@ -157,14 +171,40 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         after,
         steps,
         curves,
-        seconds: begin.elapsed().as_secs_f64(),
+        seconds: 0.0,
         fit_seconds,
-        peak_mib: peak_mib(),
+        peak_mib: None,
         pads,
         warnings,
-        bundle: bundle.map(Path::to_owned),
+        notes: notes.into_list(),
+        objections: Vec::new(),
+        in_place_of: other,
+        bundle: None,
+        unwritten: None,
         held_back,
-    })
+    };
+    let (rig, findings) = (&*dataset.rig, setup.findings.as_slice());
+    let evidence = judge::Evidence { rig, touches: &touches, fitted: &fitted, unseen: &unseen, findings };
+    adapted.objections = judge::objections(&evidence, &adapted);
+    if let Some(out) = setup.out.clone() {
+        let unwritten = Unwritten { out, from: setup.bundle.clone(), rig: dataset.rig.clone(), fitted, graphs };
+        if adapted.in_place_of.is_none() && (setup.force || adapted.objections.is_empty()) {
+            adapted.bundle = Some(unwritten.write()?);
+        } else {
+            adapted.unwritten = Some(Arc::new(unwritten));
+        }
+    }
+    (adapted.seconds, adapted.peak_mib) = (begin.elapsed().as_secs_f64(), peak_mib());
+    Ok(adapted)
+}
+
+/// Writes a fit that was refused after all, in the place of whatever is there.
+///
+/// # Errors
+/// If there is none, or it cannot be written.
+pub fn keep(adapted: &Adapted) -> Result<Adapted, TaskError> {
+    let unwritten = adapted.unwritten.as_ref().ok_or_else(|| TaskError::new(WHAT, "there is no fit to be kept"))?;
+    Ok(Adapted { bundle: Some(unwritten.write_late()?), unwritten: None, in_place_of: None, ..adapted.clone() })
 }
 
 fn references(pictures: &[Option<DepthMap>]) -> Vec<Option<&DepthMap>> {
@@ -201,6 +241,10 @@ fn warnings(
     }
     if setup.folds == 0 {
         warnings.push("nothing was left out, so what the fit is worth on other pairs is not known".into());
+    } else if closed.is_none() {
+        let few = counted(pairs, "pair");
+        warnings
+            .push(format!("of {few} nothing could be left out, so what the fit is worth on other pairs is not known"));
     }
     if gain.is_some_and(|gain| gain < LEAST_GAIN_DB) {
         warnings.push(
@@ -250,11 +294,15 @@ fn tune(
 fn source(dataset: &Dataset, setup: &AdaptSetup, touches: &[Touch]) -> FitSource {
     let mut pairs: Vec<String> = touches.iter().map(|t| t.name.clone()).collect();
     pairs.dedup();
+    let mut pictures: Vec<String> = touches.iter().map(|t| input_digest(&t.picture)[..DIGITS].to_owned()).collect();
+    pictures.sort();
+    pictures.dedup();
     FitSource {
         data: dataset.title.clone(),
         rig: dataset.rig.name.clone().into_owned(),
         scale: touches.first().map_or(Scale::Measured, |t| t.scale),
         pairs,
+        pictures,
         from: setup.bundle.name.clone(),
         from_sha256: setup.bundle.id.to_string(),
     }

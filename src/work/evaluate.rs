@@ -171,6 +171,7 @@ pub fn evaluate(
     let mut skipped = Vec::new();
     let mut scores = models.empty_scores();
     let mut findings = Findings::default();
+    findings.extend(dataset.problems.iter().cloned());
     findings.extend(doubts::notes(dataset));
     let (mut done, mut scale) = (total - fresh, Scale::Measured);
     let mut whole = work.iter();

@@ -9,13 +9,27 @@ use super::bundles::BundleInfo;
 use super::error::TaskError;
 use crate::infer::bundle::{Bundle, MANIFEST, Role};
 use crate::io::digest::sha256;
-use crate::io::staging::{self, Staging};
+use crate::io::staging::{self, Claim, Staging};
 use crate::io::{atomic, files, folders};
 
 /// Where the program keeps models that were made with it, and looks for them at its start; `None` without a folder for
 /// such files.
 pub fn models_folder() -> Option<PathBuf> {
     folders::program_data().map(|folder| folder.join("models"))
+}
+
+/// Keeps a folder for a bundle that is to be made, until the answer is dropped.
+pub(super) fn claim(what: &str, out: &Path) -> Result<Claim, TaskError> {
+    let io = |file: &Path, err: std::io::Error| {
+        TaskError::new(what, format!("cannot be written: {err} ({})", file.display()))
+    };
+    let place = std::path::absolute(out).map_err(|err| io(out, err))?;
+    let parent = place.parent().unwrap_or(&place);
+    std::fs::create_dir_all(parent).map_err(|err| io(parent, err))?;
+    Claim::of(&place).map_err(|err| io(out, err))?.ok_or_else(|| {
+        TaskError::new(what, format!("a bundle is being made in {} already", out.display()))
+            .with_hint("Wait for the other run, or name another folder.")
+    })
 }
 
 /// That a folder may become the new bundle: it is not there, is empty, or holds a bundle that `replaceable` gives up;

@@ -28,7 +28,7 @@ use super::prediction::Prediction;
 use super::tool::load_tool;
 use crate::domain::align::Ask;
 use crate::domain::contact::MaskBasis;
-use crate::domain::dataset::PairId;
+use crate::domain::dataset::{PairId, Problem};
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::grid::{DepthMap, Grid, Mask};
 use crate::domain::pose::ToolModel;
@@ -193,7 +193,8 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
         return Err(TaskError::new(WHAT, why));
     }
     let hand = rows.values().flatten().filter(|row| row.iter().any(|outcome| outcome.hand)).count();
-    let mut notes = Vec::new();
+    let line = |p: &Problem| format!("{}: {} ({})", p.file.display(), p.what, p.hint);
+    let mut notes: Vec<String> = dataset.problems.iter().map(line).collect();
     if hand > 0 && setup.hand && matches!(job.dial, Dial::Threshold | Dial::Probability) {
         notes.push(format!("{hand} imprints have a mask that was drawn by hand, which this dial does not move"));
     }

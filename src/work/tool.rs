@@ -161,21 +161,30 @@ pub fn load_tool(dataset: &Dataset, name: &str) -> Result<(ToolModel, Vec<Proble
 pub struct Tools<'a> {
     dataset: &'a Dataset,
     models: BTreeMap<String, Option<ToolModel>>,
+    notes: Vec<Problem>,
 }
 
 impl<'a> Tools<'a> {
     /// Nothing is read yet.
     pub fn new(dataset: &'a Dataset) -> Self {
-        Self { dataset, models: BTreeMap::new() }
+        Self { dataset, models: BTreeMap::new(), notes: Vec::new() }
     }
 
     /// The model of a tool, read when it is first asked for.
     pub fn get(&mut self, name: &str) -> Option<&ToolModel> {
         if !self.models.contains_key(name) {
-            let model = load_tool(self.dataset, name).ok().map(|(model, _)| model);
+            let model = load_tool(self.dataset, name).ok().map(|(model, mut odd)| {
+                self.notes.append(&mut odd);
+                model
+            });
             self.models.insert(name.to_owned(), model);
         }
         self.known(name)
+    }
+
+    /// What was odd about the files that were read.
+    pub fn into_notes(self) -> Vec<Problem> {
+        self.notes
     }
 
     /// The model of a tool that was asked for before.

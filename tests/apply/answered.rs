@@ -38,7 +38,11 @@ pub(super) fn adapted() -> Adapted {
         peak_mib: None,
         pads: Vec::new(),
         warnings: Vec::new(),
+        notes: Vec::new(),
+        objections: Vec::new(),
+        in_place_of: None,
         bundle: None,
+        unwritten: None,
         held_back: Vec::new(),
     }
 }

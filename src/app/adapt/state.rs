@@ -105,6 +105,9 @@ impl State {
             tuning: self.adapt.tune.then_some(Tuning::Steps(self.adapt.steps)),
             unfinished: None,
             out: None,
+            force: false,
+            replace: false,
+            findings: Vec::new(),
         })
     }
 
@@ -135,6 +138,11 @@ impl State {
     pub fn uses_fit(&self) -> bool {
         let now = self.bundle(BundleKind::Generator).ok().map(|bundle| &bundle.id);
         self.fitted().is_some_and(|fitted| Some(&fitted.id) == now)
+    }
+
+    /// The last fit, where it was not written because of what speaks against it.
+    pub fn refused_fit(&self) -> Option<&Arc<Adapted>> {
+        self.adapt.result.as_ref().filter(|adapted| adapted.unwritten.is_some())
     }
 
     /// The bundle that was fitted to the open data set.

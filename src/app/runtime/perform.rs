@@ -21,6 +21,8 @@ use crate::domain::rig::PerPad;
 use crate::domain::sample::Sample;
 use crate::infer::bundle::Ends;
 use crate::io::folders;
+use crate::work::adapt;
+use crate::work::bundles;
 use crate::work::error::TaskError;
 use crate::work::evaluate;
 use crate::work::figure::figure;
@@ -177,6 +179,15 @@ impl Runtime {
                     Ok(Answer::Adapted(ticket, Arc::new(adapted), bundle.map(Box::new)))
                 });
                 self.task(Lane::Batch, ticket, "Fit the model".into(), body);
+            }
+            Effect::KeepFit { ticket, adapted } => {
+                let body = Box::new(move |_: &JobCx| {
+                    let kept = adapt::keep(&adapted)?;
+                    let folder = kept.bundle.as_deref();
+                    let bundle = folder.map(|folder| bundles::open("Open the fitted bundle", folder)).transpose()?;
+                    Ok(Answer::Adapted(ticket, Arc::new(kept), bundle.map(Box::new)))
+                });
+                self.task(Lane::Batch, ticket, "Keep the fit".into(), body);
             }
             Effect::Train { ticket, source, labels, setup } => {
                 let services = self.services.clone();

@@ -131,14 +131,10 @@ pub struct LiveSource {
     reviews: Reviews,
     /// Second masks, by person.
     repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
-<<<<<<< HEAD
     case: Option<(PairId, Case, Held)>,
-=======
-    case: Option<(PairId, Case)>,
     /// Where labels wait that could not be saved.
     waiting: Option<PathBuf>,
     recovered: Recovered,
->>>>>>> doors
 }
 
 impl LiveSource {

@@ -22,6 +22,10 @@ pub struct FitSource {
     pub scale: Scale,
     /// The pairs.
     pub pairs: Vec<String>,
+    /// Digests of the pictures that were predicted from, by which the data are known under whatever name; empty in fits of
+    /// older programs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub pictures: Vec<String>,
     /// The name of the bundle that was fitted.
     pub from: String,
     /// Its SHA-256.
@@ -29,6 +33,16 @@ pub struct FitSource {
 }
 
 impl FitSource {
+    /// Whether both are of the same data, as far as can be told: of a picture in common, else of the same name, rig and a
+    /// pair in common.
+    pub fn same_data(&self, other: &Self) -> bool {
+        let common = |a: &[String], b: &[String]| a.iter().any(|one| b.contains(one));
+        if self.pictures.is_empty() || other.pictures.is_empty() {
+            return (&self.data, &self.rig) == (&other.data, &other.rig) && common(&self.pairs, &other.pairs);
+        }
+        common(&self.pictures, &other.pictures)
+    }
+
     /// What makes these data others than those it was fitted to, in words.
     pub fn misgiving(&self, sample: &Sample) -> Option<String> {
         let rig = (self.rig != sample.rig.name).then(|| format!("taken with the rig {}", self.rig));

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::FileEntry;
+use crate::domain::fit::sound::absurd;
 use crate::domain::fit::{FitSource, Fitted, PadFit};
 use crate::domain::grid::Grid;
 use crate::domain::postprocess::{Correction, CorrectionParts, Response};
@@ -97,7 +98,11 @@ pub(super) fn read(path: &Path, bytes: &[u8], spec: &FitSpec, size: [usize; 2]) 
             ));
         }
         let lattice = arrays.remove(&format!("{name}_lattice")).and_then(|t| grids(t, None)?.pop());
-        pads.push(Some(PadFit { correction: Arc::new(correction), lattice }));
+        let fit = PadFit { correction: Arc::new(correction), lattice };
+        if let Some(what) = absurd(&fit) {
+            return Err(format!("the correction of {name} has numbers that no fit has: {what}"));
+        }
+        pads.push(Some(fit));
     }
     Ok(Fitted { source: spec.source.clone(), pads: pads.into_iter().collect::<PerPad<PadFit>>() })
 }

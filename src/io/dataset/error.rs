@@ -18,6 +18,14 @@ pub enum OpenError {
         /// The system's reason.
         source: std::io::Error,
     },
+    /// The file that declares the sensors cannot be used: its pictures would be read as another sensor's.
+    #[error("{why} ({})", path.display())]
+    Rig {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
     /// Nothing in the folder looks like a data set.
     #[error("no paired touches found ({})", path.display())]
     NothingFound {
@@ -40,6 +48,7 @@ impl OpenError {
         match self {
             Self::Io { .. } => "check the path and its permissions",
             Self::ReadAs { .. } => "correct that file, or remove it to read the data as they are stored",
+            Self::Rig { .. } => "correct it, or remove it to take the pictures for the lab's sensors",
             Self::NothingFound { .. } => {
                 "open the folder that holds train/, test/ and tools_stls/, a folder of GelSlim .pt files, of \
                  NAME_gelslim.png (with NAME_bubble.png), or of NAME_touch.png with reference.png"
@@ -49,7 +58,10 @@ impl OpenError {
 
     /// The same as an entry of a problem list.
     pub fn to_problem(&self) -> Problem {
-        let (Self::Io { path, .. } | Self::NothingFound { path } | Self::ReadAs { file: path, .. }) = self;
+        let (Self::Io { path, .. }
+        | Self::Rig { path, .. }
+        | Self::NothingFound { path }
+        | Self::ReadAs { file: path, .. }) = self;
         Problem { file: path.clone(), what: self.to_string(), hint: self.hint().into() }
     }
 }

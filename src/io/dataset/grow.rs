@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use super::lab::{self, FileRef, Lab};
-use super::{Dataset, LoadError, OpenError, SAME_NAME, Scan, Source, SourceKind, pictures, problem};
+use super::{Dataset, LoadError, OpenError, RIG_JSON, SAME_NAME, Scan, Source, SourceKind, pictures, problem};
 use crate::domain::dataset::{PairId, Problem};
 use crate::domain::rig::PerPad;
 use crate::domain::sample::{DepthCamera, Sample};
@@ -49,10 +49,14 @@ impl Dataset {
         let scan = match &self.source {
             Source::Lab(lab) if lab.flat => lab::scan_flat_again(root),
             Source::Lab(_) => lab::scan(root),
-            Source::Pictures(_) => pictures::scan(root),
+            Source::Pictures(_) => pictures::scan(root)?,
             Source::BuiltIn(_) => None,
         };
         let fresh = Self::of(scan.ok_or_else(|| OpenError::NothingFound { path: root.clone() })?);
+        if *fresh.rig != *self.rig {
+            let why = format!("{RIG_JSON} declares other sensors than when the folder was opened: open it again");
+            return Err(OpenError::Rig { path: root.join(RIG_JSON), why });
+        }
         let known: BTreeMap<&str, usize> =
             self.index.pairs.iter().enumerate().map(|(at, entry)| (entry.name.as_str(), at)).collect();
         let mut dataset = Self { problems: fresh.problems.clone(), cameras: OnceLock::new(), ..self.clone() };
@@ -99,7 +103,7 @@ impl Dataset {
             (matches!(&self.source, Source::Lab(lab) if !lab.flat), self.kind == SourceKind::Pictures);
         for (is_mine, what, there) in [
             (folders, "the lab's folders of touches", lab::scan as fn(&Path) -> Option<Scan>),
-            (pictures, "pictures of touches", pictures::scan),
+            (pictures, "pictures of touches", |root| pictures::scan(root).ok().flatten()),
             (flat, "GelSlim .pt files", lab::scan_flat),
         ] {
             if !is_mine && there(root).is_some_and(|scan| scan.root == *root) {

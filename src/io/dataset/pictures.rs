@@ -29,7 +29,7 @@ use crate::domain::upright::{self, TurnReading};
 use crate::io::files;
 use crate::io::images;
 
-use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};
+use super::{LoadError, Loaded, OpenError, Scan, Source, SourceKind, last_integer, problem, same_name};
 
 /// What the darkest and brightest value of a bubble picture are taken for, meters.
 pub const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
@@ -85,25 +85,29 @@ fn suffixes(rig: &Rig) -> [String; KINDS] {
 /// The sensors that a folder declares in its [`RIG_JSON`], else the lab's.
 ///
 /// # Errors
-/// If the file cannot be read or declares no rig.
-pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, Problem> {
-    let file = folder.join(RIG_JSON);
-    let rig = match files::read(&file, files::SMALL) {
-        Ok(text) => Rig::parse(&text).map_err(|why| format!("does not declare a rig: {why}")),
-        Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(Rig::lab()),
-        Err(err) => Err(format!("cannot be read: {err}")),
+/// [`OpenError::Rig`] if the file is there and cannot be read or declares no rig.
+pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, OpenError> {
+    let path = folder.join(RIG_JSON);
+    // A link that leads nowhere is there.
+    if path.symlink_metadata().is_err_and(|err| err.kind() == std::io::ErrorKind::NotFound) {
+        return Ok(Rig::lab());
+    }
+    let rig = match files::read(&path, files::SMALL) {
+        Ok(text) => Rig::parse(&text).map_err(|why| format!("{RIG_JSON} does not declare a rig: {why}")),
+        Err(err) => Err(format!("{RIG_JSON} cannot be read: {err}")),
     };
-    let hint = "correct it, or remove it to take the pictures for the lab's sensors";
-    rig.map(Arc::new).map_err(|why| problem(file, why, hint))
+    rig.map(Arc::new).map_err(|why| OpenError::Rig { path, why })
 }
 
 /// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
-pub(super) fn scan(folder: &Path) -> Option<Scan> {
+pub(super) fn scan(folder: &Path) -> Result<Option<Scan>, OpenError> {
+    let rig = rig_of(folder)?;
+    Ok(scan_as(folder, rig))
+}
+
+/// Pictures directly in `folder`, felt by the sensors of `rig`.
+fn scan_as(folder: &Path, rig: Arc<Rig>) -> Option<Scan> {
     let mut problems = Vec::new();
-    let rig = rig_of(folder).unwrap_or_else(|wrong| {
-        problems.push(wrong);
-        Rig::lab()
-    });
     let suffixes = suffixes(&rig);
     let mut found: BTreeMap<String, Files> = BTreeMap::new();
     let mut common = None;

@@ -1,11 +1,14 @@
 //! What a fit answers: scores, what was found, and touches to look at.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde::Serialize;
 
 use super::score::Scored;
+use super::write::Unwritten;
 use crate::domain::dataset::PairId;
+use crate::domain::findings::Finding;
 use crate::domain::grid::DepthMap;
 use crate::domain::rig::PadId;
 use crate::work::error::Remark;
@@ -42,11 +45,28 @@ pub struct Adapted {
     pub pads: Vec<PadSummary>,
     /// What to be careful about.
     pub warnings: Vec<String>,
+    /// What is odd about the data set and the files that were read.
+    pub notes: Vec<Finding>,
+    /// What speaks against the fit: with any of it the bundle is only written where that is asked for.
+    pub objections: Vec<String>,
+    /// The fit to other data that the folder of the new bundle holds, which is only replaced where that is asked for.
+    pub in_place_of: Option<String>,
     /// The new bundle.
     pub bundle: Option<PathBuf>,
+    /// The fit where it was to be written and was not; [`keep`](super::keep) writes it.
+    #[serde(skip)]
+    pub unwritten: Option<Arc<Unwritten>>,
     /// Touches with what the model makes of them before and after, [`MOST_SHOWN`] at most.
     #[serde(skip)]
     pub held_back: Vec<HeldBack>,
+}
+
+impl Adapted {
+    /// Why the fit was not written though it was to be, each reason once.
+    pub fn refused(&self) -> Vec<&str> {
+        let reasons = self.objections.iter().chain(&self.in_place_of).map(String::as_str);
+        if self.unwritten.is_some() { reasons.collect() } else { Vec::new() }
+    }
 }
 
 /// A touch that the fit was not made from. Pictures are in meters, in the raw orientation, as large as the measured one.

@@ -2,6 +2,7 @@
 
 use super::{AdaptSetup, MOST_TOUCHES, Remark, WHAT};
 use crate::domain::dataset::PairId;
+use crate::domain::findings::Findings;
 use crate::domain::fit::{Case, offsets};
 use crate::domain::grid::{DepthMap, Grid, RgbGrid};
 use crate::domain::lattice::{signature, two_groups};
@@ -33,6 +34,8 @@ pub(super) struct Touch {
     pub(super) unfitted: DepthMap,
     /// That window, see [`window`].
     pub(super) window: Option<[f64; 2]>,
+    /// Where a prediction has to be moved to lie in it, `[right, down]` in pixels; `None` where either side does not say.
+    pub(super) to_window_px: Option<[f64; 2]>,
     /// What was measured, likewise.
     pub(super) target: DepthMap,
     /// What was measured as it is: raw orientation.
@@ -65,6 +68,8 @@ pub(super) struct Gathered {
     pub(super) left_out: Vec<Remark>,
     /// Whether pads were told apart by their lattices.
     pub(super) grouped: bool,
+    /// What was odd about the data set and the files of the pairs.
+    pub(super) notes: Findings,
 }
 
 /// Reads and predicts the pairs.
@@ -77,6 +82,8 @@ pub(super) fn gather(
     let ends = setup.bundle.ends(&dataset.rig).ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
     let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
     let (mut touches, mut left_out) = (Vec::new(), Vec::new());
+    let mut notes = Findings::default();
+    notes.extend(dataset.problems.iter().cloned());
     let total = setup.pairs.len() as u64;
     let mut waiting: Vec<Touch> = Vec::new();
     for (done, &id) in setup.pairs.iter().enumerate() {
@@ -95,6 +102,7 @@ pub(super) fn gather(
                 continue;
             }
         };
+        notes.extend(sample.notes.iter().cloned());
         let before = waiting.len();
         for pad in sample.rig.pads() {
             match read(dataset, id, &entry.name, entry.tool.as_deref(), &sample, (pad, input)) {
@@ -122,7 +130,7 @@ pub(super) fn gather(
             .with_hint("A fit needs pairs of a GelSlim image and the Soft Bubble's imprint of the same grasp."));
     }
     let grouped = name_pads(dataset, &mut touches)?;
-    Ok(Gathered { touches, left_out, grouped })
+    Ok(Gathered { touches, left_out, grouped, notes })
 }
 
 /// A touch without its prediction; `None` where the pad felt nothing with both sensors.
@@ -149,6 +157,7 @@ fn read(
         prediction: Grid::filled(0, 0, 0.0),
         unfitted: Grid::filled(0, 0, 0.0),
         window: window(sample, pad),
+        to_window_px: None,
         target: Grid::filled(0, 0, 0.0),
         measured: bubble.imprint.clone(),
         tile: tile_of(dataset, id, sample).map_err(|err| err.why)?,
@@ -185,7 +194,9 @@ fn predict(
             continue;
         }
         let target = on_grid(&touch.measured, touch.tile.as_ref(), turned, size);
-        touches.push(Touch { prediction, unfitted, target, turned, ..touch });
+        let both = touch.window.is_some() && placed.window.is_some();
+        let to_window_px = both.then(|| [0, 1].map(|i| placed.offset[i] * size[i] as f64));
+        touches.push(Touch { prediction, unfitted, to_window_px, target, turned, ..touch });
     }
     Ok(())
 }

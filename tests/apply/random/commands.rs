@@ -470,6 +470,7 @@ draws! {
         1 Tune(any::<bool>()),
         1 Steps(any::<u32>()),
         1 Start,
+        1 Keep,
         1 Use,
     }
     train: TrainCommand {

@@ -1,0 +1,137 @@
+//! Fits to data that are wrong in one way are refused, those to sound data are not: `adapt` on simulated grasps that are
+//! spoilt before they are fitted.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use touch2touch::domain::dataset::PairId;
+use touch2touch::io::dataset::Dataset;
+use touch2touch::io::pt::{PtItem, Tensor, read_dict, write_dict};
+
+use crate::support::run;
+
+/// The files of all pairs: GelSlim, then bubble.
+fn pairs(set: &Path) -> Vec<[PathBuf; 2]> {
+    let dataset = Dataset::open(set).unwrap();
+    let all = 0..dataset.index.pairs.len() as u32;
+    all.map(|id| <[PathBuf; 2]>::try_from(dataset.pair_files(PairId(id))).unwrap()).collect()
+}
+
+/// Writes a file anew with one array changed.
+fn change(file: &Path, key: &str, change: impl Fn(&mut Vec<f32>)) {
+    let dict = read_dict(file).unwrap();
+    let keys = dict.keys();
+    let items: Vec<(&str, PtItem)> = keys
+        .iter()
+        .map(|name| {
+            let tensor = dict.tensor(name).unwrap();
+            let tensor = if name == key {
+                let shape = tensor.shape.clone();
+                let mut values = tensor.into_f32();
+                change(&mut values);
+                Tensor::f32(&shape, values)
+            } else {
+                tensor
+            };
+            (name.as_str(), PtItem::from(tensor))
+        })
+        .collect();
+    write_dict(file, &items).unwrap();
+}
+
+fn swap_halves(values: &mut Vec<f32>) {
+    let half = values.len() / 2;
+    values.rotate_left(half);
+}
+
+/// One way to spoil a data set, and a part of what is then said.
+type Spoiling = (&'static str, fn(&Path), &'static [&'static str]);
+
+const SPOILT: [Spoiling; 5] = [
+    ("fingers swapped", |set| each_bubble(set, swap_halves), &["angle is worse", "off the window", "do not know"]),
+    ("sign flipped", |set| each_bubble(set, |v| v.iter_mut().for_each(|v| *v = -*v)), &["less is measured"]),
+    ("millimeters", |set| each_bubble(set, |v| v.iter_mut().for_each(|v| *v *= 1e3)), &["another unit"]),
+    ("GelSlims of other pairs", other_gelslims, &["do not know their own imprints"]),
+    (
+        "mirrored",
+        |set| each_bubble(set, |v| v.chunks_mut(175).for_each(<[f32]>::reverse)),
+        &["angle is worse", "off the window", "do not know", "less is measured"],
+    ),
+];
+
+fn each_bubble(set: &Path, spoil: impl Fn(&mut Vec<f32>)) {
+    for [_, bubble] in pairs(set) {
+        change(&bubble, "bubble_imprint", &spoil);
+    }
+}
+
+fn other_gelslims(set: &Path) {
+    let gelslims: Vec<PathBuf> = pairs(set).into_iter().map(|[gelslim, _]| gelslim).collect();
+    let images: Vec<[Vec<f32>; 2]> = gelslims
+        .iter()
+        .map(|file| {
+            let dict = read_dict(file).unwrap();
+            ["gelslim", "gelslim_ref"].map(|key| dict.tensor(key).unwrap().into_f32())
+        })
+        .collect();
+    for (i, file) in gelslims.iter().enumerate() {
+        let other = &images[(i + 5) % images.len()];
+        change(file, "gelslim", |values| values.clone_from(&other[0]));
+        change(file, "gelslim_ref", |values| values.clone_from(&other[1]));
+    }
+}
+
+fn simulate(dir: &Path, name: &str, more: &[&str]) -> PathBuf {
+    let set = dir.join(name);
+    let fixed = ["simulate", "--out", set.to_str().unwrap(), "--tools", "pattern_36,pattern_35,pattern_01"];
+    let made = run(&[&fixed[..], &["--grasps", "4"], more].concat(), dir);
+    assert!(made.status.success(), "{}", said(&made));
+    set
+}
+
+fn said(output: &std::process::Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// `adapt --out`, with the shipped generator in two steps and masks without a model.
+fn adapt(dir: &Path, set: &Path, out: &Path, more: &[&str]) -> (std::process::Output, Value) {
+    let [set, out] = [set, out].map(|p| p.to_str().unwrap());
+    let fixed = ["adapt", set, "--out", out, "--steps", "2", "--mask", "threshold", "--json"];
+    let ran = run(&[&fixed[..], more].concat(), dir);
+    let json = serde_json::from_slice(&ran.stdout).unwrap_or(Value::Null);
+    (ran, json)
+}
+
+#[test]
+fn a_fit_to_spoilt_data_is_refused_and_one_to_sound_data_is_written() {
+    let dir = tempfile::tempdir().unwrap();
+    for (name, spoil, reasons) in SPOILT {
+        let set = simulate(dir.path(), name, &["--seed", "5"]);
+        spoil(&set);
+        let out = dir.path().join(format!("fitted to {name}"));
+        let (ran, found) = adapt(dir.path(), &set, &out, &[]);
+        println!(
+            "{name}: {:#} {:#} {:#}",
+            found["before"]["angle"], found["closed_form"]["angle"], found["objections"]
+        );
+        let objections = found["objections"].to_string();
+        assert!(reasons.iter().any(|reason| objections.contains(reason)), "{name}: {objections} {}", said(&ran));
+        assert!(found["bundle"].is_null() && !out.exists(), "{name}: {found:#}");
+        assert_eq!(ran.status.code(), Some(1), "{name}");
+        assert!(said(&ran).contains("against this fit"), "{name}: {}", said(&ran));
+    }
+    for (name, more) in [
+        ("sound", &["--seed", "5"][..]),
+        ("other grasps", &["--seed", "6"]),
+        ("misaligned", &["--seed", "5", "--condition", "misaligned"]),
+        ("noise", &["--seed", "5", "--condition", "noise"]),
+        ("mixed", &["--seed", "5", "--condition", "mixed"]),
+    ] {
+        let set = simulate(dir.path(), name, more);
+        let out = dir.path().join(format!("fitted to {name}"));
+        let (ran, found) = adapt(dir.path(), &set, &out, &[]);
+        println!("{name}: {:#} {:#} {:#}", found["before"]["angle"], found["closed_form"]["angle"], found["pads"]);
+        assert_eq!(found["objections"], Value::Array(Vec::new()), "{name}: {}", said(&ran));
+        assert!(out.is_dir() && ran.status.success(), "{name}: {}", said(&ran));
+    }
+}
