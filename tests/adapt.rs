@@ -199,7 +199,6 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
         out: None,
         force: false,
         replace: false,
-        findings: Vec::new(),
         bundle: bundle.clone(),
     };
     let models = Models::new(None);

@@ -88,7 +88,6 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
         out: args.out.clone(),
         force: args.force,
         replace: args.replace,
-        findings: Vec::new(),
     };
     let adapted = adapt(&dataset, &setup, predictor.models(), &output.job())?;
     super::notes::say_found(&output, &dataset, &adapted.notes);

@@ -20,7 +20,7 @@ use super::job::{Curve, JobCx};
 use super::mask::MaskChoice;
 use super::models::Models;
 use super::tool::Tools;
-use crate::domain::dataset::{PairId, Problem};
+use crate::domain::dataset::PairId;
 use crate::domain::diffusion::GenerateConfig;
 use crate::domain::fit::{FitError, FitSource, Fitted, PadFit, closed_form, doubts, folds, left_out};
 use crate::domain::grid::{DepthMap, Grid};
@@ -84,8 +84,6 @@ pub struct AdaptSetup {
     pub force: bool,
     /// Replace a fit to other data in that folder.
     pub replace: bool,
-    /// What an examination of the data found wrong with them: each speaks against the fit.
-    pub findings: Vec<Problem>,
 }
 
 /// Predicts the pairs, fits the closed form, tries it on what was left out, and writes the new bundle.
@@ -183,8 +181,8 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
         unwritten: None,
         held_back,
     };
-    let (rig, findings) = (&*dataset.rig, setup.findings.as_slice());
-    let evidence = judge::Evidence { rig, touches: &touches, fitted: &fitted, unseen: &unseen, findings };
+    let (rig, doubts) = (&*dataset.rig, super::doubts::notes(dataset));
+    let evidence = judge::Evidence { rig, touches: &touches, fitted: &fitted, unseen: &unseen, doubts: &doubts };
     adapted.objections = judge::objections(&evidence, &adapted);
     if let Some(out) = setup.out.clone() {
         let unwritten = Unwritten { out, from: setup.bundle.clone(), rig: dataset.rig.clone(), fitted, graphs };

@@ -107,7 +107,6 @@ impl State {
             out: None,
             force: false,
             replace: false,
-            findings: Vec::new(),
         })
     }
 

@@ -16,12 +16,12 @@ pub(super) struct Evidence<'a> {
     /// What fits to the others make of each touch.
     pub(super) unseen: &'a [Option<DepthMap>],
     /// What an examination of the data found wrong with them.
-    pub(super) findings: &'a [Problem],
+    pub(super) doubts: &'a [Problem],
 }
 
 /// What speaks against a fit, in words: its own figures, its scores, and what is known to be wrong with the data.
 pub(super) fn objections(evidence: &Evidence<'_>, scores: &Adapted) -> Vec<String> {
-    let Evidence { rig, touches, fitted, unseen, findings } = *evidence;
+    let Evidence { rig, touches, fitted, unseen, doubts } = *evidence;
     let cases: Vec<Case<'_>> = touches.iter().map(Touch::case).collect();
     let names: Vec<_> = rig.pads().map(|pad| rig.pad_key(pad)).collect();
     let found = |pad: PadId| {
@@ -38,7 +38,7 @@ pub(super) fn objections(evidence: &Evidence<'_>, scores: &Adapted) -> Vec<Strin
         all.extend(sound::angle(&before, &after));
     }
     all.extend(sound::strangers(&cases, unseen));
-    let wrong = findings.iter().map(|p| format!("{} ({})", p.what, p.hint));
+    let wrong = doubts.iter().map(|p| format!("{} ({})", p.what, p.hint));
     all.iter().map(Objection::to_string).chain(wrong).collect()
 }
 
