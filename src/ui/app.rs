@@ -551,7 +551,8 @@ impl eframe::App for StudioApp {
 }
 
 impl Drop for StudioApp {
-    /// The window may go without asking: its display went away, or drawing it panicked.
+    /// The window may go without asking: drawing it panicked. (Where an X server goes away its library ends the program at once,
+    /// which is as a kill.)
     fn drop(&mut self) {
         self.end();
     }

@@ -102,7 +102,7 @@ fn labels_go_elsewhere_or_nowhere_and_are_kept_where_nobody_was_asked() {
     assert!(answers.contains(&ViewportCommand::Close), "{answers:?}");
     assert!(!rig.config.join("recovered").exists());
 
-    // The window is torn down without a word, as when its display goes away.
+    // The window is torn down without a word, as when drawing it panics.
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     stick(&mut rig);
     let (data, config) = (rig.data.clone(), rig.config.clone());

@@ -157,8 +157,11 @@ impl Row {
 
 /// A sound data set: every other one of other sensors than the nominal ones, each of other tools.
 fn sound_set(args: &DoctorArgs, condition: Condition, number: u32) -> Set {
-    let config =
-        if number % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(args.seed + u64::from(number)) };
+    let config = if number.is_multiple_of(2) {
+        SimConfig::default()
+    } else {
+        SimConfig::randomised(args.seed + u64::from(number))
+    };
     let all = tools();
     let mut set = Set { pairs: Vec::new(), tools: Default::default() };
     for at in 0..u64::from(args.pairs) {

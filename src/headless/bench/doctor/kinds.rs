@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
+
 use crate::domain::doubt::Cause;
 use crate::domain::grid::RgbGrid;
 use crate::domain::mesh::TriMesh;
@@ -98,16 +100,16 @@ fn models() -> Vec<Kind> {
             *first = other.clone();
         }
     }));
-    let axes: [(&str, fn(glam::DVec3) -> glam::DVec3); 9] = [
-        ("mirrored along y", |p| glam::DVec3::new(p.x, -p.y, p.z)),
-        ("mirrored along z", |p| glam::DVec3::new(p.x, p.y, -p.z)),
-        ("turned by 180 degrees about x", |p| glam::DVec3::new(p.x, -p.y, -p.z)),
-        ("turned by 90 degrees about x", |p| glam::DVec3::new(p.x, -p.z, p.y)),
-        ("y and z exchanged", |p| glam::DVec3::new(p.x, p.z, p.y)),
-        ("x and y exchanged", |p| glam::DVec3::new(p.y, p.x, p.z)),
-        ("x and z exchanged", |p| glam::DVec3::new(p.z, p.y, p.x)),
-        ("z, x, y", |p| glam::DVec3::new(p.z, p.x, p.y)),
-        ("y, z, x", |p| glam::DVec3::new(p.y, p.z, p.x)),
+    let axes: [(&str, TurnModel); 9] = [
+        ("mirrored along y", |p| DVec3::new(p.x, -p.y, p.z)),
+        ("mirrored along z", |p| DVec3::new(p.x, p.y, -p.z)),
+        ("turned by 180 degrees about x", |p| DVec3::new(p.x, -p.y, -p.z)),
+        ("turned by 90 degrees about x", |p| DVec3::new(p.x, -p.z, p.y)),
+        ("y and z exchanged", |p| DVec3::new(p.x, p.z, p.y)),
+        ("x and y exchanged", |p| DVec3::new(p.y, p.x, p.z)),
+        ("x and z exchanged", |p| DVec3::new(p.z, p.y, p.x)),
+        ("z, x, y", |p| DVec3::new(p.z, p.x, p.y)),
+        ("y, z, x", |p| DVec3::new(p.y, p.z, p.x)),
     ];
     for (name, turn) in axes {
         all.push(kind(&format!("CAD models: {name}"), &["tool-axes"], move |set| {
@@ -144,6 +146,12 @@ fn difference(a: &RgbGrid, b: &RgbGrid, change: impl Fn(f32) -> f32) -> RgbGrid 
 fn gray(image: &RgbGrid) -> RgbGrid {
     image.map(|p| [0.299 * p[0] + 0.587 * p[1] + 0.114 * p[2]; 3])
 }
+
+/// Where a corner of a CAD model goes.
+type TurnModel = fn(DVec3) -> DVec3;
+
+/// How a difference becomes what is stored.
+type Store = fn(f32) -> f32;
 
 fn black(image: &RgbGrid) -> RgbGrid {
     each(image, |_| 0.0)
@@ -182,7 +190,7 @@ fn images() -> Vec<Kind> {
         images_of("GelSlims: white untouched image", &["no-reference"], |a, b| (a.clone(), each(b, |_| 255.0))),
         images_of("GelSlims: gray", &["gray"], |a, b| (gray(a), gray(b))),
     ];
-    let differences: [(&str, &str, fn(f32) -> f32); 3] = [
+    let differences: [(&str, &str, Store); 3] = [
         ("signed", &signs, |v| v),
         ("gray added", &grays, |v| (v + 128.0).clamp(0.0, 255.0)),
         ("wrapped", &wraps, |v| v.rem_euclid(256.0)),
