@@ -32,7 +32,7 @@ pub(super) fn objections(evidence: &Evidence<'_>, scores: &Adapted) -> Vec<Strin
     };
     let pads: Vec<Option<FoundPad<'_>>> = rig.pads().map(found).collect();
     let mut all = sound::figures(&cases, &pads);
-    let angle = |scored: Option<&super::Scored>| scored.and_then(|scored| scored.angle.clone());
+    let angle = |scored: Option<&super::Scored>| scored.and_then(|scored| scored.angle);
     let after = scores.after.as_ref().or(scores.closed_form.as_ref());
     if let Some((before, after)) = angle(Some(&scores.before)).zip(angle(after)) {
         all.extend(sound::angle(&before, &after));
