@@ -124,7 +124,8 @@ const MOST_ANSWER: f32 = 100.0;
 pub fn absurd(fit: &PadFit) -> Option<String> {
     let one = &fit.correction;
     let [width, height] = one.mean.size();
-    let over = |most: f32, picture: &Grid<f32>| picture.as_slice().iter().find(|v| v.is_nan() || v.abs() > most).copied();
+    let over =
+        |most: f32, picture: &Grid<f32>| picture.as_slice().iter().find(|v| v.is_nan() || v.abs() > most).copied();
     let far = one.offset_px.iter().zip([width, height]).find(|(by, side)| by.abs() > *side as f64);
     if let Some((by, side)) = far {
         return Some(format!("an offset of {by:e} px, in pictures of {side} px"));
