@@ -136,7 +136,7 @@ fn a_rig_with_one_spoilt_field_is_refused_and_says_what_to_do() {
         std::fs::write(dir.path().join(RIG_JSON), text).unwrap();
         let err = Dataset::open(dir.path()).expect_err(what);
         assert!(matches!(err, OpenError::Rig { .. }), "{what}: {err}");
-        let err = services.open(&Place::Path(dir.path().to_owned())).err().expect(what);
+        let err = services.open(&Place::Path(dir.path().to_owned())).expect_err(what);
         let problem = Dataset::open(dir.path()).unwrap_err().to_problem();
         for shown in [err.to_string(), format!("{} {}", problem.what, problem.hint)] {
             for part in [RIG_JSON, "correct it, or remove it", said] {

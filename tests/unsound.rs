@@ -18,7 +18,7 @@ fn pairs(set: &Path) -> Vec<[PathBuf; 2]> {
 }
 
 /// Writes a file anew with one array changed.
-fn change(file: &Path, key: &str, change: impl Fn(&mut Vec<f32>)) {
+fn change(file: &Path, key: &str, change: impl Fn(&mut [f32])) {
     let dict = read_dict(file).unwrap();
     let keys = dict.keys();
     let items: Vec<(&str, PtItem)> = keys
@@ -39,7 +39,7 @@ fn change(file: &Path, key: &str, change: impl Fn(&mut Vec<f32>)) {
     write_dict(file, &items).unwrap();
 }
 
-fn swap_halves(values: &mut Vec<f32>) {
+fn swap_halves(values: &mut [f32]) {
     let half = values.len() / 2;
     values.rotate_left(half);
 }
@@ -59,7 +59,7 @@ const SPOILT: [Spoiling; 5] = [
     ),
 ];
 
-fn each_bubble(set: &Path, spoil: impl Fn(&mut Vec<f32>)) {
+fn each_bubble(set: &Path, spoil: impl Fn(&mut [f32])) {
     for [_, bubble] in pairs(set) {
         change(&bubble, "bubble_imprint", &spoil);
     }
@@ -76,8 +76,8 @@ fn other_gelslims(set: &Path) {
         .collect();
     for (i, file) in gelslims.iter().enumerate() {
         let other = &images[(i + 5) % images.len()];
-        change(file, "gelslim", |values| values.clone_from(&other[0]));
-        change(file, "gelslim_ref", |values| values.clone_from(&other[1]));
+        change(file, "gelslim", |values| values.clone_from_slice(&other[0]));
+        change(file, "gelslim_ref", |values| values.clone_from_slice(&other[1]));
     }
 }
 

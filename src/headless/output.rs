@@ -101,7 +101,7 @@ pub(super) fn print(text: &str) -> Result<(), PrintError> {
     })
 }
 
-/// A line on standard error, as [`print`] has it; there is nowhere to say that it took none.
+/// A line on standard error, as [`print()`] has it; there is nowhere to say that it took none.
 pub(super) fn note(text: &str) {
     writeln!(io::stderr().lock(), "{}", printable(text)).ok();
 }

@@ -105,7 +105,7 @@ impl fmt::Display for Objection {
             Self::Strangers { nearness, touches } => write!(
                 f,
                 "the fitted predictions of {touches} touches do not know their own imprints: each is nearer than {:.0} % of \
-                 the others' (50 % is chance): the GelSlim images are of other grasps or fingers, or all grasps are alike",
+                 the others' (50 % is chance): the GelSlim images are of other grasps or fingers, all grasps are alike, or the model sees nothing in them",
                 100.0 * nearness
             ),
         }
