@@ -48,7 +48,7 @@ fn swap_halves(values: &mut [f32]) {
 type Spoiling = (&'static str, fn(&Path), &'static [&'static str]);
 
 const SPOILT: [Spoiling; 5] = [
-    ("fingers swapped", |set| each_bubble(set, swap_halves), &["angle is worse", "off the window", "do not know"]),
+    ("fingers swapped", |set| each_bubble(set, swap_halves), &["fingers are swapped"]),
     ("sign flipped", |set| each_bubble(set, |v| v.iter_mut().for_each(|v| *v = -*v)), &["less is measured"]),
     ("millimeters", |set| each_bubble(set, |v| v.iter_mut().for_each(|v| *v *= 1e3)), &["another unit"]),
     ("GelSlims of other pairs", other_gelslims, &["do not know their own imprints"]),
@@ -83,7 +83,7 @@ fn other_gelslims(set: &Path) {
 
 fn simulate(dir: &Path, name: &str, more: &[&str]) -> PathBuf {
     let set = dir.join(name);
-    let fixed = ["simulate", "--out", set.to_str().unwrap(), "--tools", "pattern_36,pattern_35,pattern_01"];
+    let fixed = ["simulate", "--out", set.to_str().unwrap(), "--tools", "pattern_36,pattern_35,pattern_37"];
     let made = run(&[&fixed[..], &["--grasps", "4"], more].concat(), dir);
     assert!(made.status.success(), "{}", said(&made));
     set

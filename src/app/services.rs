@@ -225,7 +225,7 @@ pub trait Services: Send + Sync {
     /// The bundles that ship with the program and those in `folders`; what is wrong with those that were refused.
     fn find_bundles(&self, folders: &[PathBuf]) -> (Vec<BundleInfo>, Vec<TaskError>);
 
-    /// Runs the generator on the pictures of its input sensor, all in one batch; one answer for each, in order. The model
+    /// Runs the generator on the pictures of its input sensor; one answer for each, in order. The model
     /// stays loaded between calls; the runtime calls this on one lane only.
     ///
     /// # Errors

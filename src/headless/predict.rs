@@ -165,7 +165,7 @@ impl Predictor {
         Ok(config)
     }
 
-    /// Predictions of the pictures that the generator starts from, all in one batch, in their order. What was made before is not made
+    /// Predictions of the pictures that the generator starts from, in their order. What was made before is not made
     /// again.
     pub(super) fn predict(&mut self, differences: &[&RgbGrid], cx: &JobCx) -> anyhow::Result<Vec<Prediction>> {
         let config = self.config()?;
@@ -174,7 +174,7 @@ impl Predictor {
         self.predict_wanted(&wanted, cx)
     }
 
-    /// One image with several seeds, all in one batch.
+    /// One image with several seeds.
     pub(super) fn predict_seeds(&mut self, difference: &RgbGrid, seeds: &[u64]) -> anyhow::Result<Vec<Prediction>> {
         let wanted = |&seed: &u64| Wanted { difference, seed, size: [0, 0] };
         self.predict_wanted(&seeds.iter().map(wanted).collect::<Vec<_>>(), &JobCx::unwatched())
@@ -243,7 +243,7 @@ impl Predictor {
         Ok(ImprintOf::predicted(&id, &config, self.shift()))
     }
 
-    /// The predictions of a pair's touches, all in one batch.
+    /// The predictions of a pair's touches.
     pub(super) fn predictions(&mut self, sample: &Sample, cx: &JobCx) -> anyhow::Result<PerPad<Prediction>> {
         let (config, engine, bundle) = (self.config()?, self.engine(), self.bundle()?.clone());
         Ok(Generating { bundle: &bundle, engine, config: &config }.pair(&self.models, sample, cx)?)

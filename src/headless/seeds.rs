@@ -53,7 +53,7 @@ pub(super) struct FingerSeeds {
     pub channels: Option<DepthMap>,
 }
 
-/// Predicts one touch with every seed, in one batch.
+/// Predicts one touch with every seed.
 pub(super) fn predict(
     predictor: &mut Predictor,
     sample: &Sample,

@@ -157,7 +157,7 @@ impl Generator {
     }
 
     /// As [`Generator::generate`] for several images (both fingers, say) in one go, each from the same seed, so that
-    /// each comes out as it would alone (up to rounding inside the engine).
+    /// each comes out as it would alone, to the last bit.
     ///
     /// # Errors
     /// See [`GenerateError`].
@@ -206,8 +206,8 @@ impl Generator {
         }
     }
 
-    /// Any images from any seeds, all in one batch: each image is encoded once, however many seeds it has, and the
-    /// denoiser is called once a step. `config.seed` is not used. Answers in the order of `items`.
+    /// Any images from any seeds: each image is encoded once, however many seeds it has, and each item comes out as it
+    /// would alone, to the last bit. `config.seed` is not used. Answers in the order of `items`.
     ///
     /// # Errors
     /// See [`GenerateError`]; an item of an image that is not there is a [`GenerateError::NoImage`].
@@ -326,15 +326,20 @@ fn decode(decoder: &mut Graph, spec: &GeneratorSpec, mut latent: Tensor) -> Resu
     let scale = spec.latent.scale_factor;
     latent.data_mut().iter_mut().for_each(|v| *v = (f64::from(*v) / scale) as f32);
     let [width, height] = spec.output.size;
-    let channels = spec.output.channels;
-    let pictures =
-        decoder.run(&[("latent", Input::F32(&latent))], "image", &[latent.batch(), channels, height, width])?;
-    let planes: Vec<Grid<f32>> = pictures
-        .data()
-        .chunks_exact(width * height)
-        .map(|plane| Grid::from_vec(width, height, plane.to_vec()).expect("the chunks have this length"))
-        .collect();
-    Ok(planes.chunks_exact(channels).map(|channels| RawPrediction { channels: channels.to_vec() }).collect())
+    let shape = [1, spec.output.channels, height, width];
+    let plane = |values: &[f32]| Grid::from_vec(width, height, values.to_vec()).expect("the chunks have this length");
+    let one = |latent: Tensor| {
+        let picture = decoder.run(&[("latent", Input::F32(&latent))], "image", &shape)?;
+        Ok(RawPrediction { channels: picture.data().chunks_exact(width * height).map(plane).collect() })
+    };
+    one_by_one(&latent).map(one).collect()
+}
+
+/// The items of a batch as batches of one. Engines sum in another order for another size of batch: run alone, a prediction
+/// is the same to the last bit, whatever is predicted with it.
+fn one_by_one(batch: &Tensor) -> impl Iterator<Item = Tensor> + '_ {
+    let alone = |at| batch.item(at).and_then(|item| Tensor::stack(&[item])).expect("the batch has this item");
+    (0..batch.batch()).map(alone)
 }
 
 /// The denoiser's graph, as the sampler wants it.
@@ -345,15 +350,19 @@ struct BundleDenoiser<'a> {
 
 impl Denoiser for BundleDenoiser<'_> {
     fn predict(&mut self, latent: &Tensor, timestep: u32, condition: &Tensor) -> Result<Tensor, ModelError> {
-        let batch = latent.batch();
-        let whole = vec![i64::from(timestep); batch];
-        let float = Tensor::filled(vec![batch], timestep as f32);
+        let float = Tensor::filled(vec![1], timestep as f32);
+        let whole = [i64::from(timestep)];
         let timestep = match self.spec.timestep {
             TimestepType::Int64 => Input::I64(&whole),
             TimestepType::Float32 => Input::F32(&float),
         };
-        let inputs = [("latent", Input::F32(latent)), ("timestep", timestep), ("condition", Input::F32(condition))];
-        self.graph.run(&inputs, "prediction", latent.shape())
+        let one = |(latent, condition): (Tensor, Tensor)| {
+            let inputs =
+                [("latent", Input::F32(&latent)), ("timestep", timestep), ("condition", Input::F32(&condition))];
+            self.graph.run(&inputs, "prediction", latent.shape())
+        };
+        let all = one_by_one(latent).zip(one_by_one(condition)).map(one).collect::<Result<Vec<_>, _>>()?;
+        Ok(Tensor::concat(&all.iter().collect::<Vec<_>>()).expect("they have one shape and there is at least one"))
     }
 
     fn prediction(&self) -> Prediction {

@@ -161,7 +161,7 @@ impl Models {
         lock(&self.ways).entry(bundle.id.clone()).or_insert_with(|| ways_of(spec, fit)).clone()
     }
 
-    /// Predictions, all of one call in one batch; one answer for each, in order. What was made before is not made
+    /// Predictions; one answer for each, in order. What was made before is not made
     /// again.
     ///
     /// # Errors

@@ -55,7 +55,7 @@ impl Generating<'_> {
         pictures.iter().map(wanted).collect()
     }
 
-    /// The predictions of a pair's pads, all in one batch. Pads without a picture to start from have none.
+    /// The predictions of a pair's pads. Pads without a picture to start from have none.
     ///
     /// # Errors
     /// As [`Self::input`] and [`Models::predict`].
@@ -69,7 +69,7 @@ impl Generating<'_> {
         Ok(out)
     }
 
-    /// The predictions of several pairs' pads, all in one batch, or why one has none: it does not take the others with it.
+    /// The predictions of several pairs' pads, or why one has none: it does not take the others with it.
     /// `None` once told to stop.
     ///
     /// # Errors

@@ -238,7 +238,8 @@ fn every_command_of_the_texts_does_what_they_say() {
             let done = run(&words.iter().map(String::as_str).collect::<Vec<_>>(), stage.dir.path());
             eprintln!("{:6.1} s {place}", start.elapsed().as_secs_f64());
             let code = done.status.code();
-            assert!(code.is_some_and(|code| right.contains(&code)), "{place}: {code:?}\n{}", error_text(&done));
+            let said = (String::from_utf8_lossy(&done.stdout), error_text(&done));
+            assert!(code.is_some_and(|code| right.contains(&code)), "{place}: {code:?}\n{}\n{}", said.0, said.1);
             assert!(!done.stdout.is_empty(), "{place}: it says nothing");
             for out in words
                 .iter()

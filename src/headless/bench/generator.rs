@@ -42,7 +42,7 @@ pub(in crate::headless) struct GeneratorArgs {
     /// The mask model's bundle (default: the shipped one); it finds the contact that the poses come from.
     #[arg(long)]
     mask_bundle: Option<PathBuf>,
-    /// Simulated grasps, spread over the tools; both fingers of each are predicted in one batch.
+    /// Simulated grasps, spread over the tools; both fingers of each are predicted.
     #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     grasps: u32,
     /// Only tools that the generator was trained on, or only the others.
@@ -351,7 +351,7 @@ fn write(file: &std::path::Path, report: &Report) -> anyhow::Result<()> {
         let title = format!("Generator: {what} against time, {} grasps, {engine}", report.grasps);
         let axis = Axis {
             title: &title,
-            time: "both fingers in one batch, image to meters: time, median over the grasps, ms",
+            time: "both fingers, image to meters: time, median over the grasps, ms",
             unit,
             legend: &[],
         };
@@ -365,7 +365,7 @@ fn write(file: &std::path::Path, report: &Report) -> anyhow::Result<()> {
 fn text(report: &Report) -> String {
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
     let mut text = format!(
-        "{}\n{}, {} grasps, both fingers in one batch; measured imprints with the same masks: mean {}°, median {}°\n\n",
+        "{}\n{}, {} grasps, both fingers; measured imprints with the same masks: mean {}°, median {}°\n\n",
         report.machine.text(),
         report.bundle,
         report.grasps,

@@ -141,7 +141,7 @@ impl<'a> Worker<'a> {
         Ok(Some(done))
     }
 
-    /// Predictions of the fingers that have a GelSlim image, in one batch; `None` if told to stop.
+    /// Predictions of the fingers that have a GelSlim image; `None` if told to stop.
     fn predictions(&mut self, sample: &Sample) -> anyhow::Result<Option<PerPad<Prediction>>> {
         let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
         match self.predictor.predictions(sample, &cx) {
