@@ -10,7 +10,6 @@ use touch2touch::app::results::shown::Why;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::state::State;
-use touch2touch::app::tasks::Level;
 use touch2touch::domain::catalog;
 use touch2touch::domain::dataset::PairId;
 use touch2touch::domain::diffusion::GenerateConfig;
@@ -111,6 +110,7 @@ fn a_case_of_a_model_of_ones_own_is_the_same_where_that_model_is_not() {
     let state = studio(&file, there.path());
     let shown = state.chosen(lab::RIGHT).expect("it is predicted");
     assert_eq!((state.made_with(shown).as_str(), state.outdated(lab::RIGHT)), ("mine · 1 step · seed 42", None));
+    assert!(state.case_lacks().is_empty());
     assert_eq!(bits(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().unwrap()), bits(held));
 
     // Without it the case's own imprint is shown, said to be, and nothing of the model that ships.
@@ -121,8 +121,11 @@ fn a_case_of_a_model_of_ones_own_is_the_same_where_that_model_is_not() {
     assert_eq!(bits(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().unwrap()), bits(held));
     assert!(state.pose(ImprintSource::Predicted).ready().is_some(), "it is posed as it was");
     assert!(state.can_generate().is_err(), "nothing else is generated in its place");
-    let warned = |entry: &touch2touch::app::tasks::Entry| entry.level == Level::Warning && entry.text.contains("mine");
-    assert!(state.log.entries.iter().any(warned), "{:?}", state.log.entries);
+    assert!(
+        matches!(&state.case_lacks()[..], [one] if one.contains("generator mine is not")),
+        "{:?}",
+        state.case_lacks()
+    );
     let opened = open(&lean, there.path()).unwrap();
     let err = check(&opened, &opened.bundles(), &Models::new(None), &JobCx::unwatched()).unwrap_err();
     assert!(err.why.contains("mine"), "{err}");

@@ -12,7 +12,6 @@ use super::effect::Effect;
 use super::keys::{ImprintSource, PredictionKey};
 use super::settings::state::GenerateSettings;
 use super::state::State;
-use super::tasks::state::Level;
 use super::view::state::UiRequest;
 use super::{library, predict, settings};
 use crate::io::case_file;
@@ -140,24 +139,11 @@ fn own_preferences(state: &mut State, effects: &mut Vec<Effect>) {
 pub(super) fn case_models(state: &mut State, effects: &mut Vec<Effect>) {
     let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
     let Some((pair, case, held)) = source.case().filter(|_| std::mem::take(&mut state.export.predict)) else { return };
-    if let Some(model) = &case.recipe.mask_model
-        && state.library.bundle(&model.id).is_none()
-    {
-        let text =
-            format!("The mask model {} of the case is not on this machine: its masks are made another way", model.name);
-        state.log.push(Level::Warning, text, None, Some(CASE_HINT.into()));
-    }
     let Some((model, config)) = &case.recipe.generator else { return };
     if let Some(bundle) = state.library.bundle(&model.id) {
         state.settings.generate.bundle = Some(bundle.name.clone());
         return predict::same_seed(state, effects);
     }
-    let text = format!(
-        "The generator {} of the case is not on this machine: its predicted imprints are shown as the case holds them, \
-         and cannot be made again here",
-        model.name
-    );
-    state.log.push(Level::Warning, text, None, Some(CASE_HINT.into()));
     let id: Arc<str> = model.id.as_str().into();
     state.library.lacking = Some((id.clone(), model.name.clone()));
     let Some(open) = &state.library.open else { return };
@@ -168,10 +154,6 @@ pub(super) fn case_models(state: &mut State, effects: &mut Vec<Effect>) {
         state.hold(recipe, case.recipe.shift, Arc::new(imprint.clone()), &model.name);
     }
 }
-
-/// What helps where a case names a model that is not here.
-const CASE_HINT: &str =
-    "Put the model's folder into one that the preferences name, or have the case saved again with it.";
 
 fn import(state: &mut State, effects: &mut Vec<Effect>) {
     let (Some(setup), Some(open)) = (state.import_setup(), &state.library.open) else { return };

@@ -498,6 +498,7 @@ impl eframe::App for StudioApp {
                 }
             }
             edited = bars::top(&mut cx, ui, &mut tree);
+            bars::case(&cx, ui);
             // Drawn before the panes, so it shows the read-out of the frame before: at rest they are the same.
             bars::bottom(&mut cx, ui, self.frame_ms);
             log_pane::notices(&mut cx, ui);

@@ -140,6 +140,20 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
     }
 }
 
+/// A line below the top bar while a case is open that cannot be made again here.
+pub(super) fn case(cx: &Cx<'_>, ui: &mut Ui) {
+    let lacks = cx.state.case_lacks();
+    if lacks.is_empty() {
+        return;
+    }
+    let frame = egui::Frame::new().fill(cx.p.panel).inner_margin(egui::Margin::symmetric(12, 3));
+    Panel::top("case").frame(frame).resizable(false).show(ui, |ui| {
+        let text = RichText::new(lacks.join(" ")).size(SMALL).color(cx.p.caution);
+        let hint = "Put the model's folder into one that the preferences name, or have the case saved again with it.";
+        ui.add(egui::Label::new(text).truncate()).on_hover_text(format!("{}\n{hint}", lacks.join("\n")));
+    });
+}
+
 /// The bar at the bottom. `frame_ms`: time of the last frame, milliseconds.
 pub(super) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui, frame_ms: f32) {
     let frame = egui::Frame::new().fill(cx.p.frame).inner_margin(egui::Margin::symmetric(12, 2));

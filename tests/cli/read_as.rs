@@ -58,17 +58,6 @@ fn fingers_that_were_swapped_are_said_by_every_verb_and_read_right_for_good() {
     // For one run, then for good; then again as it is stored.
     let (once, _) = error(&["--read-as", &remedy]);
     assert!(once < 3.0, "{once}");
-    // Nothing is fitted to wrong data unasked.
-    let fitted = dir.path().join("fitted");
-    let adapt = |words: &[&str]| {
-        let fixed = ["adapt", "--input", path, "--mask", "threshold", "--out", fitted.to_str().unwrap()];
-        run(&[&fixed[..], words].concat(), dir.path())
-    };
-    let refused = adapt(&[]);
-    let why = error_text(&refused);
-    assert!(!refused.status.success() && why.contains("fingers are swapped") && !fitted.exists(), "{why}");
-    let right = adapt(&["--read-as", &remedy]);
-    assert!(right.status.success() && fitted.join("manifest.json").is_file(), "{}", error_text(&right));
     let kept = run(&["read-as", path, "--set", &remedy], dir.path());
     assert!(kept.status.success() && set.join("read-as.txt").is_file(), "{}", error_text(&kept));
     let (for_good, _) = error(&[]);

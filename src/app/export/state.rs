@@ -18,7 +18,7 @@ use crate::domain::frames::PlanarPose;
 use crate::domain::rig::{PadId, Rig};
 use crate::io::case_file;
 use crate::work::bundles::{BundleInfo, BundleKind};
-use crate::work::case::CaseSetup;
+use crate::work::case::{CaseModel, CaseSetup};
 use crate::work::cloud::Clouds;
 use crate::work::error::TaskError;
 use crate::work::export::ExportChoice;
@@ -111,6 +111,24 @@ pub struct ImportForm {
 }
 
 impl State {
+    /// What of the open case cannot be made again on this machine, in sentences.
+    pub fn case_lacks(&self) -> Vec<String> {
+        let case = self.library.open.as_ref().and_then(|open| open.source.case());
+        // Which models are here is not known at once.
+        let Some((_, case, _)) = case.filter(|_| !self.export.predict) else { return Vec::new() };
+        let lacks = |model: &&CaseModel| self.library.bundle(&model.id).is_none();
+        let generator = case.recipe.generator.as_ref().map(|(model, _)| model);
+        let imprints = generator.filter(lacks).map(|model| {
+            let name = &model.name;
+            format!("Predicted imprints are shown as the case holds them: its generator {name} is not on this machine.")
+        });
+        let masks = case.recipe.mask_model.as_ref().filter(lacks).map(|model| {
+            let name = &model.name;
+            format!("Masks are made another way than in the case: its mask model {name} is not on this machine.")
+        });
+        imprints.into_iter().chain(masks).collect()
+    }
+
     /// What is imported as the form says, while it is open.
     pub fn import_setup(&self) -> Option<ImportSetup> {
         let form = self.export.importing.as_ref()?;
