@@ -96,7 +96,7 @@ enum Verb {
     Figure(Box<figure::FigureArgs>),
     /// Write a pair for other programs: its cloud (PLY), pose (JSON) and CAD model in the hand (STL).
     Export(Box<export::ExportArgs>),
-    /// Fits a generator to pairs of your own sensors, and says what it is worth on pairs that were left out.
+    /// Fit a generator to pairs of your own sensors, and say what it is worth on pairs that were left out.
     Adapt(Box<adapt::AdaptArgs>),
     /// Write training data for the networks: a data set or, with `simulator` as PATH, simulated touches, as shards that
     /// `python -m training.train` reads.

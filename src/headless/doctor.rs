@@ -11,6 +11,7 @@ use super::args::DatasetArgs;
 use super::{Common, Output, VerbResult};
 use crate::domain::doubt::Doubt;
 use crate::domain::findings::{Finding, Findings};
+use crate::domain::units::counted;
 use crate::infer::engine::EngineChoice;
 use crate::io::dataset::{Dataset, OpenError};
 use crate::io::doctor::{self, DoctorReport};
@@ -70,7 +71,7 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
             kinds if kinds == all => String::new(),
             kinds => format!(" of {kinds} kinds"),
         };
-        let mut text = format!("{title}: {} pairs, {all} problems{kinds}\n", report.pairs);
+        let mut text = format!("{title}: {}, {}{kinds}\n", counted(report.pairs, "pair"), counted(all, "problem"));
         for p in &report.problems {
             text += &format!("\n{}\n  {}\n  {}\n", p.file.display(), p.what, p.hint);
             if p.count > 1 {

@@ -20,6 +20,7 @@ use crate::app::labels::Review;
 use crate::app::library::{Place, Sort, short_name};
 use crate::domain::dataset::PairId;
 use crate::domain::evaluation::Figure;
+use crate::domain::units::counted;
 use crate::work::queue::QueueBy;
 
 /// Height of a row, points.
@@ -245,7 +246,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     let done =
         library.open.as_ref().map_or(0, |_| cx.state.document.reviews.values().filter(|r| r.is_finished()).count());
     ui.horizontal(|ui| {
-        let count = if shown == total { format!("{total} pairs") } else { format!("{shown} of {total} pairs") };
+        let count = if shown == total { counted(total, "pair") } else { format!("{shown} of {total} pairs") };
         ui.label(caption(count, cx.p));
         if done > 0 {
             ui.label(RichText::new(format!("{done} done")).size(SMALL).color(cx.p.good));

@@ -71,6 +71,17 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Runs what holds a model's lock while the engine computes. A thread of a pool takes on other work of the pool while it
+/// waits for the engine's threads, and that work may want the same lock, which it then waits for for ever: such a thread has
+/// another one do it.
+fn outside_of_pools<T: Send>(job: impl FnOnce() -> T + Send) -> T {
+    if rayon::current_thread_index().is_none() {
+        return job();
+    }
+    let done = std::thread::scope(|scope| scope.spawn(job).join());
+    done.unwrap_or_else(|panicked| std::panic::resume_unwind(panicked))
+}
+
 /// Where sheets lie: beside what the store keeps, if it keeps anything.
 fn folder_of(store: &Store) -> Option<std::path::PathBuf> {
     (store.budget() > 0).then(|| store.folder().to_owned())
@@ -242,26 +253,29 @@ impl Models {
             // Nothing has to be loaded to show what is there.
             self.ways(bundle)?
         } else {
-            let mut loaded = lock(&self.generator);
-            let generator = ready(&mut loaded, (bundle.id.clone(), engine), || {
-                cx.progress(0, config.steps.into(), "loading the model");
-                open_generator(bundle, engine)
-            })?;
-            let ways = self.ways_to(bundle, generator.spec(), generator.fit());
-            let begin = std::time::Instant::now();
-            let items: Vec<Item> = fresh.iter().map(|&at| Item { image: image[at], seed: wanted[at].seed }).collect();
-            let mut follow = Follow { cx, wanted, fresh: &fresh, chains: &ways.chains };
-            let made = generator.run(&images, &items, config, &mut follow).map_err(fail)?;
-            let each = begin.elapsed().as_secs_f64() / fresh.len() as f64;
-            for (&at, raw) in fresh.iter().zip(made) {
-                if let Some(store) = store
-                    && let Err(err) = lock(store).put(&keys[at], &raw, each)
-                {
-                    log::warn!("a prediction could not be kept on the disk: {err}");
+            outside_of_pools(|| {
+                let mut loaded = lock(&self.generator);
+                let generator = ready(&mut loaded, (bundle.id.clone(), engine), || {
+                    cx.progress(0, config.steps.into(), "loading the model");
+                    open_generator(bundle, engine)
+                })?;
+                let ways = self.ways_to(bundle, generator.spec(), generator.fit());
+                let begin = std::time::Instant::now();
+                let items: Vec<Item> =
+                    fresh.iter().map(|&at| Item { image: image[at], seed: wanted[at].seed }).collect();
+                let mut follow = Follow { cx, wanted, fresh: &fresh, chains: &ways.chains };
+                let made = generator.run(&images, &items, config, &mut follow).map_err(fail)?;
+                let each = begin.elapsed().as_secs_f64() / fresh.len() as f64;
+                for (&at, raw) in fresh.iter().zip(made) {
+                    if let Some(store) = store
+                        && let Err(err) = lock(store).put(&keys[at], &raw, each)
+                    {
+                        log::warn!("a prediction could not be kept on the disk: {err}");
+                    }
+                    answers[at] = Some((raw, each, false));
                 }
-                answers[at] = Some((raw, each, false));
-            }
-            ways
+                Ok::<_, TaskError>(ways)
+            })?
         };
         let prediction = |(raw, seconds, kept)| Prediction {
             raw,
@@ -282,11 +296,12 @@ impl Models {
     /// If it cannot be loaded, or is of another kind.
     pub fn load(&self, bundle: &BundleInfo, engine: EngineChoice) -> Result<(), TaskError> {
         let key = (bundle.id.clone(), engine);
+        let generator = || ready(&mut lock(&self.generator), key.clone(), || open_generator(bundle, engine)).map(drop);
+        let mask_model =
+            || ready(&mut lock(&self.mask_model), key.clone(), || open_mask_model(bundle, engine)).map(drop);
         match bundle.kind {
-            BundleKind::Generator => {
-                ready(&mut lock(&self.generator), key, || open_generator(bundle, engine)).map(drop)
-            }
-            BundleKind::Mask => ready(&mut lock(&self.mask_model), key, || open_mask_model(bundle, engine)).map(drop),
+            BundleKind::Generator => outside_of_pools(generator),
+            BundleKind::Mask => outside_of_pools(mask_model),
             BundleKind::Classifier => Err(TaskError::new(format!("Open {}", bundle.name), "it is a tool classifier")),
         }
     }
@@ -386,16 +401,17 @@ impl Models {
         Ok(spec.output.threshold as f32)
     }
 
-    fn with_mask_model<T>(
+    fn with_mask_model<T: Send>(
         &self,
         bundle: &BundleInfo,
         engine: EngineChoice,
-        ask: impl FnOnce(&mut MaskModel) -> Result<T, MaskError>,
+        ask: impl FnOnce(&mut MaskModel) -> Result<T, MaskError> + Send,
     ) -> Result<T, TaskError> {
-        let what = format!("Mask with {}", bundle.name);
-        let mut loaded = lock(&self.mask_model);
-        let model = ready(&mut loaded, (bundle.id.clone(), engine), || open_mask_model(bundle, engine))?;
-        ask(model).map_err(|err| TaskError::from_error(&what, &err))
+        outside_of_pools(|| {
+            let mut loaded = lock(&self.mask_model);
+            let model = ready(&mut loaded, (bundle.id.clone(), engine), || open_mask_model(bundle, engine))?;
+            ask(model).map_err(|err| TaskError::from_error(format!("Mask with {}", bundle.name), &err))
+        })
     }
 
     /// The contact mask of one pad's imprint: the one drawn by hand, else as the choice says.

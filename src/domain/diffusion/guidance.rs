@@ -8,7 +8,7 @@ pub const GUIDANCE: std::ops::RangeInclusive<f64> = 0.0..=20.0;
 /// A denoiser whose answer is moved away from what it says without the condition:
 /// `unconditional + scale · (conditional − unconditional)` (Ho & Salimans 2021, equation 6 with scale = 1 + w).
 ///
-/// Both answers come from one call with twice the batch. The combination is linear, so it is the same for noise, v and
+/// Both answers come from one call. The combination is linear, so it is the same for noise, v and
 /// sample predictions.
 pub struct Guided<'a> {
     inner: &'a mut dyn Denoiser,
