@@ -34,6 +34,7 @@ mod noise;
 pub mod picture;
 pub mod pose;
 pub mod postprocess;
+pub mod predicted_id;
 pub mod read_as;
 pub mod resample;
 pub mod rig;

@@ -11,6 +11,8 @@ mod adapt;
 mod agreement;
 mod apply;
 #[cfg(feature = "onnx")]
+mod before;
+#[cfg(feature = "onnx")]
 mod case;
 mod cli;
 #[cfg(feature = "onnx")]

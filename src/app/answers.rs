@@ -60,7 +60,7 @@ pub enum Answer {
     /// A job ended without a result.
     TaskFailed(Ticket, TaskError),
     /// A result that a pane asked for could not be made.
-    RequestFailed(DatasetSeq, Request, TaskError),
+    RequestFailed(DatasetSeq, Box<Request>, TaskError),
     /// The labels of a pair are on the disk, as they were when this writing was asked for.
     LabelsSaved(String, Revision, Option<Box<Merged>>),
     /// The labels of a pair could not be written.
@@ -153,7 +153,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             state.log.saved(line, place);
         }
         Answer::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
-        Answer::RequestFailed(seq, request, err) if is_open(state, seq) => failed_request(state, request, err),
+        Answer::RequestFailed(seq, request, err) if is_open(state, seq) => failed_request(state, *request, err),
         Answer::LabelsSaved(name, revision, merged) => {
             // An answer to anything but the last request: what was changed since is not on the disk yet.
             if state.document.asked.get(&name) == Some(&revision) {

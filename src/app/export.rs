@@ -108,9 +108,9 @@ pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
             steps: config.steps,
             seed: config.seed,
             sampler: config.sampler,
-            eta: config.eta as f32,
+            eta: config.eta,
             spacing: config.spacing,
-            guidance: config.guidance as f32,
+            guidance: config.guidance,
             ..state.settings.generate.clone()
         };
     }

@@ -281,6 +281,7 @@ mod tests {
     use super::*;
     use crate::domain::grid::Mask;
     use crate::domain::label::Provenance;
+    use crate::domain::predicted_id::PredictedId;
     use crate::domain::rig::{PadId, lab};
     use crate::work::labels::ImprintOf;
 
@@ -338,7 +339,8 @@ mod tests {
         assert!(doc.hand_mask("a", &MaskPlace::measured(lab::LEFT)).unwrap().mask[(0, 1)]);
         assert!(doc.hand_mask("b", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(0, 1)]);
         // A prediction that is not on screen is not touched either.
-        let predicted = MaskPlace { pad: lab::RIGHT, of: ImprintOf::Predicted("a prediction".into()) };
+        let predicted =
+            MaskPlace { pad: lab::RIGHT, of: ImprintOf::Predicted(PredictedId::verbatim("a prediction".into())) };
         let mut edit = Edit::Mask { pair: "a".into(), place: predicted.clone(), mask: None };
         edit.swap(&mut doc);
         history.record(Gesture { name: "stroke".into(), edits: vec![edit] });

@@ -1,7 +1,7 @@
 //! Names of what is open and looked at, and the words that recipes are made of. The recipes themselves stand with their
 //! results in [`super::results`].
 
-pub use crate::domain::bits::Bits;
+pub use crate::domain::bits::{Bits, Bits64};
 pub use crate::domain::diffusion::{Preset, Sampler, Spacing};
 pub use crate::domain::postprocess::ShiftMode;
 pub use crate::work::labels::{ImprintSource, Revision};

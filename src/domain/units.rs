@@ -67,8 +67,13 @@ pub fn angle_error(a: f64, b: f64) -> f64 {
 }
 
 /// A number from a file or a text box, brought into a range; what is not finite becomes `default`.
-pub fn clamp_or(value: f32, lo: f32, hi: f32, default: f32) -> f32 {
-    if value.is_finite() { value.clamp(lo, hi) } else { default }
+pub fn clamp_or<T: Copy + PartialOrd + Into<f64>>(value: T, lo: T, hi: T, default: T) -> T {
+    match value {
+        value if !value.into().is_finite() => default,
+        value if value < lo => lo,
+        value if value > hi => hi,
+        value => value,
+    }
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 
 mod journal;
 
+use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -22,6 +23,7 @@ use crate::domain::dataset::Problem;
 use crate::domain::grid::Mask;
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{Marks, PackedMask};
+use crate::domain::predicted_id::PredictedId;
 use crate::domain::rig::{PadId, Rig};
 
 /// Name of the folder beside a data set.
@@ -331,7 +333,7 @@ impl MaskStore {
     ///
     /// # Errors
     /// As [`MaskStore::load`].
-    pub fn load_predicted(&self, pair: &str, finger: PadId) -> Result<Vec<(String, StoredMask)>, StoreError> {
+    pub fn load_predicted(&self, pair: &str, finger: PadId) -> Result<Vec<(PredictedId, StoredMask)>, StoreError> {
         let Some((file, bytes)) = self.find(&self.predicted_name(pair, finger))? else { return Ok(Vec::new()) };
         let damaged = |reason: String| StoreError::Damaged { file: file.clone(), reason };
         let content: PredictedFile = serde_json::from_slice(&bytes).map_err(|err| damaged(err.to_string()))?;
@@ -339,11 +341,19 @@ impl MaskStore {
         if content.pair != pair || content.finger != self.rig.pad_key(finger) {
             return Err(damaged(format!("it belongs to the {} finger of {}", content.finger, content.pair)));
         }
-        let one = |m: PredictedMask| {
+        // Earlier versions wrote one prediction in several ways: of masks on the same one that saved last is found, the
+        // others stay in the file under a name of their own.
+        let mut masks: Vec<_> = content.masks.into_iter().map(|m| (PredictedId::from(m.of.clone()), m)).collect();
+        masks.sort_by_key(|(of, m)| Reverse((of.as_str() == m.of, m.saved_unix_s)));
+        let mut all: Vec<(PredictedId, StoredMask)> = Vec::new();
+        for (mut of, m) in masks {
+            while all.iter().any(|(known, _)| *known == of) {
+                of = PredictedId::verbatim(format!("{of}, earlier"));
+            }
             let (mask, marks) = m.mask.unpack().map_err(|err| damaged(err.to_string()))?;
-            Ok((m.of, StoredMask { mask, marks, person: m.person, saved_unix_s: m.saved_unix_s }))
-        };
-        content.masks.into_iter().map(one).collect()
+            all.push((of, StoredMask { mask, marks, person: m.person, saved_unix_s: m.saved_unix_s }));
+        }
+        Ok(all)
     }
 
     /// Saves the mask drawn on the prediction `of`, beside those of other predictions; `None` removes it.
@@ -354,18 +364,18 @@ impl MaskStore {
         &self,
         pair: &str,
         finger: PadId,
-        of: &str,
+        of: &PredictedId,
         mask: Option<&StoredMask>,
     ) -> Result<(), StoreError> {
         let mut all = self.load_predicted(pair, finger)?;
         all.retain(|(other, _)| other != of);
-        all.extend(mask.map(|mask| (of.to_owned(), mask.clone())));
+        all.extend(mask.map(|mask| (of.clone(), mask.clone())));
         let file = self.folder.join(self.predicted_name(pair, finger));
         if all.is_empty() && !file.exists() {
             return Ok(());
         }
-        let one = |(of, stored): (String, StoredMask)| PredictedMask {
-            of,
+        let one = |(of, stored): (PredictedId, StoredMask)| PredictedMask {
+            of: of.into(),
             mask: PackedMask::pack(&stored.mask, &stored.marks),
             person: stored.person,
             saved_unix_s: stored.saved_unix_s,

@@ -23,6 +23,7 @@ use crate::domain::grid::{DepthMap, Mask};
 use crate::domain::hand::AcceptedPose;
 use crate::domain::label::{CleanUp, Drawing, Ground, Marks, PackError, PackedMask, Provenance, merge};
 use crate::domain::postprocess::ShiftMode;
+use crate::domain::predicted_id::PredictedId;
 use crate::domain::rig::{PadId, Rig};
 use crate::io::masks;
 
@@ -151,24 +152,14 @@ pub enum ImprintOf {
     /// What the Soft Bubble measured.
     #[default]
     Measured,
-    /// One prediction, by all that decides it; see [`ImprintOf::predicted`].
-    Predicted(Arc<str>),
+    /// One prediction, by all that decides it.
+    Predicted(PredictedId),
 }
 
 impl ImprintOf {
     /// The prediction of a generator (its bundle's identity) with these choices.
     pub fn predicted(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> Self {
-        let choices = serde_json::to_string(&(config, shift)).unwrap_or_else(|_| format!("{config:?} {shift:?}"));
-        Self::Predicted(format!("{bundle} {choices}").into())
-    }
-
-    /// Bundle and choices of a prediction, as [`Self::predicted`] took them; `None` for what was measured, and for what another
-    /// version of the program wrote otherwise.
-    pub fn prediction(&self) -> Option<(&str, GenerateConfig, ShiftMode)> {
-        let Self::Predicted(of) = self else { return None };
-        let (bundle, choices) = of.split_once(' ')?;
-        let (config, shift) = serde_json::from_str(choices).ok()?;
-        Some((bundle, config, shift))
+        Self::Predicted(PredictedId::new(bundle, config, shift))
     }
 
     /// Which of the two it is.

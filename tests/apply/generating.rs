@@ -204,6 +204,6 @@ fn guidance_is_only_asked_of_a_bundle_that_was_trained_for_it() {
     let preset = GenerateSettings::default();
     assert_eq!(preset.config(&bundle(true)).guidance, 2.5);
     assert_eq!(preset.spelt_out(Some(&bundle(true))).spacing, Spacing::Lab);
-    let wild = GenerateSettings { guidance: f32::NAN, preview_every: u32::MAX, ..own }.validated();
+    let wild = GenerateSettings { guidance: f64::NAN, preview_every: u32::MAX, ..own }.validated();
     assert_eq!((wild.guidance, wild.preview_every), (1.0, 1000));
 }

@@ -22,7 +22,7 @@ const RIGHT: PadId = lab::RIGHT;
 enum Move {
     Steps(u32),
     Seed(u64),
-    Eta(f32),
+    Eta(f64),
     Model(u8),
     Preset(Preset),
     Runtime(EngineChoice),
@@ -38,7 +38,7 @@ fn moves() -> impl Strategy<Value = Move> {
     prop_oneof![
         (1u32..4).prop_map(Move::Steps),
         (40u64..43).prop_map(Move::Seed),
-        prop_oneof![Just(0.0f32), Just(0.5)].prop_map(Move::Eta),
+        prop_oneof![Just(0.0f64), Just(0.1)].prop_map(Move::Eta),
         (0u8..2).prop_map(Move::Model),
         prop_oneof![Just(Preset::Default), Just(Preset::Fast)].prop_map(Move::Preset),
         prop_oneof![Just(EngineChoice::Auto), Just(EngineChoice::Rten)].prop_map(Move::Runtime),

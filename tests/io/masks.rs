@@ -5,10 +5,13 @@ use std::process::{Command, Stdio};
 
 use glam::DVec2;
 use serde_json::Value;
+use touch2touch::domain::diffusion::GenerateConfig;
 use touch2touch::domain::frames::PlanarPose;
 use touch2touch::domain::grid::Mask;
 use touch2touch::domain::hand::{AcceptedPose, HandPose};
 use touch2touch::domain::label::{Marks, Provenance, paint_where};
+use touch2touch::domain::postprocess::ShiftMode;
+use touch2touch::domain::predicted_id::PredictedId;
 use touch2touch::domain::rig::lab;
 use touch2touch::io::dataset::Dataset;
 use touch2touch::io::masks::{FOLDER, MaskStore, StoreError, StoredMask, StoredReview};
@@ -290,19 +293,20 @@ fn masks_of_predictions_lie_beside_each_other_and_never_for_each_other() {
     let dir = tempfile::tempdir().unwrap();
     let store = MaskStore::in_folder(dir.path().join("masks"));
     let mask = |n: usize| stored(Mask::from_fn(175, 140, |x, y| x * y % (n + 7) == 0));
-    store.save_predicted(PAIR, lab::RIGHT, "never", None).unwrap();
+    let id = |text: &str| PredictedId::verbatim(text.into());
+    store.save_predicted(PAIR, lab::RIGHT, &id("never"), None).unwrap();
     assert!(!dir.path().join("masks").exists(), "nothing is made for nothing");
-    store.save_predicted(PAIR, lab::RIGHT, "seed 1", Some(&mask(1))).unwrap();
-    store.save_predicted(PAIR, lab::RIGHT, "seed 2", Some(&mask(2))).unwrap();
+    store.save_predicted(PAIR, lab::RIGHT, &id("seed 1"), Some(&mask(1))).unwrap();
+    store.save_predicted(PAIR, lab::RIGHT, &id("seed 2"), Some(&mask(2))).unwrap();
     store.save(PAIR, lab::RIGHT, Some(&mask(3))).unwrap();
-    store.save_predicted(PAIR, lab::RIGHT, "seed 1", Some(&mask(4))).unwrap();
+    store.save_predicted(PAIR, lab::RIGHT, &id("seed 1"), Some(&mask(4))).unwrap();
     let mut found = store.load_predicted(PAIR, lab::RIGHT).unwrap();
     found.sort_by(|a, b| a.0.cmp(&b.0));
-    assert_eq!(found, [("seed 1".to_owned(), mask(4)), ("seed 2".to_owned(), mask(2))]);
+    assert_eq!(found, [(id("seed 1"), mask(4)), (id("seed 2"), mask(2))]);
     assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), Some(mask(3)));
     assert_eq!(store.masks(), [(PAIR.to_owned(), lab::RIGHT)], "what is exported is measured");
     assert!(store.load_predicted(PAIR, lab::LEFT).unwrap().is_empty());
-    store.save_predicted(PAIR, lab::RIGHT, "seed 2", None).unwrap();
+    store.save_predicted(PAIR, lab::RIGHT, &id("seed 2"), None).unwrap();
     assert_eq!(store.load_predicted(PAIR, lab::RIGHT).unwrap().len(), 1);
     // What cannot be read is never replaced.
     let file = std::fs::read_dir(store.folder())
@@ -313,7 +317,7 @@ fn masks_of_predictions_lie_beside_each_other_and_never_for_each_other() {
     for damage in ["{", "{}", r#"{"format": "touch2touch-predicted-masks", "version": 9}"#] {
         std::fs::write(&file, damage).unwrap();
         assert!(store.load_predicted(PAIR, lab::RIGHT).is_err());
-        assert!(store.save_predicted(PAIR, lab::RIGHT, "seed 3", Some(&mask(5))).is_err());
+        assert!(store.save_predicted(PAIR, lab::RIGHT, &id("seed 3"), Some(&mask(5))).is_err());
         assert_eq!(std::fs::read_to_string(&file).unwrap(), damage);
     }
 }
@@ -382,4 +386,56 @@ fn nothing_is_written_where_the_data_set_is_not_any_more() {
     std::fs::remove_dir(&root).unwrap();
     std::fs::rename(&elsewhere, &root).unwrap();
     store.save(PAIR, lab::RIGHT, Some(&mask)).unwrap();
+}
+
+/// Before version 1 of [`PredictedId`] the verbs and the studio wrote the same choices in two ways.
+#[test]
+fn a_mask_filed_by_an_earlier_version_is_found_and_none_is_lost() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = MaskStore::in_folder(dir.path().join("masks"));
+    let config = GenerateConfig { steps: 2, eta: 0.1, ..GenerateConfig::default() };
+    let before = |eta: f64| {
+        let choices = serde_json::to_string(&(GenerateConfig { eta, ..config }, ShiftMode::Raw)).unwrap();
+        PredictedId::verbatim(format!("b0 {choices}"))
+    };
+    let mask = |n: usize| StoredMask {
+        saved_unix_s: 100 + n as u64,
+        ..stored(Mask::from_fn(175, 140, |x, y| x * y % (n + 7) == 0))
+    };
+    let id = PredictedId::new("b0", &config, ShiftMode::Raw);
+    // The file as an earlier version left it.
+    let written = |masks: &[(&PredictedId, usize)]| {
+        let named = |n: usize| PredictedId::verbatim(n.to_string());
+        let kept = store.load_predicted(PAIR, lab::RIGHT).unwrap();
+        kept.iter().for_each(|(of, _)| store.save_predicted(PAIR, lab::RIGHT, of, None).unwrap());
+        masks.iter().for_each(|(_, n)| store.save_predicted(PAIR, lab::RIGHT, &named(*n), Some(&mask(*n))).unwrap());
+        let entries = std::fs::read_dir(store.folder()).unwrap().map(|entry| entry.unwrap().path());
+        let file = entries.into_iter().find(|path| path.to_string_lossy().ends_with(".predicted.json")).unwrap();
+        let mut content: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+        for mask in content["masks"].as_array_mut().unwrap() {
+            let (of, _) = masks.iter().find(|(_, n)| mask["of"].as_str() == Some(named(*n).as_str())).unwrap();
+            mask["of"] = of.as_str().into();
+        }
+        std::fs::write(&file, content.to_string()).unwrap();
+    };
+    let found = |of: &PredictedId| {
+        let all = store.load_predicted(PAIR, lab::RIGHT).unwrap();
+        (all.len(), all.into_iter().find(|(known, _)| known == of).map(|(_, mask)| mask))
+    };
+    for eta in [0.1, f64::from(0.1f32)] {
+        written(&[(&before(eta), 1)]);
+        assert_eq!(found(&id), (1, Some(mask(1))));
+        // Drawn on again it is one mask, under its new name.
+        store.save_predicted(PAIR, lab::RIGHT, &id, Some(&mask(2))).unwrap();
+        assert_eq!(found(&id), (1, Some(mask(2))));
+    }
+    // Of two the later is found; the other stays, whatever is done to the first.
+    let [verb, studio] = [before(0.1), before(f64::from(0.1f32))];
+    for (first, second) in [(&verb, &studio), (&studio, &verb)] {
+        written(&[(first, 1), (second, 2)]);
+        assert_eq!(found(&id), (2, Some(mask(2))));
+        store.save_predicted(PAIR, lab::RIGHT, &id, Some(&mask(3))).unwrap();
+        assert_eq!(found(&id), (2, Some(mask(3))));
+        assert!(store.load_predicted(PAIR, lab::RIGHT).unwrap().iter().any(|(_, kept)| *kept == mask(1)));
+    }
 }

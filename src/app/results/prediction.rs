@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::super::keys::{Bits, Sampler, Spacing};
+use super::super::keys::{Bits64, Sampler, Spacing};
 use super::super::services::{DataSource, Services};
 use super::preview::Onlooker;
 use super::{Computes, Job, Lane, Results, SharedServices, State, TouchKey, Wanted};
@@ -34,11 +34,11 @@ pub struct PredictionKey {
     /// The sampler.
     pub sampler: Sampler,
     /// DDIM's noise share, 0..1.
-    pub eta: Bits,
+    pub eta: Bits64,
     /// The training steps visited.
     pub spacing: Spacing,
     /// Scale of the guidance; 1 is none.
-    pub guidance: Bits,
+    pub guidance: Bits64,
     /// The model runtime: two of them round differently.
     pub runtime: EngineChoice,
 }
@@ -52,9 +52,9 @@ impl PredictionKey {
             steps: config.steps,
             seed: config.seed,
             sampler: config.sampler,
-            eta: (config.eta as f32).into(),
+            eta: config.eta.into(),
             spacing: config.spacing,
-            guidance: (config.guidance as f32).into(),
+            guidance: config.guidance.into(),
             runtime,
         }
     }
@@ -68,11 +68,11 @@ impl PredictionKey {
     pub fn config(&self) -> GenerateConfig {
         GenerateConfig {
             steps: self.steps,
-            eta: f64::from(self.eta.get()),
+            eta: self.eta.get(),
             seed: self.seed,
             sampler: self.sampler,
             spacing: self.spacing,
-            guidance: f64::from(self.guidance.get()),
+            guidance: self.guidance.get(),
         }
     }
 }

@@ -151,7 +151,7 @@ impl Lanes {
                 what,
                 cx: JobCx::unwatched(),
                 body: Box::new(move |cx| Ok(Answer::Computed(seq, body(cx)?))),
-                failed: Box::new(move |err| Answer::RequestFailed(seq, failed, err)),
+                failed: Box::new(move |err| Answer::RequestFailed(seq, Box::new(failed), err)),
             });
         }
         for (state, mut jobs) in self.lanes.iter().zip(fresh) {

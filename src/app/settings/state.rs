@@ -298,11 +298,11 @@ pub struct GenerateSettings {
     /// The sampler.
     pub sampler: Sampler,
     /// DDIM's noise share, 0..1.
-    pub eta: f32,
+    pub eta: f64,
     /// The training steps visited.
     pub spacing: Spacing,
     /// Scale of the guidance, for bundles trained for it; 1 is none.
-    pub guidance: f32,
+    pub guidance: f64,
     /// A picture on the way after so many steps, and after the first; 0 = none.
     pub preview_every: u32,
     /// Whether both fingers are generated (the pose needs both), or only the one selected.
@@ -337,7 +337,7 @@ impl GenerateSettings {
     pub fn validated(mut self) -> Self {
         self.steps = self.steps.clamp(*STEPS.start(), *STEPS.end());
         self.eta = clamp_or(self.eta, 0.0, 1.0, 0.0);
-        self.guidance = clamp_or(self.guidance, *GUIDANCE.start() as f32, *GUIDANCE.end() as f32, 1.0);
+        self.guidance = clamp_or(self.guidance, *GUIDANCE.start(), *GUIDANCE.end(), 1.0);
         self.preview_every = self.preview_every.min(*STEPS.end());
         self
     }
@@ -346,11 +346,11 @@ impl GenerateSettings {
     pub fn config(&self, bundle: &BundleInfo) -> GenerateConfig {
         let own = GenerateConfig {
             steps: self.steps,
-            eta: self.eta.into(),
+            eta: self.eta,
             seed: self.seed,
             sampler: self.sampler,
             spacing: self.spacing,
-            guidance: self.guidance.into(),
+            guidance: self.guidance,
         };
         match (self.preset, &bundle.generator) {
             (Some(preset), Some(g)) => {
@@ -368,10 +368,10 @@ impl GenerateSettings {
         let Some(config) = bundle.map(|bundle| self.config(bundle)) else { return self.clone() };
         Self {
             steps: config.steps,
-            eta: config.eta as f32,
+            eta: config.eta,
             sampler: config.sampler,
             spacing: config.spacing,
-            guidance: config.guidance as f32,
+            guidance: config.guidance,
             ..self.clone()
         }
     }

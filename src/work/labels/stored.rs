@@ -137,7 +137,7 @@ impl Labels {
                 labels.masks.insert(MaskPlace::measured(pad), hand_of(stored));
             }
             for (of, stored) in store.load_predicted(name, pad).map_err(fail)? {
-                labels.masks.insert(MaskPlace { pad, of: ImprintOf::Predicted(of.into()) }, hand_of(stored));
+                labels.masks.insert(MaskPlace { pad, of: ImprintOf::Predicted(of) }, hand_of(stored));
             }
         }
         if let Some(stored) = store.load_review(name).map_err(fail)? {
@@ -157,7 +157,7 @@ impl Labels {
         let stored = match &place.of {
             ImprintOf::Measured => store.load(name, place.pad)?,
             ImprintOf::Predicted(of) => {
-                store.load_predicted(name, place.pad)?.into_iter().find(|(other, _)| **other == **of).map(|(_, m)| m)
+                store.load_predicted(name, place.pad)?.into_iter().find(|(other, _)| other == of).map(|(_, m)| m)
             }
         };
         Ok(stored.map(hand_of))

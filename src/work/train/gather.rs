@@ -178,12 +178,12 @@ fn imprint(
     cx: &JobCx,
 ) -> Result<DepthMap, TaskError> {
     let touch = sample.pad(place.pad).ok_or_else(|| TaskError::new(WHAT, "the pair has no such finger"))?;
-    let ImprintOf::Predicted(_) = place.of else {
+    let ImprintOf::Predicted(of) = &place.of else {
         let depth = touch.depth().ok_or_else(|| TaskError::new(WHAT, "the finger has no imprint"))?;
         return Ok(depth.imprint.clone());
     };
     let unknown = || TaskError::new(WHAT, "what decided the prediction that the mask is of cannot be read");
-    let (bundle, config, shift) = place.of.prediction().ok_or_else(unknown)?;
+    let (bundle, config, shift) = of.parts().ok_or_else(unknown)?;
     let known = setup.generators.iter().find(|known| known.kind == BundleKind::Generator && *known.id == *bundle);
     let generator = known
         .ok_or_else(|| TaskError::new(WHAT, "the model whose prediction the mask is of is not among the bundles"))?;

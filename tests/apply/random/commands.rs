@@ -187,7 +187,7 @@ fn generate() -> impl Strategy<Value = GenerateSettings> {
         |(steps, seed, eta, seed_locked, both)| GenerateSettings {
             steps,
             seed,
-            eta,
+            eta: eta.into(),
             seed_locked,
             both_fingers: both,
             ..GenerateSettings::default()
@@ -554,7 +554,7 @@ draws! {
         1 Saved(ticket(), Just("Something".to_owned()), Just(PathBuf::from("/dev/null/folder"))),
         1 Revealed,
         1 TaskFailed(ticket(), error()),
-        1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Request::Sample(t.pair)), error()),
+        1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Box::new(Request::Sample(t.pair))), error()),
         1 LabelsSaved(Just("tool_a/data_0".to_owned()), Just(Revision(u64::MAX)), Just(None)),
         1 LabelsFailed(select(vec![DatasetSeq(1), NEVER]).prop_map(not_saved)),
         1 LabelsKept(select(vec![Vec::new(), vec![("tool_a/data_0".to_owned(), Revision(1))]]), Just(PathBuf::from("elsewhere"))),

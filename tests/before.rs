@@ -1,0 +1,95 @@
+//! What an earlier build wrote is found by this one, in the studio and by the verbs alike.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde_json::Value;
+use touch2touch::app::command::{Command, Pane, ViewCommand};
+use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::library::Place;
+use touch2touch::app::runtime::Runtime;
+use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::settings::{GenerateSettings, Settings};
+use touch2touch::app::state::State;
+use touch2touch::domain::diffusion::Sampler;
+use touch2touch::domain::rig::lab;
+use touch2touch::infer::engine::EngineChoice;
+use touch2touch::work::bundles;
+
+use crate::cli_generate::full_size_bundle;
+use crate::support::run;
+
+/// A simulated pair with the labels that a build before `PredictedId` wrote: a mask on the right finger's prediction (DDIM,
+/// 2 steps, eta 0.1), an accepted pose of it, a note. And the bundle that predicted it.
+fn labeled(dir: &Path, spelled: impl Fn(&str) -> String) -> [PathBuf; 2] {
+    let (set, bundle) = (dir.join("set"), full_size_bundle(dir));
+    let path = set.to_str().unwrap();
+    assert!(
+        run(&["simulate", "--out", path, "--tools", "pattern_36", "--grasps", "1", "--seed", "3"], dir)
+            .status
+            .success()
+    );
+    let id = bundles::open("test", bundle.as_path()).unwrap().id;
+    let labels = set.join("touch2touch_masks");
+    std::fs::create_dir(&labels).unwrap();
+    for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/before/labels")).unwrap() {
+        let file = entry.unwrap().path();
+        let text = std::fs::read_to_string(&file).unwrap();
+        // The tests' bundle has another identity wherever its manifest is written anew.
+        let text = text.replace("3bba1b752350ca0aed061dfaaba2ef551efc19ed9d429e04f4e79ed7dd4a188c", &id);
+        std::fs::write(labels.join(file.file_name().unwrap()), spelled(&text)).unwrap();
+    }
+    [set, bundle]
+}
+
+/// Whether the studio shows a drawn mask on the right finger's prediction.
+fn in_studio(home: &Path, [set, bundle]: &[PathBuf; 2]) -> bool {
+    let mut state = State::default();
+    let services = LiveServices::with_config_folder(Some(home.to_owned()));
+    let settings = Settings {
+        bundle_folders: vec![bundle.clone()],
+        runtime: EngineChoice::Rten,
+        generate: GenerateSettings {
+            bundle: Some(bundles::open("test", bundle.as_path()).unwrap().name),
+            preset: None,
+            steps: 2,
+            eta: 0.1,
+            sampler: Sampler::Ddim,
+            ..GenerateSettings::default()
+        },
+        ..Settings::default()
+    };
+    let file = home.join("settings.json");
+    std::fs::write(&file, serde_json::to_vec(&settings).unwrap()).unwrap();
+    let mut runtime = Runtime::inline(Arc::new(services));
+    runtime.start(&mut state, Some(Place::Path(set.clone())));
+    runtime
+        .tick(&mut state, vec![Command::View(ViewCommand::ShowPanes([Pane::Predicted, Pane::ScenePredicted].into()))]);
+    runtime.settle(&mut state);
+    let shown = state.chosen(lab::RIGHT).expect("it is predicted by itself");
+    assert_eq!((shown.steps, shown.config().eta, state.outdated(lab::RIGHT)), (2, 0.1, None));
+    state.hand_mask(ImprintSource::Predicted, lab::RIGHT).is_some()
+}
+
+#[test]
+fn a_mask_on_a_prediction_is_found_by_what_decided_the_prediction() {
+    // As the verbs wrote eta, and as the studio did, which took it for 32 bits.
+    let spellings: [fn(&str) -> String; 2] =
+        [str::to_owned, |text| text.replace(r#"\"eta\":0.1"#, &format!(r#"\"eta\":{}"#, f64::from(0.1f32)))];
+    for spelled in spellings {
+        let dir = tempfile::tempdir().unwrap();
+        let places = labeled(dir.path(), spelled);
+        let [set, bundle] = places.each_ref().map(|path| path.to_str().unwrap());
+        let choices = ["--runtime", "rten", "--steps", "2", "--eta", "0.1", "--sampler", "ddim"];
+        let pose = |more: &[&str]| -> Value {
+            let fixed = ["pose", set, "--imprint", "predicted", "--mask", "top_percent", "--bundle", bundle, "--json"];
+            let done = run(&[&fixed[..], &choices, more].concat(), dir.path());
+            serde_json::from_slice::<Value>(&done.stdout).unwrap()["cases"][0].clone()
+        };
+        let found = pose(&[]);
+        assert_eq!(found["mask"], "hand, top_percent", "{found:#}");
+        assert_eq!(found["accepted"]["by_hand"], true, "{found:#}");
+        assert_eq!(pose(&["--seed", "7"])["mask"], "top_percent", "another prediction has its own");
+        assert!(in_studio(dir.path(), &places));
+    }
+}
